@@ -7,7 +7,8 @@
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
-CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) setup.py pyproject.toml
+CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) \
+        $(wildcard python/vkbloom/own/glsl/*/*) python/vkbloom/own/spirv.py setup.py pyproject.toml
 
 # Test processes. All tests of a file run in one process, which makes its fixtures once.
 WORKERS := $(shell nproc 2>/dev/null || echo 2)

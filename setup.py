@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import struct
 import subprocess
@@ -14,8 +15,12 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 SHADERS = Path("shaders")
+# GLSL that users can include, too.
+LIBRARY = Path("python/vkbloom/own/glsl")
 SPIRV = Path("build/spirv")
 STAGES = (".vert", ".frag", ".comp")
+# Of the package itself, which cannot be imported before its core is built.
+without_contraction = runpy.run_path("python/vkbloom/own/spirv.py")["without_contraction"]
 
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
@@ -101,37 +106,6 @@ def modules(shader: Path) -> list[Module]:
     return [Module(name, shader)]
 
 
-# Of SPIR-V: words of a module's header; the opcodes of types and of arithmetic on floats (FNegate
-# to FMod, VectorTimesScalar to Dot); the instruction OpDecorate, of three words; NoContraction.
-HEADER_WORDS = 5
-TYPES = range(19, 40)
-FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
-DECORATE = 3 << 16 | 71
-NO_CONTRACTION = 42
-
-
-def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the module with NoContraction on the result of each operation on floats.
-
-    Else a compiler may make one operation of a product and a sum, which rounds once, in one shader
-    and not in another that has the same expression: variants of a pass would differ in the last
-    bit. GLSL's `precise` does the same for a variable, but where it is forgotten only some GPUs
-    show it.
-    """
-    decorations = []
-    first_type = 0
-    position = HEADER_WORDS
-    while position < len(words):
-        opcode, count = words[position] & 0xFFFF, words[position] >> 16
-        if opcode in TYPES and not first_type:
-            first_type = position
-        if opcode in FLOAT_ARITHMETIC:
-            decorations += [DECORATE, words[position + 2], NO_CONTRACTION]
-        position += count
-    # Decorations come before all types.
-    return (*words[:first_type], *decorations, *words[first_type:])
-
-
 def compile_shader(module: Module, target: Path) -> None:
     """Compile one module, as glslang does, to a file."""
     compiler = shutil.which("glslangValidator") or shutil.which("glslang")
@@ -139,7 +113,8 @@ def compile_shader(module: Module, target: Path) -> None:
         raise SystemExit(
             "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
         )
-    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", *module.options]
+    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
+    command += module.options
     command += ["-o", str(target), str(module.shader)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
@@ -149,7 +124,8 @@ def compile_shader(module: Module, target: Path) -> None:
 def compile_module(module: Module) -> tuple[int, ...]:
     """Compile one module to its SPIR-V words."""
     target = SPIRV / f"{module.name}.spv"
-    sources = [Path("setup.py"), *SHADERS.rglob("*.*")]
+    sources = [Path("setup.py"), Path("python/vkbloom/own/spirv.py")]
+    sources += [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
     if not target.exists() or target.stat().st_mtime < max(s.stat().st_mtime for s in sources):
         compile_shader(module, target)
     code = target.read_bytes()
@@ -253,6 +229,7 @@ setup(
             depends=[
                 *(str(path) for path in Path("csrc").rglob("*.h")),
                 *(str(path) for path in SHADERS.rglob("*.*")),
+                *(str(path) for path in LIBRARY.rglob("*.glsl")),
             ],
             include_dirs=["csrc", ".", volk_folder()],
             define_macros=[("VK_NO_PROTOTYPES", None), ("Py_LIMITED_API", "0x030b0000")],

@@ -158,6 +158,8 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
         if (fits)
             return vkb_read_kernel(settings_object, frame, buffers, &self->kernel,
                                    &settings->kernel);
+        if (error.kind == VKB_ERROR_VALUE)
+            vkb_add_words(&error, ". A smaller bloom_scale or kernel_size makes it so");
     }
     vkb_raise(state, &error);
     return false;

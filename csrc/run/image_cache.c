@@ -177,8 +177,8 @@ static bool check_memory(const struct vkb_device *device, const struct vkb_graph
     // Plans without a renderer know no heaps.
     if (convolves && largest && needed > largest)
         return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
-                        "%llu MiB of images are needed, and the adapter %s has %llu; use a smaller "
-                        "bloom_scale",
+                        "memory is short: %llu MiB of images are needed, and the adapter %s has "
+                        "%llu; use a smaller bloom_scale or kernel_size",
                         (unsigned long long)(needed >> 20), device->adapter.name,
                         (unsigned long long)(largest >> 20));
     return true;

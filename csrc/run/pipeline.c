@@ -429,6 +429,18 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
     return create_graphics(device, pipelines, pass, &constants, render_pass, pipeline, error);
 }
 
+// lavapipe compiles in this process, and ends it where that fails.
+enum { COMPILE_MIB = 64 };
+
+static bool has_room_to_compile(const struct vkb_device *device, struct vkb_error *error)
+{
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU
+        || vkb_require_room("compiling shaders", COMPILE_MIB, error))
+        return true;
+    vkb_add_words(error, ". %s", vkb_memory_hint);
+    return false;
+}
+
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                        const struct vkb_pass_row *pass, VkRenderPass render_pass,
                        VkPipeline *pipeline, struct vkb_error *error)
@@ -454,6 +466,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
         }
     if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
                   pipelines->entry_count + 1, sizeof *pipelines->entries)
+        || !has_room_to_compile(device, error)
         || !create_pipeline(device, pipelines, pass, render_pass, pipeline, error))
         return false;
     struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];

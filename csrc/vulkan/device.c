@@ -251,13 +251,16 @@ static bool has_words(const struct vkb_device *device)
         && has_whole_words(device);
 }
 
+// A thread of lavapipe with memory for its allocations, twice.
+enum { DEVICE_MIB = 192 };
+
 static bool create_handle(struct vkb_device *device, const char *adapter_choice, const char *driver,
                           bool validation, struct vkb_error *error)
 {
     if (!(device->workers = vkb_workers_create(error))
         || !vkb_adapter_open(adapter_choice, driver, validation, &device->instance,
                              &device->adapter, error)
-        || !create_logical(device, error))
+        || !vkb_require_room("a device", DEVICE_MIB, error) || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);

@@ -1,3 +1,5 @@
+// mmap is no part of C11.
+#define _DEFAULT_SOURCE
 #include "vulkan/error.h"
 
 #include <stdarg.h>
@@ -5,6 +7,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+const char vkb_memory_hint[] =
+    "Smaller bloom buffers (bloom_scale), half floats, fewer framebuffers (attachments) or bands "
+    "of rows need less";
 
 bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...)
 {
@@ -15,6 +25,16 @@ bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *for
     vsnprintf(error->message, sizeof error->message, format, arguments);
     va_end(arguments);
     return false;
+}
+
+void vkb_add_words(struct vkb_error *error, const char *format, ...)
+{
+    const size_t length = strlen(error->message);
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(error->message + length, sizeof error->message - length, format, arguments);
+    va_end(arguments);
 }
 
 #define RESULT_NAMES(NAME) \
@@ -90,6 +110,8 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
 
     vkb_fail(error, result_kind(result), "%.*s failed with %s", (int)length, name,
              result_name(result));
+    if (error->kind == VKB_ERROR_OUT_OF_MEMORY)
+        vkb_add_words(error, ": memory is short. %s", vkb_memory_hint);
     error->result = result;
     snprintf(error->call, sizeof error->call, "%.*s", (int)length, name);
     return false;
@@ -97,8 +119,12 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
 
 static bool fail_memory(struct vkb_error *error, size_t count, size_t size)
 {
-    return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY, "no host memory for %zu objects of %zu bytes",
-                    count, size);
+    const double bytes = (double)count * (double)size;
+
+    return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+                    "memory is short: the host has no %.4g %s more. %s",
+                    bytes < 1 << 20 ? bytes : bytes / (1 << 20), bytes < 1 << 20 ? "bytes" : "MiB",
+                    vkb_memory_hint);
 }
 
 // Allocation in one place: test builds count it and can make it fail (faults.h).
@@ -159,4 +185,22 @@ void vkb_free(void *memory)
 {
     COUNT_BLOCKS(-(memory != NULL));
     free(memory);
+}
+
+bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error)
+{
+    bool done = !REFUSED();
+#ifdef __linux__
+    // Address space only: memory that nobody writes to is not counted by anything else.
+    void *room =
+        mmap(NULL, mib << 20, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    done = done && room != MAP_FAILED;
+    if (room != MAP_FAILED)
+        munmap(room, mib << 20);
+#endif
+    return done
+        || vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+                    "memory is short: %s needs %zu MiB of address space, and this process gets no "
+                    "more. Raise its limit (ulimit -v)",
+                    what, mib);
 }

@@ -31,6 +31,12 @@ __attribute__((format(printf, 3, 4)))
 #endif
 bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
 
+// Adds to the message, as far as there is space.
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 3)))
+#endif
+void vkb_add_words(struct vkb_error *error, const char *format, ...);
+
 // The function's name in the text of a call, for example "vkCreateImage" in
 // "device->vk.vkCreateImage(...)", and its length.
 const char *vkb_call_name(const char *call_text, size_t *length);
@@ -59,5 +65,12 @@ bool vkb_grow(struct vkb_error *error, void *array, size_t *capacity, size_t nee
 void *vkb_append(struct vkb_error *error, void *pointers, size_t *count, size_t *capacity,
                  size_t size);
 void vkb_free(void *memory);
+
+// What takes less memory.
+extern const char vkb_memory_hint[];
+
+// Fails if the process gets no `mib` MiB of address space more (ulimit -v), which `what` needs.
+// Drivers that run out of it inside a call crash instead of reporting it.
+bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "vulkan/driver.h"
 #include "vulkan/messages.h"
+#include "vulkan/parts.h"
 #include "vulkan/process.h"
 
 #include <stdio.h>
@@ -16,6 +17,17 @@ const char vkb_install_hint[] =
     "driver. `vkbloom doctor` tells more.";
 
 enum { MAX_INSTANCES = 8 };
+
+// lavapipe takes 400 MiB with LLVM, and each of its threads up to 144 for its stacks and
+// allocations.
+static size_t driver_mib(void)
+{
+    enum { LEAST = 448, THREAD = 144, MAX_THREADS = 32 };
+    const char *text = getenv("LP_NUM_THREADS");
+    const unsigned long threads = text ? strtoul(text, NULL, 10) : vkb_core_count();
+
+    return LEAST + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
+}
 
 static struct vkb_lock lock;  // protects the instances and volk's globals
 static struct vkb_instance instances[MAX_INSTANCES];
@@ -66,13 +78,6 @@ static bool check_loader(bool validation, struct vkb_error *error)
     return true;
 }
 
-static void add_text(struct vkb_error *error, const char *text)
-{
-    const size_t length = strlen(error->message);
-
-    snprintf(error->message + length, sizeof error->message - length, "%s", text);
-}
-
 // The result of the loader does not always name the cause if there is no adapter.
 static bool check_created(VkResult result, bool direct, struct vkb_error *error)
 {
@@ -96,8 +101,8 @@ static bool check_created(VkResult result, bool direct, struct vkb_error *error)
     if (vkb_check(error, result, "vkCreateInstance"))
         return true;
     if (result == VK_ERROR_OUT_OF_HOST_MEMORY)
-        add_text(error, ". Unless memory is short, a driver's manifest (a JSON file) is damaged, "
-                        "which some loaders report so; `vkbloom doctor` names the file");
+        vkb_add_words(error, ". If it is not, a driver's manifest (a JSON file) is damaged, which "
+                             "some loaders report so; `vkbloom doctor` names the file");
     return false;
 }
 
@@ -259,7 +264,8 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
         return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
                         sizeof instance->driver - 1);
     memcpy(instance->driver, driver, strlen(driver));
-    if (open_source(instance, &entry, error)
+    if (vkb_require_room("a Vulkan driver", driver_mib(), error)
+        && open_source(instance, &entry, error)
         && create_handle(instance, entry, validation ? &messenger : NULL, error)) {
         load_functions(instance);
         if (!validation
@@ -319,9 +325,10 @@ void vkb_instance_explain_fork(struct vkb_error *error)
 {
     vkb_lock_acquire(&lock);
     if (forked)
-        add_text(error, ". This process was forked from one that had used Vulkan, after which some "
-                        "drivers (NVIDIA's among them) do not work; start it by multiprocessing's "
-                        "method \"spawn\" or \"forkserver\"");
+        vkb_add_words(error,
+                      ". This process was forked from one that had used Vulkan, after which some "
+                      "drivers (NVIDIA's among them) do not work; start it by multiprocessing's "
+                      "method \"spawn\" or \"forkserver\"");
     vkb_lock_release(&lock);
 }
 

@@ -63,14 +63,18 @@ static bool allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
     if (type == UINT32_MAX)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
     *flags = device->memory.memoryTypes[type].propertyFlags;
-    return VK(error,
-              device->vk.vkAllocateMemory(device->handle,
-                                          &(VkMemoryAllocateInfo){
-                                              .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                                              .allocationSize = requirements->size,
-                                              .memoryTypeIndex = type,
-                                          },
-                                          NULL, memory));
+    const bool done =
+        VK(error, device->vk.vkAllocateMemory(device->handle,
+                                              &(VkMemoryAllocateInfo){
+                                                  .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                                  .allocationSize = requirements->size,
+                                                  .memoryTypeIndex = type,
+                                              },
+                                              NULL, memory));
+    if (!done)
+        vkb_add_words(error, ". One image or buffer of this call takes %.4g MiB",
+                      (double)requirements->size / (1 << 20));
+    return done;
 }
 
 // What a buffer is for, as captures name it.

@@ -5,6 +5,11 @@
 
 #ifdef _WIN32
 
+uint32_t vkb_core_count(void)
+{
+    return VKB_MAX_PARTS;  // unknown
+}
+
 struct vkb_workers {
     char unused;
 };
@@ -72,7 +77,7 @@ struct vkb_workers {
     uint32_t started;  // the highest part with a thread
 };
 
-static uint32_t core_count(void)
+uint32_t vkb_core_count(void)
 {
 #ifdef CPU_COUNT
     cpu_set_t usable;
@@ -169,7 +174,7 @@ static uint32_t part_count(const struct work *work, size_t size)
     count = count < work->chunk_count ? count : work->chunk_count;
     if (count <= 1)
         return 1;
-    const uint32_t cores = core_count();
+    const uint32_t cores = vkb_core_count();
     return count < cores ? (uint32_t)count : cores;
 }
 

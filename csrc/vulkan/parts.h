@@ -9,6 +9,9 @@
 
 enum { VKB_MAX_PARTS = 16 };
 
+// The processor's cores that this process may use.
+uint32_t vkb_core_count(void);
+
 // Does the rows `first` to `end` (excluded). `part` is below VKB_MAX_PARTS, and no two calls at the
 // same time have the same one.
 typedef void vkb_rows(void *context, uint32_t part, uint32_t first, uint32_t end);

@@ -63,15 +63,6 @@ def bundled_driver() -> str:
 
     The environment variable VKBLOOM_DRIVER names one: the path of a driver's library or of its
     manifest (JSON), or "system" for none. Without it, the package ``vkbloom-lavapipe`` has one.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    OSError, ValueError
-        The manifest cannot be read; the message names it.
     """
     chosen = os.environ.get("VKBLOOM_DRIVER")
     if chosen == "system":
@@ -87,10 +78,6 @@ def bundled_hash() -> str:
 
     Two drivers with the same hash draw the same bits on every CPU. Other drivers have no hash here,
     since their results also depend on shared libraries and on the CPU.
-
-    Returns
-    -------
-    str
     """
     package = None if os.environ.get("VKBLOOM_DRIVER") else _package()
     return "" if package is None else str(package.SHA256)

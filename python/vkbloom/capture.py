@@ -42,19 +42,7 @@ def _functions() -> Callable[..., int]:
 
 @contextmanager
 def capture(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
-    """Write what the devices of an instance do meanwhile to a file.
-
-    Parameters
-    ----------
-    instance : int
-        The VkInstance.
-    path : str or path-like
-
-    Raises
-    ------
-    Error
-        As `Renderer.capture`.
-    """
+    """Write what the devices of an instance do meanwhile to a file."""
     call = _functions()
     target = Path(path)
     # A device is known by the dispatch table to which its instance points.

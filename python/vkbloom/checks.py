@@ -51,27 +51,7 @@ _MODE_CURES = {
 
 
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
-    """Import a package that one of vkbloom's extras installs.
-
-    Parameters
-    ----------
-    package : str
-        Name of the package, such as "OpenImageIO".
-    extra : str
-        The extra that installs it, such as "images".
-    purpose : str
-        What needs the package; the subject of the error message.
-
-    Returns
-    -------
-    module
-        The package.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        The package is missing; the message gives the command that installs it.
-    """
+    """Import a package that one of vkbloom's extras installs."""
     try:
         return importlib.import_module(package)
     except ModuleNotFoundError as error:
@@ -121,15 +101,7 @@ def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
 
 
 def check_like(example: object, name: str, value: Any, low: float, high: float) -> float:
-    """Return a number as the type of an example: float, int or bool. NumPy scalars print otherwise.
-
-    Raises
-    ------
-    TypeError
-        The value is not a number.
-    ValueError
-        It is out of range, or not an integer where the example is one.
-    """
+    """Return a number as an example's type: float, int or bool; NumPy scalars print otherwise."""
     number = check_number(name, value, low, high)
     if not isinstance(example, int):
         return number

@@ -14,16 +14,11 @@ __all__ = ["CoreKernel", "core_kernel"]
 class CoreKernel(NamedTuple):
     """A kernel as the core reads it.
 
-    Attributes
-    ----------
-    pixels : ndarray of float32, shape (h, w, 4)
-        Linear RGB, and the mean of the three channels for alpha.
-    serial : int
-        A hash of the pixels, so that a kernel that is made again is known to the device.
-    is_grey : bool
-        Whether all channels are equal.
-    prefilter : (float, float, float)
-        min, max and mult of Unreal Engine's prefilter; no prefilter if min is above max.
+    - `pixels`: ndarray of float32, shape (h, w, 4); Linear RGB, and the mean of the three channels
+      for alpha.
+    - `serial`: A hash of the pixels, so that a kernel that is made again is known to the device.
+    - `is_grey`: Whether all channels are equal.
+    - `prefilter`: min, max and mult of Unreal Engine's prefilter; no prefilter if min is above max.
     """
 
     pixels: NDArray[np.float32]

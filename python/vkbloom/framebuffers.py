@@ -49,15 +49,7 @@ class Framebuffers(Protocol):
 def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
     """Return the name of the framebuffer that represents all of them.
 
-    Parameters
-    ----------
-    arrays : mapping of str to ndarray
-        At least one image of shape (H, W, C) or depth of shape (H, W).
-
-    Returns
-    -------
-    str
-        "final", or else the name of the last image, or else the last name.
+    `arrays`: At least one image of shape (H, W, C) or depth of shape (H, W).
     """
     if "final" in arrays:
         return "final"
@@ -74,15 +66,7 @@ def dimensions(arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, ...]]
     channels and "<first>_channel" of another number. With shared dimensions, xarray computes
     `glow - blur_vertical` pixel by pixel; otherwise it would broadcast to six dimensions.
 
-    Parameters
-    ----------
-    arrays : mapping of str to ndarray
-        At least one image of shape (H, W, C) or depth of shape (H, W).
-
-    Returns
-    -------
-    dict of str to tuple of str
-        The names of the dimensions by framebuffer, three for images, two for depth.
+    `arrays`: At least one image of shape (H, W, C) or depth of shape (H, W).
     """
     shape = arrays[leading(arrays)].shape
     # Keys are (H, W) and (C,), which differ in length and cannot collide.

@@ -29,12 +29,8 @@ _Made = TypeVar("_Made", bound=_Sized)
 class KeptArrays:
     """Arrays by the arguments of the function that made them, the oldest of which are dropped.
 
-    Parameters
-    ----------
-    most : int
-        The bound in bytes.
-    last : int
-        How many arrays stay even if they are larger.
+    - `most`: The bound in bytes.
+    - `last`: How many arrays stay even if they are larger.
     """
 
     def __init__(self, most: int, last: int) -> None:

@@ -178,7 +178,7 @@ def test_a_convolution_of_too_much_memory(layer: Path, name: str) -> None:
     """An error of the plan, with the memory that is needed, before any work."""
     done = run(layer, name, "heap", ("-c", TOO_LARGE))
     assert done.returncode == 0, done.stderr
-    words = r"\d+ MiB of images are needed, and the adapter .* has 256; use a smaller"
+    words = r"memory is short: \d+ MiB of images are needed, and the .* has 256; use a smaller"
     first, second = done.stdout.splitlines()
     assert re.match(words, first), first
     assert re.match(words, second), second

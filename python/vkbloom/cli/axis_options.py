@@ -38,19 +38,9 @@ _MOST_VALUES: Final = 1_000_000
 def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
     """Return the values of each ``NAME=VALUES``.
 
-    Parameters
-    ----------
-    words : sequence of str
-        ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
-        (logarithmically spaced), or ``NAME=VALUE,VALUE,...``. Values that contain commas are
-        separated by semicolons. The NAME "preset" has names of `vkbloom.presets`.
-    settings : Settings
-        The settings whose fields are varied.
-
-    Raises
-    ------
-    click.UsageError
-        A word has the wrong form, or names a field that the settings do not have.
+    `words`: ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
+    (logarithmically spaced), or ``NAME=VALUE,VALUE,...``. Values that contain commas are separated
+    by semicolons. The NAME "preset" has names of `vkbloom.presets`.
     """
     types = _types_of([settings])
     lacking = f"the method {settings.method} has no field"
@@ -170,22 +160,7 @@ def chunk_counts(words: Sequence[str]) -> dict[str, int] | None:
 def named_reductions(
     words: Sequence[str], settings: vkbloom.Settings
 ) -> dict[str, reductions.Reduction]:
-    """Parse each ``[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]`` into a reduction.
-
-    Parameters
-    ----------
-    words : sequence of str
-        REFERENCE is an image file, or a point of the grid as ``AXIS=VALUE,...``.
-    settings : Settings
-        The settings whose fields the axes vary.
-
-    Raises
-    ------
-    click.UsageError
-        A word has the wrong form.
-    OSError, ValueError
-        An image file cannot be read.
-    """
+    """Parse each ``[NAME=]KIND[:FRAMEBUFFER][@REFERENCE]`` into a reduction."""
     found: dict[str, reductions.Reduction] = {}
     for word in words:
         head, _, reference = word.partition("@")

@@ -69,11 +69,6 @@ def accompanying(
     """Read both files, and return a function from an image to its `mask` and `emission`.
 
     `is_blended`: multiply the emission's colours by its alpha.
-
-    Raises
-    ------
-    OSError, ValueError
-        A file cannot be read, or the mask has colours.
     """
     values = None if mask is None else grey_mask(read_picture(mask, 0, "linear").pixels, mask)
     glow = None

@@ -98,15 +98,7 @@ def read_picture(
     layer: str | None = None,
     raw: bool = False,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents.
-
-    Raises
-    ------
-    click.UsageError
-        `raw` is given and the file does not have 8 bits, or `colour` is unknown.
-    OSError, ValueError
-        The file cannot be read, or a renderer cannot take its pixels.
-    """
+    """Read an image file, decode it for a renderer, and print notes about its contents."""
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:

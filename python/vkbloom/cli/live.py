@@ -44,19 +44,10 @@ def _after(value: object, values: Mapping[str, Any]) -> Any:
 class Live:
     """The state of a window.
 
-    Attributes
-    ----------
-    settings : Settings
-    source : Scene or Image
-    shading : {"forward", "deferred"}
-        Of a scene.
-    framebuffer : str
-        Name of the framebuffer that is shown.
-    time : float
-        Time of the animation, in periods.
-    paused, closed : bool
-    screenshot : bool
-        Whether to write a screenshot after the next frame.
+    - `shading`: Of a scene.
+    - `framebuffer`: Name of the framebuffer that is shown.
+    - `time`: Time of the animation, in periods.
+    - `screenshot`: Whether to write a screenshot after the next frame.
     """
 
     settings: Settings

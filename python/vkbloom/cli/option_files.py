@@ -63,13 +63,7 @@ class CommandWithFile(Command):
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Read and check an option file.
-
-    Raises
-    ------
-    OSError, ValueError
-        The file cannot be read or its content is wrong; the message names the file.
-    """
+    """Read and check an option file."""
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".yaml", ".yml"):
         raise ValueError(f"{path}: its extension is not .toml, .yaml or .yml")
@@ -106,11 +100,6 @@ def _check_size(value: object, known: dict[int, tuple[int, int]]) -> tuple[int, 
 
     A YAML alias refers to a value without copying it; each value is measured once here, before
     writing it out could multiply it.
-
-    Raises
-    ------
-    ValueError
-        A limit is exceeded, or an integer is too large to be written.
     """
     if isinstance(value, str | bytes):
         return len(value), 0

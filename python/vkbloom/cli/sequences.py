@@ -26,23 +26,7 @@ _NUMBER: Final = re.compile(r"%(0?)(\d*)d")
 
 
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
-    """Return the files to read, each with the file to write.
-
-    Parameters
-    ----------
-    sources : sequence of str
-        Files, printf patterns (``f.%04d.exr``), globs, folders, or "-".
-    target : str
-        A file, a folder or a printf pattern. In a folder, files keep their names. A pattern gets
-        the numbers of the sources' pattern, or 0, 1, 2 and so on.
-
-    Raises
-    ------
-    FileNotFoundError
-        No file matches a pattern or a glob, or a folder has no image.
-    click.UsageError
-        There are several sources for one file.
-    """
+    """Return the files to read, each with the file to write."""
     found = [pair for source in sources for pair in _expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
     is_pattern = _NUMBER.search(os.path.basename(target)) is not None

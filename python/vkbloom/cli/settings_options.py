@@ -94,13 +94,7 @@ def default_preset(is_image: bool) -> str:
 
 
 def _begun(preset: str | None, method: str | None) -> vkbloom.Settings:
-    """Return the settings of a preset or the defaults of a method.
-
-    Raises
-    ------
-    click.UsageError
-        Both are given, and the preset is of another method.
-    """
+    """Return the settings of a preset or the defaults of a method."""
     begun = METHODS[str(method)]() if preset is None else vkbloom.presets[preset]
     if method not in (None, begun.method):
         raise click.UsageError(f"--preset {preset} is of the method {begun.method}, not {method}")
@@ -108,13 +102,7 @@ def _begun(preset: str | None, method: str | None) -> vkbloom.Settings:
 
 
 def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settings:
-    """Return settings with the options' changes.
-
-    Raises
-    ------
-    click.UsageError
-        The method has no such field, or a value is out of range.
-    """
+    """Return settings with the options' changes."""
     foreign = [name for name in changes if not hasattr(begun, name)]
     if foreign:
         declared = {one.name: one for kind in METHODS.values() for one in dataclasses.fields(kind)}

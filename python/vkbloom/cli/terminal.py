@@ -12,13 +12,7 @@ _UNBROKEN: Final = 4096
 
 
 def show(renderable: RenderableType) -> None:
-    """Print a rich renderable: wrapped to the terminal's width, or unwrapped without a terminal.
-
-    Parameters
-    ----------
-    renderable
-        Text, printed without interpreting rich's markup, or a table.
-    """
+    """Print a rich renderable: wrapped to the terminal's width, or unwrapped without a terminal."""
     console = Console(markup=False, highlight=False, emoji=False)
     if console.is_terminal:
         console.print(renderable)

@@ -49,22 +49,9 @@ _LARGEST_FILE: Final = 1 << 30
 class Server:
     """Serves the page until it is stopped.
 
-    Parameters
-    ----------
-    new_viewer : callable
-        Makes a viewer for each page that is opened. Viewers may share a renderer.
-    port : int, default 0
-        The port to listen on; 0: any free port.
-
-    Attributes
-    ----------
-    url : str
-        The address of the page.
-
-    Raises
-    ------
-    OSError
-        The port is in use.
+    - `new_viewer`: Makes a viewer for each page that is opened. Viewers may share a renderer.
+    - `port`: The port to listen on; 0: any free port.
+    - `url`: The address of the page.
 
     Notes
     -----

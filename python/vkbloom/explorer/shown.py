@@ -20,21 +20,7 @@ _LEVEL: Final = 1
 def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
     """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha.
 
-    Parameters
-    ----------
-    array : ndarray, shape (H, W, C) or (H, W)
-    name : str
-        Name of the framebuffer.
-    is_encoded : bool
-        Whether `final` is already encoded.
-    stops : float
-        Exposure for framebuffers of floats with colours of light.
-
-    Returns
-    -------
-    bytes
-        An 8-bit PNG file of 1 or 3 channels. float32 colours may be off by one level, since they
-        are rounded to half floats for the table.
+    `array`: ndarray, shape (H, W, C) or (H, W).
     """
     if array.dtype == np.uint8:
         picture = array[:, :, :3]
@@ -60,17 +46,7 @@ def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
 def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Return an image whose pixels are averaged until it fits into a size.
 
-    Parameters
-    ----------
-    image : ndarray, shape (H, W, C)
-        uint8, float16 or float32.
-    size : (int, int)
-        Width and height.
-
-    Returns
-    -------
-    ndarray
-        Of the same dtype; the image itself if it fits.
+    `image`: ndarray, shape (H, W, C); uint8, float16 or float32.
     """
     height, width = image.shape[:2]
     shrink = min(size[0] / width, size[1] / height)

@@ -118,17 +118,7 @@ def stages() -> dict[str, type[Glare]]:
 def check_glare(glare: object) -> tuple[Glare, ...]:
     """Return the stages of settings.
 
-    Parameters
-    ----------
-    glare : Glare, mapping, a sequence of them, or None
-        A mapping is the result of `Glare.to_dict`. None: no stages.
-
-    Raises
-    ------
-    ValueError
-        There are too many stages, or a mapping does not describe a stage.
-    TypeError
-        A stage is neither a Glare nor a mapping.
+    `glare`: A mapping is the result of `Glare.to_dict`. None: no stages.
     """
     if glare is None:
         return ()
@@ -150,13 +140,7 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
 
 
 def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
-    """Return the stage and the field of a name such as "glare.0.intensity".
-
-    Raises
-    ------
-    ValueError
-        There is no such stage, or it has no such field.
-    """
+    """Return the stage and the field of a name such as "glare.0.intensity"."""
     parts = name.split(".")
     if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
         place = int(parts[1])

@@ -181,29 +181,7 @@ def run_there(
     adapter: str,
     validation: bool,
 ) -> None:
-    """Render blocks on the workers of a cluster.
-
-    Parameters
-    ----------
-    client : distributed.Client
-    grid : Grid
-    layout : Layout
-    sink : Sink
-        Its writer is sent to the workers; this process makes the marks.
-    todo : iterable of Block
-    progress : Progress
-    missing : int
-        Number of points in these blocks.
-    adapter, validation
-        Arguments of the workers' renderers.
-
-    Raises
-    ------
-    Error
-        Every worker that started a run died.
-    Exception
-        A run's exception after all retries; completed runs are kept.
-    """
+    """Render blocks on the workers of a cluster."""
     distributed = import_extra("distributed", "grid", _PURPOSE)
     workers = max(1, len(client.nthreads()))
     runs = _runs(todo, layout, math.ceil(missing / (workers * _RUNS_A_WORKER)))

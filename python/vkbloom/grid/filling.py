@@ -23,13 +23,8 @@ __all__ = ["Filler", "Tally"]
 class Tally:
     """Number of points, and of their passes.
 
-    Parameters
-    ----------
-    points : int
-    ran : int
-        Passes that ran, including those of reference frames.
-    alone : int
-        Passes that the same points need if each is rendered alone, without fused passes.
+    - `ran`: Passes that ran, including those of reference frames.
+    - `alone`: Passes that the same points need if each is rendered alone, without fused passes.
     """
 
     points: int = 0
@@ -49,14 +44,7 @@ class Tally:
 
 
 class Filler:
-    """Renders points of one grid on one renderer.
-
-    Parameters
-    ----------
-    grid : Grid
-    layout : Layout
-    renderer : FrameRenderer
-    """
+    """Renders points of one grid on one renderer."""
 
     def __init__(self, grid: Grid, layout: Layout, renderer: FrameRenderer) -> None:
         self._grid = grid
@@ -74,24 +62,7 @@ class Filler:
     ) -> Tally:
         """Render the points of a block.
 
-        Parameters
-        ----------
-        block : Block
-        arrays : mapping of str to ndarray
-            By variable; the block's shape, then the variable's. They are filled.
-        on_point : callable
-            Called with the tally of each rendered point, and with the tally of the reference
-            frames.
-
-        Returns
-        -------
-        Tally
-
-        Raises
-        ------
-        ValueError
-            A point's variable has another shape or dtype than the first point's; the message names
-            the point.
+        `arrays`: By variable; the block's shape, then the variable's. They are filled.
         """
         grid, total = self._grid, Tally()
         order = list(points(block, self._layout.ranking))

@@ -96,17 +96,10 @@ class _FileWriter:
 class GridFiles:
     """A folder of image files, ``<index along each axis>_<framebuffer>``, with ``grid.json``.
 
-    Parameters
-    ----------
-    folder : Path
-    suffix : str
-        Extension of the image files, such as ".png". A framebuffer that the format cannot hold
-        without conversion is written as ``.exr``.
-    grid : Grid
-        A grid without reductions.
-    layout : Layout
-    forms : sequence of FileForm
-        How `final` is written, by image; empty: without conversion.
+    - `suffix`: Extension of the image files, such as ".png". A framebuffer that the format cannot
+      hold without conversion is written as ``.exr``.
+    - `grid`: A grid without reductions.
+    - `forms`: How `final` is written, by image; empty: without conversion.
     """
 
     def __init__(
@@ -145,20 +138,7 @@ class GridFiles:
             self.done[block.slices] = True
 
     def prepare(self, *, resume: bool) -> None:
-        """Create the folder, or examine an existing one.
-
-        Parameters
-        ----------
-        resume : bool
-            Whether to continue an existing grid.
-
-        Raises
-        ------
-        FileExistsError
-            The folder has a grid and `resume` is False.
-        ValueError
-            The folder contains other files or another grid. Nothing is written.
-        """
+        """Create the folder, or examine an existing one."""
         files = self._files
         index = files.folder / _INDEX
         own = self._identity

@@ -81,20 +81,7 @@ def _memory_left() -> int | None:
 
 
 def in_memory(grid: Grid, renderer: FrameRenderer, progress: bool | None) -> xarray.Dataset:
-    """Render a grid into a Dataset.
-
-    Parameters
-    ----------
-    grid : Grid
-    renderer : FrameRenderer
-    progress : bool or None
-        As for `vkbloom.Renderer.grid`.
-
-    Returns
-    -------
-    xarray.Dataset
-        The Dataset that `vkbloom.Renderer.grid` documents.
-    """
+    """Render a grid into a Dataset."""
     xr = import_extra("xarray", "grid", "Renderer.grid")
     layout = lay_out(grid, renderer, lambda variables: check_fits(grid, variables))
     shape = grid.shape

@@ -20,12 +20,8 @@ Index = tuple[int, ...]
 class Block:
     """Neighbouring points of a grid: a box along its axes.
 
-    Parameters
-    ----------
-    start, stop : tuple of int
-        The box, by axis.
-    backwards : tuple of bool
-        By axis, whether the visit begins with the box's last value.
+    - `start`, `stop`: The box, by axis.
+    - `backwards`: By axis, whether the visit begins with the box's last value.
     """
 
     start: Index
@@ -58,19 +54,7 @@ def _reflected(position: int, radices: Sequence[int]) -> Iterator[int]:
 def blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
     """Yield all blocks of a grid in the order in which they are visited.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Number of values by axis.
-    chunk : tuple of int
-        Number of values per block by axis; the last block of an axis may have fewer.
-    ranking : sequence of int
-        The axes from the slowest to the fastest.
-
-    Yields
-    ------
-    Block
-        The last point of a block and the first of the next differ along one axis.
+    `shape`: Number of values by axis.
     """
     counts = [-(-shape[axis] // chunk[axis]) for axis in ranking]
     backwards = [False] * len(shape)
@@ -89,19 +73,7 @@ def blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block
 
 
 def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
-    """Yield the points of a block in the order in which they are visited.
-
-    Parameters
-    ----------
-    block : Block
-    ranking : sequence of int
-        The axes from the slowest to the fastest.
-
-    Yields
-    ------
-    tuple of int
-        The index along each axis, in the grid's order of axes.
-    """
+    """Yield the points of a block in the order in which they are visited."""
     index = list(block.start)
 
     def sweep(depth: int, backwards: list[bool]) -> Iterator[Index]:
@@ -121,20 +93,7 @@ def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
 def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
     """Return a chunk that spans complete fast axes, within a number of points.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Number of values by axis.
-    ranking : sequence of int
-        The axes from the slowest to the fastest.
-    most : int
-        Largest number of points of a chunk, 1 or more.
-
-    Returns
-    -------
-    tuple of int
-        Number of values per chunk by axis. Visiting block by block then has the same order as
-        visiting a grid without blocks.
+    `shape`: Number of values by axis.
     """
     chunk = [1] * len(shape)
     for axis in reversed(ranking):
@@ -148,17 +107,7 @@ def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
 def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]:
     """Yield a corner of a grid, then a step along each axis in turn.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Number of values by axis.
-    backwards : bool
-        Whether to start from the last values instead of the first.
-
-    Yields
-    ------
-    (int or None, tuple of int)
-        The axis of the step (None for the corner), and the index along each axis.
+    `shape`: Number of values by axis.
     """
     index = [count - 1 if backwards else 0 for count in shape]
     yield None, tuple(index)
@@ -169,13 +118,5 @@ def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]
 
 
 def ranking_of(costs: Sequence[int], later: Sequence[bool]) -> tuple[int, ...]:
-    """Return the axes from the highest cost of a step to the lowest.
-
-    Parameters
-    ----------
-    costs : sequence of int
-        By axis.
-    later : sequence of bool
-        By axis: among axes with equal costs, these come last.
-    """
+    """Return the axes from the highest cost of a step to the lowest."""
     return tuple(sorted(range(len(costs)), key=lambda axis: (-costs[axis], later[axis])))

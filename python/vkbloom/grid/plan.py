@@ -38,16 +38,9 @@ _CHANNELS: Final = ("r", "g", "b", "a")
 class Grid:
     """A requested grid, with checked arguments.
 
-    Parameters
-    ----------
-    source : Source
-    settings : Settings
-        The settings that the axes change, unless an axis has the settings.
-    axes : tuple of Axis
-        The axes, in the order of the result's dimensions.
-    attachments : "all" or tuple of str
-        The framebuffers to keep.
-    reduce : mapping of str to callable
+    - `settings`: The settings that the axes change, unless an axis has the settings.
+    - `axes`: The axes, in the order of the result's dimensions.
+    - `attachments`: The framebuffers to keep.
     """
 
     source: Source
@@ -135,20 +128,11 @@ class Variable:
 class Layout:
     """The layout of a grid on a renderer.
 
-    Parameters
-    ----------
-    ranking : tuple of int
-        The axes from the slowest to the fastest.
-    variables : mapping of str to Variable
-    coordinates : mapping of str to (array, attributes)
-        Coordinates of dimensions that are not axes.
-    reference_size : int
-        Bytes of the reference frames of one point.
-    structural : tuple of int
-        The axes that change which passes or framebuffers exist.
-    ran : int
-        Passes that ran to learn the shapes and dtypes of the reductions.
-    adapter, driver, version : str
+    - `ranking`: The axes from the slowest to the fastest.
+    - `coordinates`: Coordinates of dimensions that are not axes.
+    - `reference_size`: Bytes of the reference frames of one point.
+    - `structural`: The axes that change which passes or framebuffers exist.
+    - `ran`: Passes that ran to learn the shapes and dtypes of the reductions.
     """
 
     ranking: tuple[int, ...]
@@ -180,22 +164,7 @@ def ask(
     attachments: str | Sequence[str],
     reduce: Reduce | None,
 ) -> Grid:
-    """Check the arguments that all grids share.
-
-    Parameters
-    ----------
-    source, settings, axes, mask, emission, size, shading, time, attachments, reduce
-        As for `vkbloom.Renderer.grid`.
-
-    Returns
-    -------
-    Grid
-
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is wrong.
-    """
+    """Check the arguments that all grids share."""
     if settings is not None:
         settings = check_settings(settings)
     checked = read_source(source, size, shading, time, mask=mask, emission=emission)
@@ -224,25 +193,7 @@ def lay_out(
     renderer: FrameRenderer,
     check: Callable[[Mapping[str, Variable]], object] = lambda variables: None,
 ) -> Layout:
-    """Determine the layout of a grid on a renderer before its points are rendered.
-
-    Parameters
-    ----------
-    grid : Grid
-    renderer : FrameRenderer
-    check : callable, optional
-        Gets the framebuffers' variables before anything is rendered.
-
-    Returns
-    -------
-    Layout
-
-    Raises
-    ------
-    ValueError
-        A framebuffer does not exist, or its shape or dtype is not the same at all points; nothing
-        was rendered.
-    """
+    """Determine the layout of a grid on a renderer before its points are rendered."""
     framebuffers, structural = _survey(grid, renderer)
     variables = _frame_variables(framebuffers)
     check(variables)
@@ -281,15 +232,6 @@ def ranking(grid: Grid) -> tuple[int, ...]:
     numbers of values. Proof: let two adjacent axes a, b have n_a, n_b values and c_a, c_b passes
     for a step. With a as the slower one, the cost is c_a (n_a - 1) + n_a c_b (n_b - 1). This is
     less than for the other order exactly if c_a > c_b.
-
-    Parameters
-    ----------
-    grid : Grid
-
-    Returns
-    -------
-    tuple of int
-        Among axes with equal costs, images and times come first, then the given order.
     """
     costs = [0] * len(grid.axes)
     if sum(len(axis) > 1 for axis in grid.axes) > 1:
@@ -315,14 +257,7 @@ def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.P
 
 
 class PassCounter:
-    """Counts the passes of a grid's points if each were rendered alone.
-
-    Parameters
-    ----------
-    grid : Grid
-    layout : Layout
-    renderer : FrameRenderer
-    """
+    """Counts the passes of a grid's points if each were rendered alone."""
 
     def __init__(self, grid: Grid, layout: Layout, renderer: FrameRenderer) -> None:
         self._grid = grid
@@ -462,13 +397,7 @@ def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
 
 
 def checked_value(name: str, value: Any) -> NDArray[Any]:
-    """Convert the value of a reduction to an array of numbers.
-
-    Raises
-    ------
-    ValueError
-        The value is something else.
-    """
+    """Convert the value of a reduction to an array of numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "biuf":
         raise ValueError(f"reduce: {name}: {value!r} is not a number or an array of numbers")

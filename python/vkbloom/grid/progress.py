@@ -24,15 +24,10 @@ def _is_watched() -> bool:
 class Progress:
     """Count points and passes, and show them as a progress bar.
 
-    Parameters
-    ----------
-    total : int
-        Number of points of the grid.
-    done : int
-        Number of points that were done before.
-    shown : bool or None
-        True: shown in a terminal or a notebook, but not elsewhere. None: the same if tqdm is
-        installed. False: not shown.
+    - `total`: Number of points of the grid.
+    - `done`: Number of points that were done before.
+    - `shown`: True: shown in a terminal or a notebook, but not elsewhere. None: the same if tqdm is
+      installed. False: not shown.
     """
 
     def __init__(self, total: int, done: int = 0, *, shown: bool | None = None) -> None:

@@ -27,22 +27,7 @@ def render_grid(
 ) -> Tally:
     """Render the points of a grid that are not done.
 
-    Parameters
-    ----------
-    grid : Grid
-    prepared : callable
-        Takes the layout and returns a sink that is ready to be written to.
-    client : distributed.Client or None
-        None: this process renders.
-    adapter, validation
-        Arguments of the renderers.
-    progress : bool or None
-        As for `vkbloom.Renderer.grid`.
-
-    Returns
-    -------
-    Tally
-        The points and passes of this call.
+    `client`: None: this process renders.
     """
     with ExitStack() as stack:
         renderer: Renderer | None = None

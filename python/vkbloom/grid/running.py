@@ -73,20 +73,6 @@ def run_here(
     """Render blocks one after the other.
 
     Blocks that were written are marked as done, also when an exception ends the call.
-
-    Parameters
-    ----------
-    grid : Grid
-    layout : Layout
-    sink : Sink
-    todo : iterable of Block
-    renderer : Renderer
-    progress : Progress
-
-    Raises
-    ------
-    OSError
-        A block cannot be written; the blocks before it are kept.
     """
     filler = Filler(grid, layout, renderer)
     pending: list[Block] = []
@@ -117,23 +103,7 @@ def written_behind(
     layout: Layout,
     on_point: Callable[[Tally], object],
 ) -> Iterator[Block]:
-    """Render blocks, and write each while the next one is rendered.
-
-    Parameters
-    ----------
-    filler : Filler
-    writer : Writer
-    todo : iterable of Block
-    layout : Layout
-    on_point : callable
-        Called with the `Tally` of each rendered point.
-
-    Yields
-    ------
-    Block
-        A block that was written. If rendering a block fails, the block before it is still
-        written and yielded.
-    """
+    """Render blocks, and write each while the next one is rendered."""
     with ThreadPoolExecutor(1, "vkbloom-grid") as pool:
         behind: tuple[Block, Future[None]] | None = None
         failure: Exception | None = None

@@ -27,13 +27,7 @@ __all__ = [
 
 
 def axes_of(dataset: xarray.Dataset) -> list[str]:
-    """Return the axes of a grid that are still dimensions of the Dataset.
-
-    Raises
-    ------
-    TypeError, ValueError
-        The argument is not a Dataset of a grid.
-    """
+    """Return the axes of a grid that are still dimensions of the Dataset."""
     if not hasattr(dataset, "data_vars"):
         raise TypeError(f"dataset: {type(dataset).__name__} is not an xarray.Dataset")
     if "axes" not in dataset.attrs:
@@ -54,26 +48,7 @@ def framebuffers_of(dataset: xarray.Dataset) -> dict[str, int]:
 def select(
     dataset: xarray.Dataset, at: Mapping[str, Any] | None, shown: Sequence[str]
 ) -> xarray.Dataset:
-    """Reduce a grid to the shown axes.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    at : mapping of str to object, optional
-        Values along other axes: the nearest number is selected, or an equal text. None selects
-        the value None.
-    shown : sequence of str
-
-    Returns
-    -------
-    xarray.Dataset
-        Along an axis that is neither shown nor in `at`, the first value is selected.
-
-    Raises
-    ------
-    ValueError
-        `at` names something else than an axis, or a value that the axis does not have.
-    """
+    """Reduce a grid to the shown axes."""
     axes = axes_of(dataset)
     for name in at or {}:
         if name not in axes:

@@ -18,24 +18,7 @@ __all__ = ["animation"]
 
 @contextmanager
 def animation(file: Path, rate: int) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Yield a function that adds a frame to a GIF.
-
-    Parameters
-    ----------
-    file : Path
-        Its extension is .gif. It is created or replaced when all frames are written.
-    rate : int
-        Frames per second. A GIF rounds the time of each frame to hundredths of a second.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; the error names it, and no partial file is left.
-    ValueError
-        A frame is not of uint8, or has another size than the first.
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Yield a function that adds a frame to a GIF."""
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     shape: tuple[int, ...] | None = None
 

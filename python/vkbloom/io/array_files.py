@@ -272,13 +272,7 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
 def _numbers(
     oiio: ModuleType, values: NDArray[Any], bits: int | None, temporary: Path, target: Path
 ) -> str:
-    """Return OpenImageIO's name of the number type to write.
-
-    Raises
-    ------
-    ValueError
-        The format does not support it. The message says what it supports.
-    """
+    """Return OpenImageIO's name of the number type to write."""
     own = PIXEL_TYPES[values.dtype.name]
     wanted: Sequence[str] = [own]
     if values.dtype.kind == "f":
@@ -335,13 +329,7 @@ def _plain(value: Any) -> Any:
 
 
 def _typed(oiio: ModuleType, metadata: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """Return attributes with OpenImageIO's types.
-
-    Raises
-    ------
-    TypeError
-        A value is neither text nor numbers.
-    """
+    """Return attributes with OpenImageIO's types."""
     typed: dict[str, tuple[Any, Any]] = {}
     for name, value in metadata.items():
         if name in _FACTS:

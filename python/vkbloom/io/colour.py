@@ -39,21 +39,8 @@ def check_space(name: str) -> None:
 def from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
     """Convert colours of a named space to linear Rec. 709.
 
-    Parameters
-    ----------
-    colours : ndarray of float32, shape (H, W, 3)
-    space : str
-        A name or an alias of OpenColorIO's built-in configuration.
-
-    Returns
-    -------
-    ndarray of float32, shape (H, W, 3)
-        Not clipped.
-
-    Raises
-    ------
-    ValueError
-        There is no such space.
+    - `colours`: ndarray of float32, shape (H, W, 3).
+    - Returns: ndarray of float32, shape (H, W, 3): not clipped.
     """
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
     check_space(space)
@@ -70,22 +57,11 @@ def from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
 def from_profile(colours: NDArray[np.float32], profile: bytes) -> NDArray[np.float32]:
     """Convert colours that an ICC profile describes to linear Rec. 709.
 
-    Parameters
-    ----------
-    colours : ndarray of float32, shape (H, W, 3)
-        0..1.
-    profile : bytes
-        An RGB profile of a matrix and curves, such as those of sRGB, Display P3 and Adobe RGB.
-
-    Returns
-    -------
-    ndarray of float32, shape (H, W, 3)
-        Not clipped: colours outside of Rec. 709 have negative components.
-
-    Raises
-    ------
-    ValueError
-        The profile is damaged or has another kind.
+    - `colours`: ndarray of float32, shape (H, W, 3); 0..1.
+    - `profile`: An RGB profile of a matrix and curves, such as those of sRGB, Display P3 and Adobe
+      RGB.
+    - Returns: ndarray of float32, shape (H, W, 3): not clipped: colours outside of Rec. 709 have
+      negative components.
     """
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
     # A new name each time, since OpenColorIO caches files by name.
@@ -104,13 +80,7 @@ def from_profile(colours: NDArray[np.float32], profile: bytes) -> NDArray[np.flo
 
 
 def is_srgb_profile(profile: bytes) -> bool:
-    """Tell whether an ICC profile means sRGB, within half a level of 8 bits.
-
-    Raises
-    ------
-    ValueError
-        The profile is damaged, or not of a matrix and curves.
-    """
+    """Tell whether an ICC profile means sRGB, within half a level of 8 bits."""
     levels = np.linspace(0, 1, 6, dtype=np.float32)
     probe = np.stack(np.meshgrid(levels, levels, levels), -1).reshape(6, 36, 3)
     expected = decode_srgb(probe)

@@ -33,29 +33,7 @@ _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
 def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
-    """Write framebuffers to image files, as `Frames.save` documents.
-
-    Parameters
-    ----------
-    frames : Framebuffers
-        At least one framebuffer.
-    path : str or path-like
-        A file name with an extension that OpenImageIO writes, or a folder.
-
-    Returns
-    -------
-    list of Path
-        The written files, in the order of the framebuffers.
-
-    Raises
-    ------
-    ValueError
-        The extension is unknown, the name is not UTF-8, or there is no framebuffer.
-    OSError
-        A file cannot be written; the error names it, and no partial file is left.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
-    """
+    """Write framebuffers to image files, as `Frames.save` documents."""
     if not frames:
         raise ValueError("frames: there is no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
@@ -98,21 +76,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
 
 
 def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read framebuffers from files that `save` wrote, as `Frames.load` documents.
-
-    Returns
-    -------
-    arrays : dict of str to ndarray
-    facts : dict
-        "settings", "timings" and "info".
-
-    Raises
-    ------
-    OSError, ValueError
-        A file is missing, damaged or not written by `save`. The error names it.
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Read framebuffers from files that `save` wrote, as `Frames.load` documents."""
     found: dict[str, tuple[int, NDArray[Any], Path]] = {}
     facts: dict[str, Any] = {}
     target = Path(path)

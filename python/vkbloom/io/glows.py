@@ -11,13 +11,7 @@ __all__ = ["alike", "grey_mask"]
 
 
 def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
-    """Return the values of a mask.
-
-    Raises
-    ------
-    ValueError
-        It has colours; the error names the file.
-    """
+    """Return the values of a mask."""
     if (pixels[..., :3] != pixels[..., :1]).any():
         raise ValueError(f"{file}: a mask must be grey, but this image has colours")
     return pixels[..., 0]

@@ -56,29 +56,7 @@ _MOST_PARTS: Final = 100
 
 @contextmanager
 def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
-    """Open an image file; the context closes it.
-
-    Parameters
-    ----------
-    path : str or path-like
-        A file of any format that OpenImageIO reads.
-    purpose : str
-        What needs OpenImageIO; the subject of the message if it is missing.
-
-    Yields
-    ------
-    OpenImageIO.ImageInput
-        The open file. Colours are read as stored, not multiplied by alpha.
-
-    Raises
-    ------
-    OSError
-        The file does not exist or cannot be opened; the error names it.
-    ValueError
-        The file is not an image, or its name is not UTF-8; the error names it.
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Open an image file; the context closes it."""
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = os.fspath(path)
     check_name(name)
@@ -105,13 +83,7 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
 
 
 def readable_extensions() -> set[str]:
-    """Return the extensions of the formats that can be read, such as ".png".
-
-    Raises
-    ------
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Return the extensions of the formats that can be read, such as ".png"."""
     oiio = import_extra("OpenImageIO", "images", "Reading images")
     # "openexr:exr,sxr,mxr;png:png;..."
     formats = oiio.get_string_attribute("input_format_list").split(",")
@@ -131,32 +103,7 @@ def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -
 
 
 def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = None) -> StoredImage:
-    """Read an image file.
-
-    Parameters
-    ----------
-    path : str or path-like
-        A file of any format that OpenImageIO reads.
-    subimage : int, default 0
-        The part of a file with several parts (OpenEXR, TIFF, GIF), from 0.
-    layer : str, optional
-        For OpenEXR files: only the channels ``layer.NAME`` are read, with the name NAME. The layer
-        is searched in `subimage` and the parts after it.
-
-    Returns
-    -------
-    StoredImage
-
-    Raises
-    ------
-    OSError
-        The file does not exist or cannot be opened; the error names it.
-    ValueError
-        The file is damaged or not an image; it has no such part or layer; it is not a flat image of
-        8 or 16 bit integers or floats; or its name is not UTF-8. The error names the file.
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Read an image file."""
     with opened(path, "Reading images") as reader:
         return _read(reader, os.fspath(path), subimage, layer)
 
@@ -197,13 +144,7 @@ def _read(
 def chosen_part(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> tuple[int, OpenImageIO.ImageSpec]:
-    """Make the part to read the current one, and return its number and what it is.
-
-    Raises
-    ------
-    ValueError
-        As `load`, but of a file that is damaged in its pixels.
-    """
+    """Make the part to read the current one, and return its number and what it is."""
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
     if subimage < 0 or not reader.seek_subimage(subimage, 0):
@@ -257,13 +198,7 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
 
 
 def describe(reader: OpenImageIO.ImageInput) -> StoredImage:
-    """Return the description of a file's current part, without pixels. May change the current part.
-
-    Parameters
-    ----------
-    reader : OpenImageIO.ImageInput
-        From `opened`.
-    """
+    """Return the description of a file's current part; this may change the current part."""
     spec = reader.spec()
     # Before the reader goes to other parts.
     found = StoredImage(
@@ -326,28 +261,12 @@ def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
 def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = False) -> Picture:
     """Decode a stored image to a picture of linear values.
 
-    Parameters
-    ----------
-    stored : StoredImage
-    colour : str, optional
-        The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's built-in
-        configuration, such as "ACEScg". Default: floats are linear; integers have the space that
-        the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
-    raw : bool, default False
-        Whether to keep 8-bit values without decoding.
-
-    Returns
-    -------
-    Picture
-        float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer files,
-        or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor divided
-        by alpha.
-
-    Raises
-    ------
-    ValueError
-        The channels are neither RGB, RGBA, grey nor grey with alpha; there is no such `colour`;
-        `raw` and the file has no 8-bit integers, or `colour` is also given.
+    - `colour`: The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's
+      built-in configuration, such as "ACEScg". Default: floats are linear; integers have the space
+      that the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
+    - Returns: float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer
+      files, or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor
+      divided by alpha.
     """
     if raw and colour is not None:
         raise ValueError(f"colour: {colour!r} cannot be combined with raw values")

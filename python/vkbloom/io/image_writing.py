@@ -44,19 +44,7 @@ _LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file's extension belongs to a format that can be written.
-
-    Parameters
-    ----------
-    path : str or path-like
-
-    Raises
-    ------
-    ValueError
-        No writable format has the extension.
-    ModuleNotFoundError
-        OpenImageIO is missing.
-    """
+    """Check that a file's extension belongs to a format that can be written."""
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     safe_writing.check_extension(oiio, Path(path).suffix)
 
@@ -64,19 +52,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
     """Check that a file's format has a quality of compression, if one is given.
 
-    Parameters
-    ----------
-    path : str or path-like
-        Of a format that can be written.
-    quality : int or None
-        1 to 100; None: the format's own.
-
-    Raises
-    ------
-    ValueError
-        The format has none, or `quality` is out of range.
-    TypeError
-        `quality` is not an int.
+    `quality`: 1 to 100; None: the format's own.
     """
     if quality is None:
         return
@@ -100,33 +76,7 @@ def save(
     display windows are kept if the format has them, else pixels outside the display window are cut
     off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
 
-    Parameters
-    ----------
-    picture : Picture
-    path : str or path-like
-        A file name with an extension that OpenImageIO writes. An existing file is replaced when
-        the new one is complete.
-    colour : {"linear", "srgb"}, optional
-        Encoding of the colours in the file. Default: integers are sRGB and floats linear.
-    attributes : mapping of str to str, optional
-        Added to the file if its format supports them.
-    quality : int, optional
-        Quality of JPEG, WebP and JPEG XL, 1 to 100. Default: that of the format's writer.
-
-    Returns
-    -------
-    tuple of str
-        Notes for the user about information that the file cannot hold.
-
-    Raises
-    ------
-    ValueError
-        The extension is unknown, the format cannot hold the picture, or `colour` is given for a
-        picture that is not linear.
-    OSError
-        The file cannot be written; the error names it, and no partial file is left.
-    ModuleNotFoundError
-        OpenImageIO is missing.
+    `colour`: Encoding of the colours in the file. Default: integers are sRGB and floats linear.
     """
     if colour is not None and picture.encoding != "linear":
         raise ValueError(
@@ -163,17 +113,7 @@ def _write(
 def prepared(
     picture: Picture, channels: int, numbers: str, colour: SavedColour | None, target: Path
 ) -> tuple[NDArray[Any], Encoding | None, tuple[str, ...]]:
-    """Return the values to write in a layout, their encoding, and notes about lost information.
-
-    Parameters
-    ----------
-    picture : Picture
-        All rows of the file, or some.
-    channels, numbers
-        From `chosen_layout`.
-    colour, target
-        As for `save`.
-    """
+    """Return the values to write in a layout, their encoding, and notes about lost information."""
     values = next(one for one in _layouts(picture, True) if one.shape[2] == channels)
     integer = numbers.startswith("uint")
     has_alpha = channels in (2, 4)
@@ -195,23 +135,7 @@ def put(
 ) -> None:
     """Write values unchanged into a temporary file.
 
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    values : ndarray, shape (H, W, C)
-        1 to 4 channels of a dtype that the format supports.
-    picture : Picture
-        Encoding, windows and attributes of the values.
-    temporary, target : Path
-        The result of `safe_writing.reserve`, and its argument.
-    attributes : mapping of str to str or int
-        Further attributes of the file.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written. The error names `target`.
+    `values`: ndarray, shape (H, W, C); 1 to 4 channels of a dtype that the format supports.
     """
     writer = oiio.ImageOutput.create(str(temporary))
     stored = picture.stored
@@ -273,13 +197,7 @@ def chosen_layout(
     temporary: Path,
     target: Path,
 ) -> tuple[int, str]:
-    """Return the closest number of channels and number type that the format supports.
-
-    Raises
-    ------
-    ValueError
-        The format supports none.
-    """
+    """Return the closest number of channels and number type that the format supports."""
     for values in _layouts(picture, writer.supports("alpha") != 0):
         for numbers in _PREFERENCES[picture.numbers]:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
@@ -326,16 +244,9 @@ def _losses(
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
     """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (H, W, C)
-    curve : {"none", "linear", "srgb", "gamma22"}
-        "none" and "linear" return the values themselves.
-
-    Returns
-    -------
-    ndarray, shape (H, W, C)
-        float32 if a curve is applied.
+    - `values`: ndarray of float, shape (H, W, C).
+    - `curve`: "none" and "linear" return the values themselves.
+    - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
     """
     if curve in ("none", "linear"):
         return values

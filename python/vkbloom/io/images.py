@@ -94,35 +94,22 @@ _LOST_ATTRIBUTES: Final = frozenset(
 class StoredImage:
     """An image as stored in a file: every channel, no value changed.
 
-    Parameters
-    ----------
-    pixels : ndarray, shape (H, W, C)
-        uint8, uint16, float16 or float32 (also for doubles), top row first, turned upright if the
-        file has an orientation. They cover the data window and the display window; pixels without
-        data are 0.
-    channels : tuple of str
-        The names of the C channels, such as ("R", "G", "B", "A").
-    numbers : tuple of str
-        OpenImageIO's name of each channel's number type: "uint8", "uint16", "half", "float" or
-        "double".
-    origin : (int, int)
-        Position of the first pixel in the file's coordinates.
-    display : (int, int, int, int)
-        The display window (x, y, width, height), in the file's coordinates.
-    associated : bool
-        Whether the file's format says that colours are multiplied by alpha.
-    space : str
-        OpenImageIO's name of the file's colour space; "" if the file has none.
-    attributes : mapping of str to (OpenImageIO.TypeDesc, value)
-        Those of which `is_kept` is true, by OpenImageIO's names.
-    parts : tuple of str
-        The names of the file's parts (the first 100), of which the pixels are one; "" for a part
-        without a name.
-    profile_name : str
-        The name in the ICC profile; "" without a profile.
-    is_signalled : bool
-        Whether `space` is from a cICP chunk, which has precedence over a profile (PNG, third
-        edition).
+    - `pixels`: ndarray, shape (H, W, C); uint8, uint16, float16 or float32 (also for doubles), top
+      row first, turned upright if the file has an orientation. They cover the data window and the
+      display window; pixels without data are 0.
+    - `channels`: The names of the C channels, such as ("R", "G", "B", "A").
+    - `numbers`: OpenImageIO's name of each channel's number type: "uint8", "uint16", "half",
+      "float" or "double".
+    - `origin`: Position of the first pixel in the file's coordinates.
+    - `display`: The display window (x, y, width, height), in the file's coordinates.
+    - `associated`: Whether the file's format says that colours are multiplied by alpha.
+    - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
+    - `attributes`: Those of which `is_kept` is true, by OpenImageIO's names.
+    - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
+      part without a name.
+    - `profile_name`: The name in the ICC profile; "" without a profile.
+    - `is_signalled`: Whether `space` is from a cICP chunk, which has precedence over a profile
+      (PNG, third edition).
     """
 
     pixels: NDArray[Any]
@@ -148,23 +135,15 @@ class StoredImage:
 class Picture:
     """An image that `vkbloom.Renderer.apply` accepts, and the data to write it to a file.
 
-    Parameters
-    ----------
-    pixels : ndarray, shape (H, W, 3) or (H, W, 4)
-        uint8, float16 or float32; grey images have three equal colours.
-    encoding : {"linear", "srgb", "gamma22"} or None
-        Encoding of the colours. None: not known, because the values were not decoded.
-    numbers : str
-        OpenImageIO's name of the number type in the file.
-    grey : bool
-        Whether the file has one colour channel instead of three.
-    stored : StoredImage
-        The image as stored in the file.
-    notes : tuple of str
-        Notes for the user about how the file was interpreted.
-    colour : str
-        The colour space from which colours were decoded: "linear", "srgb", the name of another
-        space or of the file's profile; "" if the values were not decoded.
+    - `pixels`: ndarray, shape (H, W, 3) or (H, W, 4); uint8, float16 or float32; grey images have
+      three equal colours.
+    - `encoding`: Encoding of the colours. None: not known, because the values were not decoded.
+    - `numbers`: OpenImageIO's name of the number type in the file.
+    - `grey`: Whether the file has one colour channel instead of three.
+    - `stored`: The image as stored in the file.
+    - `notes`: Notes for the user about how the file was interpreted.
+    - `colour`: The colour space from which colours were decoded: "linear", "srgb", the name of
+      another space or of the file's profile; "" if the values were not decoded.
     """
 
     pixels: NDArray[Any]
@@ -185,14 +164,7 @@ class Picture:
     ) -> Self:
         """Make a picture from an array. Without an encoding, `save` writes its values unchanged.
 
-        Parameters
-        ----------
-        pixels : ndarray, shape (H, W, 3) or (H, W, 4)
-            uint8, float16 or float32, 1 being white.
-        numbers : str
-            OpenImageIO's name of the number type to write, if the file's format supports it.
-        encoding : {"linear", "srgb", "gamma22"} or None
-        attributes : mapping of str to (OpenImageIO.TypeDesc, value), optional
+        `pixels`: ndarray, shape (H, W, 3) or (H, W, 4); uint8, float16 or float32, 1 being white.
         """
         height, width, channels = pixels.shape
         stored = StoredImage(
@@ -246,13 +218,7 @@ def complete(pixels: NDArray[Any] | None, reader: Any, file: object) -> NDArray[
 
 
 def failure_of(source: Any) -> str:
-    """Return and clear the error of an OpenImageIO object; "" if there is none.
-
-    Parameters
-    ----------
-    source : OpenImageIO.ImageInput or module
-        When it is destroyed, OpenImageIO prints an error that was not read.
-    """
+    """Return and clear the error of an OpenImageIO object; "" if there is none."""
     try:
         text: str = source.geterror()
     except UnicodeDecodeError as error:

@@ -29,22 +29,11 @@ _BAND_BYTES: Final = 64 << 20
 class Rows:
     """The rows of an image file, from the top to the bottom.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    numbers : str
-        OpenImageIO's name of the number type.
-    read : callable
-        Returns rows `first` to `end` as `image_reading.load` returns the image.
-    step : int
-        `first` and `end` are multiples of this, or `end` is the height.
-
-    Attributes
-    ----------
-    size, numbers
-    band : int
-        Rows to take at a time.
+    - `size`: Width and height in pixels.
+    - `numbers`: OpenImageIO's name of the number type.
+    - `read`: Returns rows `first` to `end` as `image_reading.load` returns the image.
+    - `step`: `first` and `end` are multiples of this, or `end` is the height.
+    - `band`: Rows to take at a time.
     """
 
     def __init__(
@@ -62,13 +51,7 @@ class Rows:
         self._left: StoredImage | None = None
 
     def take(self, count: int) -> StoredImage:
-        """Return the next rows.
-
-        Raises
-        ------
-        ValueError
-            The file is damaged; the error names it.
-        """
+        """Return the next rows."""
         height = self.size[1]
         parts = [] if self._left is None else [self._left.pixels]
         found = self._left
@@ -95,16 +78,6 @@ def opened_rows(
 
     Files that are turned, and those whose data window is not their display window, are read as a
     whole when the first rows are taken.
-
-    Parameters
-    ----------
-    path, subimage, layer
-        As for `image_reading.load`.
-
-    Raises
-    ------
-    OSError, ValueError, ModuleNotFoundError
-        As `image_reading.load`.
     """
     name = os.fspath(path)
     with image_reading.opened(path, "Reading images") as reader:
@@ -162,18 +135,6 @@ def written_rows(
     """Yield a function that writes the next rows, and returns notes as `image_writing.save` does.
 
     The file is created or replaced when all rows are written.
-
-    Parameters
-    ----------
-    path, colour, attributes, quality
-        As for `image_writing.save`.
-    height : int
-        Height of the image in rows.
-
-    Raises
-    ------
-    OSError, ValueError
-        As for `image_writing.save`.
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)

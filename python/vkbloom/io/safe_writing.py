@@ -54,20 +54,7 @@ _ZEROS: Final = 1 << 20  # bytes written at a time
 
 
 def check_extension(oiio: ModuleType, suffix: str) -> None:
-    """Check that an extension belongs to a format that can be written.
-
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    suffix : str
-        The extension with its dot, such as ".png".
-
-    Raises
-    ------
-    ValueError
-        No writable format has the extension.
-    """
+    """Check that an extension belongs to a format that can be written."""
     writer = oiio.ImageOutput.create(f"image{suffix}")
     if writer is None:
         oiio.geterror()
@@ -81,25 +68,7 @@ def reserve(file: Path, size: int) -> Path:
     A failure here has the system's own reason, which OpenImageIO does not report. On a full disk,
     OpenImageIO's JPEG writer would end the process, and its WebP writer would not return.
 
-    Parameters
-    ----------
-    file : Path
-        The file to write in the end; it is not changed.
-    size : int
-        Bytes of the pixels.
-
-    Returns
-    -------
-    Path
-        The temporary file, with the extension of `file`.
-
-    Raises
-    ------
-    ValueError
-        The name is not UTF-8.
-    OSError
-        The file cannot be created or the disk is full; the error names `file`, and no temporary
-        file is left.
+    `size`: Bytes of the pixels.
     """
     return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 
@@ -109,21 +78,6 @@ def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> boo
 
     OpenImageIO knows this only for an open file. One pixel is written, because libpng prints a
     message about a file without pixels.
-
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    temporary : Path
-        From `reserve`; its content is overwritten.
-    channels : int
-        1 to 4.
-    numbers : str
-        OpenImageIO's name of the number type, such as "half".
-
-    Returns
-    -------
-    bool
     """
     spec = oiio.ImageSpec(1, 1, channels, numbers)
     writer = oiio.ImageOutput.create(str(temporary))
@@ -139,56 +93,19 @@ def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> boo
 
 
 def write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
-    """Convert a writer's error to an exception.
-
-    Parameters
-    ----------
-    writer : OpenImageIO.ImageOutput
-        A writer with a failed call.
-    temporary, file : Path
-        The file that it was writing, and the file that the exception names.
-
-    Returns
-    -------
-    OSError
-        An exception with the writer's reason.
-    """
+    """Convert a writer's error to an exception."""
     reason = writer.geterror().replace(str(temporary), file.name).strip() or "not written"
     return OSError(errno.EIO, reason, str(file))
 
 
 def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
-    """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk.
-
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    temporary, file : Path
-        The file that was written, and the file that the exception names.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    """
+    """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk."""
     if not _is_readable(oiio, temporary):
         raise OSError(errno.EIO, "not written completely; is the disk full?", str(file))
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Rename a temporary file to its final name, with the permissions of the file it replaces.
-
-    Parameters
-    ----------
-    temporary, file : Path
-        The temporary file from `reserve`, and the file that it was reserved for.
-
-    Raises
-    ------
-    OSError
-        It cannot be renamed, for example because a folder has the name; the error names `file`.
-    """
+    """Rename a temporary file to its final name, with the permissions of the file it replaces."""
     target = _link_target(file)
     with contextlib.suppress(OSError):
         shutil.copymode(target, temporary)
@@ -203,13 +120,6 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
     """Yield a temporary file to be written in place of a file.
 
     At the end of the block it is checked and renamed. If the block raises, it is removed.
-
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    file, size
-        As for `reserve`, which also names the errors.
     """
     temporary = reserve(file, size)
     try:
@@ -222,21 +132,7 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
-    """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it.
-
-    Parameters
-    ----------
-    oiio : module
-        OpenImageIO.
-    file : Path
-        The file to replace or create.
-
-    Yields
-    ------
-    Steps
-        The writer, not opened yet; the temporary file; and a function that takes the results of
-        the writer's calls, and raises OSError for a failed one.
-    """
+    """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it."""
     with replacing(oiio, file, 0) as temporary:
         writer: Any = oiio.ImageOutput.create(str(temporary))
 
@@ -253,18 +149,7 @@ def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
 
 
 def write_file(file: Path, content: bytes) -> None:
-    """Write a file atomically.
-
-    Parameters
-    ----------
-    file : Path
-    content : bytes
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; the error names it, and the old content is kept.
-    """
+    """Write a file atomically."""
     temporary = _filled(file, lambda stream: stream.write(content))
     try:
         put_in_place(temporary, file)

@@ -13,16 +13,9 @@ __all__ = ["decode_srgb", "encode_srgb"]
 def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
     """Decode sRGB values to linear values.
 
-    Parameters
-    ----------
-    encoded : ndarray of float
-        Any shape. The curve is defined for 0..1 and continued above.
-
-    Returns
-    -------
-    ndarray
-        The same shape and dtype: x / 12.92 up to 0.04045, then ((x + 0.055) / 1.055)^2.4
-        (IEC 61966-2-1).
+    - `encoded`: Any shape. The curve is defined for 0..1 and continued above.
+    - Returns: the same shape and dtype: x / 12.92 up to 0.04045, then ((x + 0.055) / 1.055)^2.4
+      (IEC 61966-2-1).
     """
     kind = encoded.dtype.type
     # The maximum avoids powers of negative numbers, where the linear part is used.
@@ -34,16 +27,9 @@ def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
 def encode_srgb(linear: NDArray[Any]) -> NDArray[Any]:
     """Encode linear values to sRGB, the inverse of `decode_srgb`.
 
-    Parameters
-    ----------
-    linear : ndarray of float
-        Any shape. The curve is defined for 0..1 and continued above.
-
-    Returns
-    -------
-    ndarray
-        The same shape and dtype: 12.92 x up to 0.0031308, then 1.055 x^(1 / 2.4) - 0.055
-        (IEC 61966-2-1).
+    - `linear`: Any shape. The curve is defined for 0..1 and continued above.
+    - Returns: the same shape and dtype: 12.92 x up to 0.0031308, then 1.055 x^(1 / 2.4) - 0.055
+      (IEC 61966-2-1).
     """
     kind = linear.dtype.type
     curve = kind(1.055) * np.maximum(linear, kind(0.0031308)) ** kind(1 / 2.4) - kind(0.055)

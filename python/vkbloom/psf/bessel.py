@@ -20,16 +20,8 @@ def bessel(order: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
     rule converges exponentially here, because the integrand is periodic. For large x, Hankel's
     asymptotic expansion is used (NIST Digital Library of Mathematical Functions, 10.9.2, 10.17.3).
 
-    Parameters
-    ----------
-    order : int
-        0 or 1.
-    x : ndarray
-        Of any shape, at least 0.
-
-    Returns
-    -------
-    ndarray of float64, of the shape of x
+    - `x`: Of any shape, at least 0.
+    - Returns: ndarray of float64, of the shape of x.
     """
     result = np.empty_like(x)
     far = x >= _FAR

@@ -31,19 +31,11 @@ def integrate_pixels(
 ) -> Array:
     """Integrate a radial density over the pixels of an image.
 
-    Parameters
-    ----------
-    density : callable
-        Takes distances in pixels, of any shape, and returns energies per square pixel, (C, ...).
-    size : (int, int)
-        Width and height.
-    period : float
-        Period of the density's oscillation in pixels.
-
-    Returns
-    -------
-    ndarray of float64, shape (height, width, C)
-        The centre is at [height // 2, width // 2].
+    - `density`: Takes distances in pixels, of any shape, and returns energies per square pixel, (C,
+      ...).
+    - `period`: Period of the density's oscillation in pixels.
+    - Returns: ndarray of float64, shape (height, width, C): the centre is at [height // 2, width //
+      2].
     """
     width, height = check_size("size", size)
     # The quadrants are equal. This one is to the right of the point and below it.

@@ -19,22 +19,11 @@ def box_resample(
 ) -> Array:
     """Resample a kernel: a new pixel gets the energy of the area that it covers.
 
-    Parameters
-    ----------
-    kernel : ndarray of float64, shape (h, w, C)
-        Energy per pixel.
-    point : (int, int)
-        Row and column of the kernel's point.
-    scale : (float, float)
-        Height and width of an old pixel in new pixels, above 0.
-    room : (int, int), optional
-        Height and width around the point outside of which no new pixels are needed.
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, C)
-        The sum of each channel is unchanged, unless `room` cuts some off. H and W are odd, and the
-        point is in the middle.
+    - `kernel`: ndarray of float64, shape (h, w, C); Energy per pixel.
+    - `scale`: Height and width of an old pixel in new pixels, above 0.
+    - `room`: Height and width around the point outside of which no new pixels are needed.
+    - Returns: ndarray of float64, shape (H, W, C): the sum of each channel is unchanged, unless
+      `room` cuts some off. H and W are odd, and the point is in the middle.
     """
     within = room or (None, None)
     edges = [_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, within, strict=True)]
@@ -47,17 +36,8 @@ def box_resample(
 def integrals(values: Array, edges: Array, axis: int) -> Array:
     """Integrate between edges along an axis; values are constant within a pixel.
 
-    Parameters
-    ----------
-    values : ndarray of float64
-    edges : ndarray of float64, shape (N,)
-        Ascending. Pixel n lies between n and n + 1. Values outside of the array are 0.
-    axis : int
-
-    Returns
-    -------
-    ndarray of float64
-        N - 1 values along the axis.
+    `edges`: ndarray of float64, shape (N,); Ascending. Pixel n lies between n and n + 1. Values
+    outside of the array are 0.
     """
     lines = np.moveaxis(values, axis, 0)
     sums = np.concatenate([np.zeros((1, *lines.shape[1:])), lines.cumsum(axis=0)])

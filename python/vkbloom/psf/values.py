@@ -16,10 +16,7 @@ __all__ = ["ArrayValue"]
 class ArrayValue:
     """An array of float32 that can be a field of a frozen dataclass.
 
-    Parameters
-    ----------
-    array : array-like
-        Anything that NumPy can convert, or the result of `to_plain`. It is copied.
+    `array`: Anything that NumPy can convert, or the result of `to_plain`. It is copied.
     """
 
     __slots__ = ("_hash", "array")

@@ -3,14 +3,15 @@
 It is slow, simple and independent of the device code. Tests compare rendered images with it.
 
 `apply` returns all framebuffers of an image, `passes` and `blur` only those of the blur,
-`composite` the final image, `gain` the bloom of a flat image of 1, and `shade` the light of the
-deferred system.
+`composite` the final image, `gain` the bloom of a flat image of 1, `shade` the light of the
+deferred system, and `vjp` the framebuffers with their derivatives.
 """
 
 from __future__ import annotations
 
 from .compositing import composite
+from .derivatives import vjp
 from .framebuffers import apply, blur, gain, passes
 from .shading import shade
 
-__all__ = ["apply", "blur", "composite", "gain", "passes", "shade"]
+__all__ = ["apply", "blur", "composite", "gain", "passes", "shade", "vjp"]

@@ -12,7 +12,7 @@ from .image import as_float, format_of, storage
 from .sampling import Array
 from .tone_map import ENCODINGS, TONE_MAPS
 
-__all__ = ["check_settings", "composite"]
+__all__ = ["check_settings", "composite", "composite_checked"]
 
 
 class CompositeSettings(Protocol):
@@ -112,22 +112,34 @@ def composite(
     """
     check_settings(settings)
     image = as_float(scene, "scene", (3, 4))
-    stored = np.asarray(scene).dtype if dtype is None else np.dtype(dtype)
+    stored = np.asarray(scene).dtype if dtype is None else dtype
+    if not settings.bloom:
+        return composite_checked(image, None, settings, stored)
+    if bloom is None:
+        raise TypeError("bloom must be an array where settings.bloom is True, not None")
+    light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
+    if light.shape[:2] != image.shape[:2]:
+        raise ValueError(
+            f"bloom must have the scene's height and width {image.shape[:2]}, not {light.shape[:2]}"
+        )
+    return composite_checked(image, light, settings, stored, share)
+
+
+def composite_checked(
+    image: Array,
+    light: Array | None,
+    settings: CompositeSettings,
+    dtype: DTypeLike,
+    share: float | Array = 1.0,
+) -> Array:
+    """Return the final image of a scene and light, both in real units; None: without bloom."""
     original, alpha = image[..., :3], image[..., 3:]
     rgb = np.where(np.isfinite(original), original, 0.0)
     scale, curve = 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
-    if not settings.bloom:
+    if light is None:
         rgb = curve(rgb * scale)
-    elif bloom is None:
-        raise TypeError("bloom must be an array where settings.bloom is True, not None")
     else:
-        light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
         glow = light[..., :3]
-        if glow.shape != rgb.shape:
-            raise ValueError(
-                f"bloom must have the scene's height and width {image.shape[:2]}, "
-                f"not {glow.shape[:2]}"
-            )
         if settings.method == "godot":
             # The glow was already exposed before the threshold.
             rgb = _godots(rgb * scale, glow, settings, curve, share)
@@ -135,6 +147,7 @@ def composite(
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
         alpha = _blend_alpha(alpha, light, settings.alpha)
     rgb = ENCODINGS[settings.encoding](rgb)
+    stored = np.dtype(dtype)
     store = storage(format_of(np.empty(0, stored), None))
     rgb = store(rgb)
     if settings.dither and stored == np.uint8:

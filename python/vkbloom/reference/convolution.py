@@ -8,6 +8,7 @@ import numpy as np
 
 from .image import BlurInput
 from .sampling import Array, sample
+from .tape import operation, value_of
 from .threshold import luminance
 
 __all__ = ["convolve", "gain", "passes", "prefiltered"]
@@ -65,17 +66,11 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
     The glow is extended by as much as the kernel reaches, so that the Fourier transform's own
     wrapping falls outside.
 
-    Parameters
-    ----------
-    glow : ndarray of float64, shape (H, W, C)
-    kernel : ndarray of float64, shape (h, w, C)
-    boundary : {"zero", "edge", "wrap", "wrap_x"}
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, C)
+    - `glow`: ndarray of float64, shape (H, W, C).
+    - `kernel`: ndarray of float64, shape (h, w, C).
+    - Returns: ndarray of float64, shape (H, W, C).
     """
-    (height, width), (rows, columns) = glow.shape[:2], kernel.shape[:2]
+    rows, columns = kernel.shape[:2]
     modes: dict[str, tuple[Any, Any]] = {
         "zero": ("constant", "constant"),
         "edge": ("edge", "edge"),
@@ -88,9 +83,32 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
     extended = np.pad(
         extended, ((0, 0), (columns - 1 - columns // 2, columns // 2), (0, 0)), across
     )
-    shape = extended.shape[:2]
-    spectrum = np.fft.rfft2(extended, axes=(0, 1)) * np.fft.rfft2(kernel, shape, axes=(0, 1))
-    spread = np.fft.irfft2(spectrum, shape, axes=(0, 1))
+    return _valid(extended, kernel)
+
+
+def _valid(image: Array, kernel: Array) -> Array:
+    """Return the convolution where the kernel lies inside of the image."""
+    shape = image.shape[:2]
+    values = [np.fft.rfft2(value_of(one), shape, axes=(0, 1)) for one in (image, kernel)]
+    rows, columns = (image.shape[i] - kernel.shape[i] + 1 for i in (0, 1))
+
+    def spread(product: Any) -> Array:
+        whole: Array = np.fft.irfft2(product, shape, axes=(0, 1))
+        return whole
+
+    def spectrum(derivative: Array) -> Any:
+        placed = np.zeros(image.shape)
+        placed[kernel.shape[0] - 1 :, kernel.shape[1] - 1 :] = derivative
+        return np.fft.rfft2(placed, axes=(0, 1))
+
     # From the first pixel on whose sum is complete.
-    whole = spread[rows - 1 : rows - 1 + height, columns - 1 : columns - 1 + width]
-    return np.ascontiguousarray(whole)
+    result = spread(values[0] * values[1])[-rows:, -columns:]
+    valid: Array = operation(
+        np.ascontiguousarray(result),
+        (image, lambda d: spread(spectrum(d) * values[1].conj())),
+        (
+            kernel,
+            lambda d: spread(spectrum(d) * values[0].conj())[: kernel.shape[0], : kernel.shape[1]],
+        ),
+    )
+    return valid

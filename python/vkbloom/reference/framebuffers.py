@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from . import (
     bevy,
@@ -25,7 +25,7 @@ from . import (
     unreal,
     urp,
 )
-from .compositing import CompositeSettings, check_settings, composite
+from .compositing import CompositeSettings, check_settings, composite_checked
 from .image import BlurInput, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import apply_threshold, masked
@@ -55,18 +55,12 @@ class Settings(CompositeSettings, Protocol):
 class _Method(NamedTuple):
     """The functions of a method's module.
 
-    Parameters
-    ----------
-    passes : callable
-        ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the
-        data flow; the last one is "bloom". `source` is a `BlurInput`.
-    gain : callable
-        ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a flat
-        image of 1.
-    published : bool
-        Whether `passes` reduces the frame and applies the threshold itself.
-    sized : bool
-        Whether the gain depends on the size of the frame.
+    - `passes`: ``passes(source, settings)`` returns the framebuffers after the glow, in the order
+      of the data flow; the last one is "bloom". `source` is a `BlurInput`.
+    - `gain`: ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a
+      flat image of 1.
+    - `published`: Whether `passes` reduces the frame and applies the threshold itself.
+    - `sized`: Whether the gain depends on the size of the frame.
     """
 
     passes: Callable[[BlurInput, Any], dict[str, Array]]
@@ -161,37 +155,71 @@ def apply(
     >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
     True
     """
-    method = _method(settings)
+    scene, source, weights, format = checked(image, settings, mask, emission)
+    share = 0.0 if emission is not None else 1.0 if weights is None else weights
+    return framebuffers(
+        scene,
+        source,
+        settings,
+        mask=weights,
+        share=share,
+        format=format,
+        dtype=np.asarray(image).dtype,
+    )
+
+
+def checked(
+    image: NDArray[Any],
+    settings: Settings,
+    mask: NDArray[Any] | None,
+    emission: NDArray[Any] | None,
+) -> tuple[Array, Array, Array | None, str]:
+    """Return scene, source of the bloom and mask in real units, and the bloom buffers' format."""
+    _method(settings)
     scene = as_float(image, "image", (3, 4))
-    dtype = np.asarray(image).dtype
     height, width, channels = scene.shape
     format = format_of(image, settings.format)
     if settings.alpha != "keep" and (channels == 3 or format == "rg11b10ufloat"):
         raise ValueError(f'alpha must be "keep" without a fourth channel, not {settings.alpha!r}')
     source = scene if emission is None else _emission(image, emission)
-    weights = None if mask is None else as_mask(mask, (width, height))
+    return scene, source, None if mask is None else as_mask(mask, (width, height)), format
+
+
+def framebuffers(
+    scene: Array,
+    source: Array,
+    settings: Settings,
+    *,
+    mask: Array | None,
+    share: float | Array,
+    format: str,
+    dtype: DTypeLike,
+) -> dict[str, Array]:
+    """Return the framebuffers of `apply`.
+
+    `share` is the share of the scene that is the source of the bloom, (H, W, 1) or a number.
+    """
+    method = _method(settings)
+    height, width, _ = scene.shape
     if not settings.bloom:
-        return {"final": composite(scene, None, settings, dtype)}
+        return {"final": composite_checked(scene, None, settings, dtype)}
     store = storage(format)
     channels = 4 if settings.alpha == "blur" else 3
     reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
     if method.published:
         glow = store.end(reduced)
     else:
-        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), weights))
-    blurred = method.passes(BlurInput(glow, (width, height), store, weights), settings)
-    stages = glare.stages(_glowing(glow, settings, weights), settings.glare, format)
-    framebuffers = _with_alphas({"glow": glow, **stages, **blurred})
-    # The share of the scene that is the source of the bloom.
-    share = 0.0 if emission is not None else 1.0 if weights is None else weights
-    bloom = framebuffers["bloom"]
+        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
+    blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
+    stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
+    found = _with_alphas({"glow": glow, **stages, **blurred})
     if settings.glare:
-        images = [framebuffers[name] for name in stages]
-        bloom = glare.light(bloom, settings.intensity, images, settings.glare)
-    framebuffers["final"] = composite(
-        scene, bloom, settings, dtype, share=share, is_light=bool(settings.glare)
-    )
-    return framebuffers
+        images = [found[name] for name in stages]
+        light = glare.light(found["bloom"], settings.intensity, images, settings.glare)
+    else:
+        light = found["bloom"] * settings.intensity
+    found["final"] = composite_checked(scene, light, settings, dtype, share)
+    return found
 
 
 def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:

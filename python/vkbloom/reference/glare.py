@@ -12,6 +12,7 @@ from .image import Storage, storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample
+from .tape import Traced
 
 __all__ = ["light", "stage_format", "stages"]
 
@@ -24,18 +25,8 @@ def stage_format(format: str) -> str:
 def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]:
     """Return the framebuffer of each stage.
 
-    Parameters
-    ----------
-    source : ndarray of float64, shape (H, W, C)
-        The thresholded and masked image, at the size of the bloom buffers.
-    glare : sequence of vkbloom.Glare
-    format : str
-        Of the bloom buffers.
-
-    Returns
-    -------
-    dict of str to ndarray of float64
-        By the stage's name, with a number if there are several stages of the same class.
+    `source`: ndarray of float64, shape (H, W, C); The thresholded and masked image, at the size of
+    the bloom buffers.
     """
     store = storage(stage_format(format))
     counts = Counter(stage.stage for stage in glare)
@@ -95,17 +86,8 @@ def _above(image: Array, threshold: float) -> Array:
 
 def _moved(image: Array, x: float, y: float) -> Array:
     """Return the image shifted by (x, y) texels, bilinearly, with 0 outside of the image."""
-    height, width, _ = image.shape
-    left, top = int(np.floor(x)), int(np.floor(y))
-    total = np.zeros_like(image)
-    for row, row_share in ((top, 1 - (y - top)), (top + 1, y - top)):
-        for column, share in ((left, 1 - (x - left)), (left + 1, x - left)):
-            rows = np.arange(height) + row
-            columns = np.arange(width) + column
-            inside = np.outer((rows >= 0) & (rows < height), (columns >= 0) & (columns < width))
-            texels = image[rows.clip(0, height - 1)][:, columns.clip(0, width - 1)]
-            total += row_share * share * inside[..., np.newaxis] * texels
-    return total
+    rows, columns = (np.arange(side, dtype=np.float64) for side in image.shape[:2])
+    return _texels(image, columns[np.newaxis] + x, rows[:, np.newaxis] + y)
 
 
 def _streaks(image: Array, stage: Any, store: Storage) -> Array:
@@ -138,10 +120,10 @@ def _streaks(image: Array, stage: Any, store: Storage) -> Array:
 
 def _colours(tap: int, less: float, channels: int) -> Array:
     """Return the factors of the channels at a tap: in turn, red, blue or green is kept."""
-    factors = np.ones(channels)
+    kept = np.ones(channels)
     if tap > 0:
-        factors[:3] = less
-        factors[(0, 2, 1)[(tap - 1) % 3]] = 1
+        kept[:3] = np.arange(3) == (0, 2, 1)[(tap - 1) % 3]
+    factors: Array = kept + less * (1 - kept)
     return factors
 
 
@@ -153,19 +135,37 @@ def _places(image: Array) -> tuple[Array, Array]:
 
 
 def _read(image: Array, x: Array, y: Array) -> Array:
-    """Return the image at positions, bilinearly, with 0 outside of the image."""
+    """Return the image at positions as of `_places`, bilinearly, with 0 outside of the image."""
     height, width, _ = image.shape
-    total = np.zeros_like(image)
-    column, row = (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5
-    left, top = np.floor(column), np.floor(row)
+    return _texels(image, (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5)
+
+
+def _texels(image: Array, column: Array, row: Array) -> Array:
+    """Return the image at positions in texels, bilinearly, with 0 outside of the image."""
+    # At a texel's centre (with roundings) the derivative is the mean of those of both sides, whose
+    # value is the same.
+    is_traced = isinstance(column, Traced) or isinstance(row, Traced)
+    near = 1e-9
+    both = (lambda place: np.floor(place + near), lambda place: np.ceil(place - near) - 1)
+    sides = both if is_traced else (np.floor,)
+    found = [_between(image, column, row, side(column), side(row)) for side in sides]
+    mean: Array = sum(found[1:], found[0]) / len(sides)
+    return mean
+
+
+def _between(image: Array, column: Array, row: Array, left: Array, top: Array) -> Array:
+    """Return the bilinear mean of the texels at left, left + 1 and top, top + 1."""
+    height, width, _ = image.shape
+    total: Any = 0.0
     for rows, row_share in ((top, top + 1 - row), (top + 1, row - top)):
         for columns, share in ((left, left + 1 - column), (left + 1, column - left)):
             inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
             texels = image[
                 rows.clip(0, height - 1).astype(int), columns.clip(0, width - 1).astype(int)
             ]
-            total += (row_share * share * inside)[..., np.newaxis] * texels
-    return total
+            total = total + (row_share * share * inside)[..., np.newaxis] * texels
+    found: Array = total
+    return found
 
 
 def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
@@ -184,10 +184,11 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
     """Return the sum of the ghosts: the image read at 1/2 + s (p - 1/2)."""
     x, y = _places(image)
     total = np.zeros_like(image)
-    for scale, tint in stage.ghosts:
+    tints = stage.tints if len(stage.tints) > 1 else [stage.tints[0]] * len(stage.scales)
+    for scale, tint in zip(stage.scales, tints, strict=True):
         distance = np.abs(scale) * np.hypot(x, y)
         weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
-        factors = np.append(tint, [np.mean(tint)] * (image.shape[2] - 3))
+        factors = np.concatenate([tint, [sum(tint) / 3] * (image.shape[2] - 3)])
         total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
     corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
     total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]

@@ -12,6 +12,7 @@ import numpy as np
 
 from .image import BlurInput
 from .sampling import Array, sample
+from .tape import contiguous
 from .threshold import brightest, luminance, masked
 from .upsampling import cubic, linear
 
@@ -100,7 +101,7 @@ def _luminance(rgb: Array, settings: GodotBloom) -> Array:
 def _blur(samples: Array) -> Array:
     """Apply the nine taps along both axes."""
     columns = _blur_rows(samples.swapaxes(0, 1)).swapaxes(0, 1)
-    return np.ascontiguousarray(_blur_rows(columns))
+    return contiguous(_blur_rows(columns))
 
 
 def _blur_rows(samples: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from .image import BlurInput, Storage
 from .sampling import Array, read_rows, sample, weighted_mean
+from .tape import contiguous
 from .threshold import firefly_weight, luminance, masked
 from .upsampling import combine, cubic, spline_taps
 
@@ -89,7 +90,7 @@ def _along_both(
     """Apply a filter of rows along x, then along y; each result is stored if `store` is given."""
     horizontal = rows(image.swapaxes(0, 1), size[0]).swapaxes(0, 1)
     both = rows(horizontal if store is None else store(horizontal), size[1])
-    return np.ascontiguousarray(both) if store is None else store(both)
+    return contiguous(both) if store is None else store(both)
 
 
 def _convolve(rows: Array, count: int) -> Array:

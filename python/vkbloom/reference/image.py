@@ -26,25 +26,8 @@ _FORMATS = {
 def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
     """Return an image in real units.
 
-    Parameters
-    ----------
-    image : ndarray, shape (H, W, C)
-        uint8 (read as value / 255), float16, float32 or float64.
-    name : str
-        Name of the argument, for error messages.
-    channels : collection of int, optional
-        Accepted numbers of channels C; by default any.
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, C)
-
-    Raises
-    ------
-    TypeError
-        The image has another dtype.
-    ValueError
-        Another shape.
+    - `image`: ndarray, shape (H, W, C); uint8 (read as value / 255), float16, float32 or float64.
+    - Returns: ndarray of float64, shape (H, W, C).
     """
     array = np.asarray(image)
     if array.dtype.name not in _FORMATS:
@@ -63,21 +46,8 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
 def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     """Return a mask as values of 0 to 1.
 
-    Parameters
-    ----------
-    mask : ndarray, shape (H, W)
-        uint8 (read as value / 255), bool, or floats.
-    size : (int, int)
-        The required width and height.
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, 1)
-
-    Raises
-    ------
-    ValueError
-        The mask has another size, or a value that is not in 0..1.
+    - `mask`: ndarray, shape (H, W); uint8 (read as value / 255), bool, or floats.
+    - Returns: ndarray of float64, shape (H, W, 1).
     """
     array = np.asarray(mask)
     if array.shape != size[::-1]:
@@ -129,17 +99,12 @@ class Storage:
 class BlurInput:
     """What the passes of a method read.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (H, W, C)
-        The content of the first bloom buffer. Methods that read a luminance accept 1, 3 or, with
-        alpha, 4 channels.
-    size : (int, int)
-        Width and height of the bloom.
-    store : Storage
-        The effect of storing values in a bloom buffer.
-    mask : ndarray of float64, shape (height, width, 1), optional
-        Multiplies the result of a published method's threshold. Other methods do not read it.
+    - `image`: ndarray of float64, shape (H, W, C); The content of the first bloom buffer. Methods
+      that read a luminance accept 1, 3 or, with alpha, 4 channels.
+    - `size`: Width and height of the bloom.
+    - `store`: The effect of storing values in a bloom buffer.
+    - `mask`: ndarray of float64, shape (height, width, 1), optional; Multiplies the result of a
+      published method's threshold. Other methods do not read it.
     """
 
     image: Array
@@ -153,10 +118,8 @@ def _as_rg11b10(image: Array) -> Array:
 
     Ties go to the even value, as in IEEE 754. The smallest step is 2^-20, for blue 2^-19.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (..., C)
-        Three channels are red, green and blue. With another number, all have 6 bits.
+    `image`: ndarray of float64, shape (..., C); Three channels are red, green and blue. With
+    another number, all have 6 bits.
     """
     bits = np.array([6, 6, 5]) if image.shape[-1] == 3 else np.array(6)
     kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
@@ -176,21 +139,7 @@ _STORAGES = {
 
 
 def storage(format: str) -> Storage:
-    """Return the effect of storing values in a bloom buffer of a format.
-
-    Parameters
-    ----------
-    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}
-
-    Returns
-    -------
-    Storage
-
-    Raises
-    ------
-    ValueError
-        Another format.
-    """
+    """Return the effect of storing values in a bloom buffer of a format."""
     if format not in _STORAGES:
         names = ", ".join(map(repr, _STORAGES))
         raise ValueError(f"format must be one of {names}, not {format!r}")

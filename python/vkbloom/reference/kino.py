@@ -60,9 +60,15 @@ def _prefilter(image: Array, settings: KinoBloom) -> Array:
     padded = np.pad(clamped, ((1, 1), (1, 1), (0, 0)), mode="edge")
     kept = padded[1:-1, 1:-1]
     if settings.anti_flicker:
-        kept = np.median([kept, padded[1:-1, :-2], padded[1:-1, 2:]], axis=0)
-        kept = np.median([kept, padded[:-2, 1:-1], padded[2:, 1:-1]], axis=0)
+        kept = _median(kept, padded[1:-1, :-2], padded[1:-1, 2:])
+        kept = _median(kept, padded[:-2, 1:-1], padded[2:, 1:-1])
     return _threshold(kept, settings)
+
+
+def _median(first: Array, second: Array, third: Array) -> Array:
+    larger = np.minimum(np.maximum(first, second), third)
+    median: Array = np.maximum(np.minimum(first, second), larger)
+    return median
 
 
 def _threshold(rgb: Array, settings: KinoBloom) -> Array:

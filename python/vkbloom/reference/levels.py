@@ -21,17 +21,7 @@ def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
     Each level has half the size of the one before (`halved`). The chain ends before a level of
     1 x 1, except that it always has one level.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image above the first level, in pixels.
-    levels : int
-        The number of levels, at least 1.
-
-    Returns
-    -------
-    list of (int, int)
-        Width and height of each level; 1 to `levels` entries.
+    `size`: Width and height of the image above the first level, in pixels.
     """
     sizes: list[tuple[int, int]] = []
     for _ in range(levels):

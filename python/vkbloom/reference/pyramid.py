@@ -37,11 +37,6 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
     by their number N: up_N-1 = down_N-1, up_k = down_k + tent(up_k+1), and the bloom is
     tent(up_0) / N. With level weights, up_N-1 = w_N-1 down_N-1, up_k = w_k down_k + tent(up_k+1),
     and the bloom is tent(up_0). The scale multiplies the distances of all taps.
-
-    Raises
-    ------
-    ValueError
-        Firefly filter of an image with another number of channels than 1, 3 and 4.
     """
     height, width, _ = source.image.shape
     downs: list[Array] = []
@@ -52,7 +47,7 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
         downs.append(image)
     count, weights = len(downs), settings.level_weights
     up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
-    shares = [1.0] * count if weights is None else [float(w) for w in weights[:count]]
+    shares = [1.0] * count if weights is None else list(weights[:count])
     return combine(
         downs,
         source,

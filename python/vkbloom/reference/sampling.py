@@ -8,10 +8,12 @@ banded. They are built and applied in blocks of output rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .tape import Traced, contiguous, operation, value_of
 
 __all__ = ["CENTRE", "Array", "Taps", "read_rows", "sample", "weighted_mean"]
 
@@ -38,34 +40,60 @@ def sample(
     of the two nearest texels along each axis (the Vulkan specification, chapter "Image Operations",
     section "Texel Filtering", of linear filters). Outside of the image it is the value at the edge.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (H, W, C)
-        Finite values. It is not changed.
-    size : (int, int)
-        Width and height of the result, in pixels.
-    x_taps, y_taps : sequence of (float, float)
-        Offset (in texels of `image`) and weight of each tap along the axis. The taps of both axes
-        form a grid, and their weights are multiplied.
-
-    Returns
-    -------
-    ndarray of float64, shape (height, width, C)
+    - `image`: ndarray of float64, shape (H, W, C); Finite values. It is not changed.
+    - `size`: Width and height of the result, in pixels.
+    - `x_taps`, `y_taps`: Offset (in texels of `image`) and weight of each tap along the axis. The
+      taps of both axes form a grid, and their weights are multiplied.
+    - Returns: ndarray of float64, shape (height, width, C).
     """
     width, height = size
     rows = _filter_rows(image, height, y_taps)
     columns = _filter_rows(rows.swapaxes(0, 1), width, x_taps)
-    return np.ascontiguousarray(columns.swapaxes(0, 1))
+    return contiguous(columns.swapaxes(0, 1))
 
 
 def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
     """Apply the taps along the first axis, for `count` rows of output."""
-    length = image.shape[0]
-    if count == length and tuple(taps) == CENTRE:
+    values, offsets, shares = value_of(image), *zip(*taps, strict=True)
+    places = np.array([value_of(offset) for offset in offsets], dtype=np.float64)
+    weights = np.array([value_of(share) for share in shares], dtype=np.float64)
+    length = values.shape[0]
+    is_traced = any(isinstance(one, Traced) for one in (*offsets, *shares))
+    if count == length and tuple(taps) == CENTRE and not is_traced:
         return image
-    source = image.reshape(length, -1)
-    offsets, tap_weights = np.array(taps, dtype=np.float64).T
+    source = values.reshape(length, -1)
     result = np.empty((count, source.shape[1]))
+    for rows, texels, matrix in _bands(length, count, places, weights):
+        result[rows] = matrix @ source[texels]
+
+    def by_image(derivative: Array) -> Array:
+        total: Array = np.zeros(source.shape)
+        for rows, texels, matrix in _bands(length, count, places, weights):
+            total[texels] += matrix.T @ derivative[rows].reshape(len(matrix), -1)
+        return total.reshape(values.shape)
+
+    def by_weight(tap: int) -> Callable[[Array], Array]:
+        alone = ((float(places[tap]), 1.0),)
+        return lambda derivative: (derivative * _filter_rows(values, count, alone)).sum()
+
+    def by_offset(tap: int) -> Callable[[Array], Array]:
+        return lambda derivative: (
+            weights[tap] * (derivative * _slopes(values, count, places[tap])).sum()
+        )
+
+    filtered: Array = operation(
+        result.reshape(count, *values.shape[1:]),
+        (image, by_image),
+        *((share, by_weight(tap)) for tap, share in enumerate(shares)),
+        *((offset, by_offset(tap)) for tap, offset in enumerate(offsets)),
+    )
+    return filtered
+
+
+def _bands(
+    length: int, count: int, offsets: Array, tap_weights: Array
+) -> Iterator[tuple[slice, slice, Array]]:
+    """Yield blocks of output rows, the texels that each reads, and the matrix between them."""
     for start in range(0, count, _BLOCK):
         stop = min(start + _BLOCK, count)
         centres = (np.arange(start, stop) + 0.5) * length / count - 0.5
@@ -83,23 +111,31 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
             (output_rows * band + texels - first).ravel(),
             weights=weights.ravel(),
             minlength=(stop - start) * band,
-        ).reshape(stop - start, band)
-        result[start:stop] = matrix @ source[first : first + band]
-    return result.reshape(count, *image.shape[1:])
+        )
+        blocks = slice(start, stop), slice(first, first + band)
+        yield *blocks, matrix.reshape(stop - start, band).astype(np.float64, copy=False)
+
+
+def _slopes(image: Array, count: int, offset: float) -> Array:
+    """Return the derivative of a tap by its offset: at texel centres the mean of both sides."""
+    length = image.shape[0]
+    positions = (np.arange(count) + 0.5) * length / count - 0.5 + offset
+    # A centre is met with roundings.
+    left, right = np.ceil(positions - 1e-9) - 1, np.floor(positions + 1e-9)
+    texels = [
+        image[np.clip(place, 0, length - 1).astype(np.intp)]
+        for place in (left, left + 1, right, right + 1)
+    ]
+    slopes: Array = (texels[1] - texels[0] + texels[3] - texels[2]) / 2
+    return slopes
 
 
 def read_rows(image: Array, positions: Array) -> Array:
     """Sample an image along its first axis at any positions, linearly and clamped to the edge.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (H, W, C)
-    positions : ndarray, shape (N,)
-        In texels, with texel n at n.
-
-    Returns
-    -------
-    ndarray of float64, shape (N, W, C)
+    - `image`: ndarray of float64, shape (H, W, C).
+    - `positions`: ndarray, shape (N,); In texels, with texel n at n.
+    - Returns: ndarray of float64, shape (N, W, C).
     """
     lower = np.floor(positions)
     part = (positions - lower)[:, np.newaxis, np.newaxis]
@@ -113,14 +149,9 @@ def read_rows(image: Array, positions: Array) -> Array:
 def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
     """Return the weighted mean of images.
 
-    Parameters
-    ----------
-    parts : iterable of (float or ndarray, ndarray)
-        The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W, C).
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W, C)
+    - `parts`: The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W,
+      C).
+    - Returns: ndarray of float64, shape (H, W, C).
     """
     total, weights = np.zeros(()), np.zeros(())
     for weight, image in parts:

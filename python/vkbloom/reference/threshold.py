@@ -15,16 +15,10 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
     """Return the luminance, by default that of Rec. 709: 0.2126 r + 0.7152 g + 0.0722 b.
 
-    Parameters
-    ----------
-    rgb : ndarray of float64, shape (..., 3), (..., 4) or (..., 1)
-        A fourth channel is alpha, which is ignored. A single channel is its own luminance.
-    coefficients : ndarray of float64, shape (3,)
-        Sources differ in the last digits.
-
-    Returns
-    -------
-    ndarray of float64, shape (..., 1)
+    - `rgb`: ndarray of float64, shape (..., 3), (..., 4) or (..., 1); A fourth channel is alpha,
+      which is ignored. A single channel is its own luminance.
+    - `coefficients`: ndarray of float64, shape (3,); Sources differ in the last digits.
+    - Returns: ndarray of float64, shape (..., 1).
     """
     if rgb.shape[-1] == 1:
         return rgb
@@ -41,10 +35,8 @@ def brightest(image: Array) -> Array:
 def masked(image: Array, mask: Array | None) -> Array:
     """Return the image times the mask, which is read bilinearly at the image's pixel centres.
 
-    Parameters
-    ----------
-    image : ndarray of float64, shape (h, w, C)
-    mask : ndarray of float64, shape (H, W, 1), or None
+    - `image`: ndarray of float64, shape (h, w, C).
+    - `mask`: ndarray of float64, shape (H, W, 1), or None.
     """
     if mask is None:
         return image
@@ -68,18 +60,9 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     threshold - k to the line b - threshold at threshold + k. Both formulas are documented with
     `vkbloom.Settings`.
 
-    Parameters
-    ----------
-    rgb : ndarray of float64, shape (..., 3) or (..., 4)
-        Alpha is scaled like the colour.
-    threshold : float or None
-        In the units of the image; None keeps everything.
-    knee : float
-        Half-width of the soft part, as a fraction of the threshold; 0 for the hard one.
-
-    Returns
-    -------
-    ndarray of float64, of the same shape
+    - `rgb`: ndarray of float64, shape (..., 3) or (..., 4); Alpha is scaled like the colour.
+    - `threshold`: In the units of the image; None keeps everything.
+    - Returns: ndarray of float64, of the same shape.
     """
     if threshold is None:
         return rgb
@@ -95,18 +78,9 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
     b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
     divisor.
 
-    Parameters
-    ----------
-    rgb : ndarray of float64, shape (..., C)
-    threshold, half_width : float
-        Middle and half-width of the soft part, in the units of the image.
-    divisor, least : float
-        About 4 half_width, and the lower bound of the brightness in the division. Sources differ
-        in both.
-
-    Returns
-    -------
-    ndarray of float64, shape (..., C)
+    - `rgb`: ndarray of float64, shape (..., C).
+    - `threshold`, `half_width`: Middle and half-width of the soft part, in the units of the image.
+    - Returns: ndarray of float64, shape (..., C).
     """
     brightness = brightest(rgb)
     soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor

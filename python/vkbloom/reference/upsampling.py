@@ -8,6 +8,7 @@ import numpy as np
 
 from .image import BlurInput
 from .sampling import Array, sample
+from .tape import contiguous
 
 __all__ = [
     "combine",
@@ -47,7 +48,7 @@ def cubic(image: Array, size: tuple[int, int]) -> Array:
     """
     rows = _cubic_rows(image, size[1])
     columns = _cubic_rows(rows.swapaxes(0, 1), size[0])
-    return np.ascontiguousarray(columns.swapaxes(0, 1))
+    return contiguous(columns.swapaxes(0, 1))
 
 
 def _cubic_rows(image: Array, count: int) -> Array:
@@ -71,14 +72,7 @@ def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
     w_1 / (w_0 + w_1) of the way, has both their shares (Sigg and Hadwiger, "Fast Third-Order
     Texture Filtering", GPU Gems 2, chapter 20); likewise the other two.
 
-    Parameters
-    ----------
-    positions : ndarray
-        In texels, with texel n at n.
-
-    Returns
-    -------
-    list of (ndarray, ndarray)
+    `positions`: In texels, with texel n at n.
     """
     lower = np.floor(positions)
     f = positions - lower
@@ -108,26 +102,6 @@ def combine(
     is gain * last(up_0). Buffers of rgba8unorm hold values up to 1: there up_k is divided by the
     value that it has if all levels are 1 (with the sizes of the shares instead of the shares), and
     the bloom is multiplied by that of up_0.
-
-    Parameters
-    ----------
-    downs : sequence of ndarray
-        The levels, largest first.
-    source : BlurInput
-        Its size and storage are read.
-    upsample, last : callable
-        The filters between levels and to the bloom.
-    own, coarse : sequence of float, optional
-        Shares of the level and of the smaller levels; N - 1 entries are read. Default: all 1.
-    smallest, gain : float, optional
-        Factors of the smallest level and of the bloom.
-    end : callable, optional
-        The effect of storing the bloom; by default ``source.store.end``.
-
-    Returns
-    -------
-    dict of str to ndarray
-        "down_0" to "down_N-1", "up_N-2" to "up_0" and "bloom".
     """
     size, store = source.size, source.store
     framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}

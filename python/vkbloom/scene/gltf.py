@@ -52,32 +52,6 @@ def load_mesh(path: str | os.PathLike[str]) -> Mesh:
     there are no normals, flat ones are computed (3.7.2.1). A transform with a negative determinant
     reverses the winding (3.7.4). A normal of length 0 becomes the mesh's y axis, since a shader
     would make it NaN. The file's cameras and `doubleSided` are ignored.
-
-    Parameters
-    ----------
-    path
-        The file. A GLB is recognized by its first bytes, not by its name. Buffers and images may be
-        in the file, in data URIs, or in files in the same folder or below it.
-
-    Returns
-    -------
-    Mesh
-
-    Warns
-    -----
-    UserWarning
-        Once for each file, with everything that is not loaded: points and lines, other textures,
-        alpha modes, skins, morph targets, animations, extensions.
-
-    Raises
-    ------
-    OSError
-        The file or one of its buffers or images is missing or cannot be read.
-    ValueError
-        The file or an image is damaged, requires an extension that is not supported, refers to a
-        file outside of its folder, is too large, or has no triangles. The message names the cause.
-    ModuleNotFoundError
-        pygltflib, or OpenImageIO for textures, is not installed.
     """
     file = GltfFile(Path(path))
     mesh = _Loader(file).mesh()

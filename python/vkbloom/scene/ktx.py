@@ -38,24 +38,9 @@ def _aligned(size: int) -> int:
 def read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], ...]:
     """Read all mip levels of a cubemap.
 
-    Parameters
-    ----------
-    path
-        A KTX 1 file of six square faces in RGBA8, RGB8, RGBA16F, RGB16F, RGBA32F or RGB32F.
-
-    Returns
-    -------
-    tuple of ndarray
-        One array ``(6, n, n, C)`` for each level, the largest first. The faces are in the order +x,
-        -x, +y, -y, +z, -z; C is 3 or 4; the dtype is uint8, float16 or float32. The arrays own
-        their memory.
-
-    Raises
-    ------
-    OSError
-        The file is missing or cannot be read.
-    ValueError
-        The file is damaged or is not such a cubemap. The message names the file.
+    Returns: one array ``(6, n, n, C)`` for each level, the largest first. The faces are in the
+    order +x, -x, +y, -y, +z, -z; C is 3 or 4; the dtype is uint8, float16 or float32. The arrays
+    own their memory.
     """
     path = Path(path)
     data = path.read_bytes()

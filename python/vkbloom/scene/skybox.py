@@ -116,29 +116,9 @@ def level_limit(side: int) -> int:
 def load(source: SkyboxSource) -> Cubemap:
     """Make a cubemap from any type of skybox argument.
 
-    Parameters
-    ----------
-    source
-        A path to a KTX 1 cubemap; a path to an equirectangular image; six paths to face images in
-        the order +x, -x, +y, -y, +z, -z; an array ``(6, N, N, C)``; or a Cubemap, which is
-        returned itself.
-
-    Returns
-    -------
-    Cubemap
-        With the file's mip levels if it has more than one; otherwise with all levels, which are
-        computed.
-
-    Raises
-    ------
-    TypeError
-        `source` has another type.
-    OSError
-        A file is missing or cannot be read.
-    ValueError
-        A file is damaged or has a wrong size or format. The message names the file.
-    ModuleNotFoundError
-        An image is given and OpenImageIO is not installed.
+    `source`: A path to a KTX 1 cubemap; a path to an equirectangular image; six paths to face
+    images in the order +x, -x, +y, -y, +z, -z; an array ``(6, N, N, C)``; or a Cubemap, which is
+    returned itself.
     """
     if isinstance(source, Cubemap):
         return source
@@ -162,23 +142,9 @@ def load(source: SkyboxSource) -> Cubemap:
 def from_array(faces: NDArray[Any]) -> Cubemap:
     """Make a cubemap with all mip levels from an array.
 
-    Parameters
-    ----------
-    faces
-        ``(6, N, N, C)``, faces in the order +x, -x, +y, -y, +z, -z, top row first; C is 3 (alpha
-        becomes 1, or 255) or 4; dtype uint8, float16 or float32. N does not have to be a power of
-        two.
-
-    Returns
-    -------
-    Cubemap
-
-    Raises
-    ------
-    TypeError
-        The array has another dtype.
-    ValueError
-        The array has another shape.
+    `faces`: ``(6, N, N, C)``, faces in the order +x, -x, +y, -y, +z, -z, top row first; C is 3
+    (alpha becomes 1, or 255) or 4; dtype uint8, float16 or float32. N does not have to be a power
+    of two.
     """
     if faces.dtype.newbyteorder("=") not in DTYPES:
         raise TypeError(f"skybox is {faces.dtype}; uint8, float16 or float32 is needed")
@@ -187,26 +153,7 @@ def from_array(faces: NDArray[Any]) -> Cubemap:
 
 
 def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
-    """Make a cubemap from a KTX 1 file.
-
-    Parameters
-    ----------
-    path
-        The file. `vkbloom.scene.ktx.read` lists the texel formats.
-
-    Returns
-    -------
-    Cubemap
-        With the file's mip levels if it has more than one; otherwise with all levels, which are
-        computed.
-
-    Raises
-    ------
-    OSError
-        The file is missing or cannot be read.
-    ValueError
-        The file is damaged or is not a cubemap. The message names it.
-    """
+    """Make a cubemap from a KTX 1 file."""
     levels = ktx.read(path)
     if len(levels) == 1:
         return _with_levels(_with_alpha(levels[0]))
@@ -216,28 +163,9 @@ def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
 def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
     """Make a cubemap with all mip levels from six face images.
 
-    Parameters
-    ----------
-    paths
-        Image files in the order +x, -x, +y, -y, +z, -z. They are square, RGB or RGBA, and have the
-        same size and dtype. 8-bit images stay uint8, half-float images float16; 16-bit integers
-        become float32 in 0..1.
-
-    Returns
-    -------
-    Cubemap
-
-    Raises
-    ------
-    TypeError
-        An entry is not a path.
-    OSError
-        A file is missing or cannot be read.
-    ValueError
-        There are not six paths, or a file is damaged or differs from the others in size or dtype.
-        The message names it.
-    ModuleNotFoundError
-        OpenImageIO is not installed.
+    `paths`: Image files in the order +x, -x, +y, -y, +z, -z. They are square, RGB or RGBA, and have
+    the same size and dtype. 8-bit images stay uint8, half-float images float16; 16-bit integers
+    become float32 in 0..1.
     """
     if isinstance(paths, (str, bytes)) or not all(isinstance(p, (str, os.PathLike)) for p in paths):
         raise TypeError("skybox must be six paths of face images")
@@ -264,25 +192,8 @@ def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
 def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
     """Make a cubemap with all mip levels from an equirectangular panorama.
 
-    Parameters
-    ----------
-    path
-        An image file twice as wide as high, RGB or RGBA; dtypes as for `from_faces`.
-
-    Returns
-    -------
-    Cubemap
-        Its faces have a side of round(width / 4) pixels. `project_equirectangular` states the
-        directions.
-
-    Raises
-    ------
-    OSError
-        The file is missing or cannot be read.
-    ValueError
-        The file is damaged, or is not twice as wide as high. The message names it.
-    ModuleNotFoundError
-        OpenImageIO is not installed.
+    Returns: its faces have a side of round(width / 4) pixels. `project_equirectangular` states the
+    directions.
     """
     panorama = _with_alpha(_read_image(path))
     height, width = panorama.shape[:2]
@@ -302,18 +213,10 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     camera without rotation. Columns to the right of the centre are towards +x, which this camera
     sees on its right. The picture appears upright and not mirrored.
 
-    Parameters
-    ----------
-    panorama
-        ``(H, W, C)``, uint8, float16 or float32, top row first.
-    side
-        Side of a face in pixels, at least 1.
-
-    Returns
-    -------
-    ndarray
-        ``(6, side, side, C)`` in the panorama's dtype: bilinear samples, wrapped in longitude and
-        clamped at the poles. NaN and infinity count as 0.
+    - `panorama`: ``(H, W, C)``, uint8, float16 or float32, top row first.
+    - `side`: Side of a face in pixels, at least 1.
+    - Returns: ``(6, side, side, C)`` in the panorama's dtype: bilinear samples, wrapped in
+      longitude and clamped at the poles. NaN and infinity count as 0.
 
     Notes
     -----
@@ -351,18 +254,10 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
 def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Make all mip levels of a cubemap.
 
-    Parameters
-    ----------
-    faces
-        ``(6, n, n, C)``, uint8, float16 or float32: the largest level.
-
-    Returns
-    -------
-    tuple of ndarray
-        `faces` and all smaller levels down to 1 x 1. A pixel is the mean of 2 x 2 pixels of the
-        next larger level. The last row and column of an odd side are left out, as sides are rounded
-        down. Means are computed in float32 and rounded to the dtype once for each level, so that
-        errors do not add up. NaN and infinity count as 0.
+    Returns: `faces` and all smaller levels down to 1 x 1. A pixel is the mean of 2 x 2 pixels of
+    the next larger level. The last row and column of an odd side are left out, as sides are rounded
+    down. Means are computed in float32 and rounded to the dtype once for each level, so that errors
+    do not add up. NaN and infinity count as 0.
     """
     # Face by face, since what a face needs stays in the CPU's cache.
     smaller = zip(*map(_smaller_levels, faces), strict=True)

@@ -23,27 +23,14 @@ MAX_SIDE: Final = 16384
 class Texture:
     """A picture with its mip levels, and how it is sampled.
 
-    Parameters
-    ----------
-    levels
-        Arrays ``(h, w, 4)`` of float16, all finite: linear RGBA, top row first; sides 1..16384. h
-        and w are halved and rounded down from level to level, but at least 1. The chain may end
-        early; a single level is a texture without mip levels. Arrays are copied unless they are
-        read-only and own their memory.
-    address_mode
-        Horizontal and vertical: "repeat", "mirror-repeat" or "clamp-to-edge".
-    mag_filter, min_filter
-        "nearest" or "linear": used where a texel is larger (`mag_filter`) or smaller (`min_filter`)
-        than a pixel.
-    mipmap_filter
-        "nearest" or "linear": the nearest level, or a mean of two.
-
-    Raises
-    ------
-    TypeError
-        A level is not an array of float16.
-    ValueError
-        The shapes are not a mip chain, a value is not finite, or a name is unknown.
+    - `levels`: Arrays ``(h, w, 4)`` of float16, all finite: linear RGBA, top row first; sides
+      1..16384. h and w are halved and rounded down from level to level, but at least 1. The chain
+      may end early; a single level is a texture without mip levels. Arrays are copied unless they
+      are read-only and own their memory.
+    - `address_mode`: Horizontal and vertical: "repeat", "mirror-repeat" or "clamp-to-edge".
+    - `mag_filter`, `min_filter`: "nearest" or "linear": used where a texel is larger (`mag_filter`)
+      or smaller (`min_filter`) than a pixel.
+    - `mipmap_filter`: "nearest" or "linear": the nearest level, or a mean of two.
     """
 
     levels: tuple[NDArray[np.float16], ...]
@@ -105,21 +92,9 @@ WHITE: Final = Texture((np.ones((1, 1, 4), np.float16),), mag_filter="nearest")
 class Surface:
     """The textures of some of a mesh's triangles.
 
-    Parameters
-    ----------
-    index_count
-        Entries of the mesh's indices, a positive multiple of 3.
-    base
-        Multiplies the vertex colours; sampled at the first two texture coordinates.
-    emission
-        Multiplies the emission; sampled at the last two texture coordinates.
-
-    Raises
-    ------
-    TypeError
-        A texture has another type.
-    ValueError
-        `index_count` is not a positive multiple of 3.
+    - `index_count`: Entries of the mesh's indices, a positive multiple of 3.
+    - `base`: Multiplies the vertex colours; sampled at the first two texture coordinates.
+    - `emission`: Multiplies the emission; sampled at the last two texture coordinates.
     """
 
     index_count: int
@@ -139,18 +114,12 @@ class Surface:
 def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
     """Make all mip levels of a picture.
 
-    Parameters
-    ----------
-    picture
-        ``(h, w, C)`` float16, finite.
-
-    Returns
-    -------
-    tuple of ndarray
-        The picture and all smaller levels down to 1 x 1; sizes are halved and rounded down. A texel
-        is the mean of the part of the larger level that it covers: of two texels along an even
-        side, and of three weighted texels along an odd side (Guthe and Heckbert, "Non-Power-of-Two
-        Mipmapping", NVIDIA, 2005). Means are computed in float32 and rounded once for each level.
+    - `picture`: ``(h, w, C)`` float16, finite.
+    - Returns: the picture and all smaller levels down to 1 x 1; sizes are halved and rounded down.
+      A texel is the mean of the part of the larger level that it covers: of two texels along an
+      even side, and of three weighted texels along an odd side (Guthe and Heckbert,
+      "Non-Power-of-Two Mipmapping", NVIDIA, 2005). Means are computed in float32 and rounded once
+      for each level.
     """
     levels = [picture]
     mean: NDArray[Any] = picture

@@ -58,17 +58,7 @@ def compare_with_law(
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong.
 
-    Parameters
-    ----------
-    assertion, law : str
-        Name of the assertion, and its law as text.
-    found, expected : ndarray of float64, shape (H, W, C)
-    allowed : float
-        The largest allowed difference.
-    border : int
-        Number of rows and columns that were removed at the top and the left.
-    note : str
-        A text with a further figure for the message.
+    `found`, `expected`: ndarray of float64, shape (H, W, C).
     """
     __tracebackhide__ = True
     difference = np.abs(found - expected)

@@ -20,22 +20,14 @@ __all__ = ["Verdict", "first_failure", "judge", "judge_image"]
 class Verdict:
     """The result of comparing one framebuffer.
 
-    Parameters
-    ----------
-    name : str
-        Name of the framebuffer.
-    failed_at : Stage or None
-        The first check that failed; None if all passed.
-    reasons : tuple of str
-        One reason for each failed check.
-    warning : str or None
-        Text of a warning if the framebuffer passed but differs by more than `Tolerances.warn`.
-    comparison : Comparison or None
-        The figures; None if shapes or dtypes differ, or one image is missing.
-    diagnosis : Diagnosis or None
-        The cause of the difference of two images that failed.
-    atol, rtol : float
-        The tolerances that were used.
+    - `name`: Name of the framebuffer.
+    - `failed_at`: The first check that failed; None if all passed.
+    - `reasons`: One reason for each failed check.
+    - `warning`: Text of a warning if the framebuffer passed but differs by more than
+      `Tolerances.warn`.
+    - `comparison`: The figures; None if shapes or dtypes differ, or one image is missing.
+    - `diagnosis`: The cause of the difference of two images that failed.
+    - `atol`, `rtol`: The tolerances that were used.
     """
 
     name: str
@@ -63,21 +55,7 @@ def judge(
     actual: Mapping[str, NDArray[Any]],
     tolerances: Tolerances,
 ) -> tuple[Verdict, ...]:
-    """Compare framebuffers with those of a reference.
-
-    Parameters
-    ----------
-    expected, actual : mapping of str to ndarray
-        Framebuffers by name, in the order of the data flow, as arrays that
-        `vkbloom.views.comparison.compare` accepts.
-    tolerances : Tolerances
-
-    Returns
-    -------
-    tuple of Verdict
-        In the order of `actual`. A framebuffer that only the reference has comes after the
-        framebuffer that precedes it in the reference.
-    """
+    """Compare framebuffers with those of a reference."""
     return tuple(
         _of_missing(name, is_expected=name in expected)
         if name not in expected or name not in actual
@@ -94,19 +72,7 @@ def first_failure(verdicts: tuple[Verdict, ...]) -> Verdict | None:
 def judge_image(
     name: str, expected: NDArray[Any], actual: NDArray[Any], tolerances: Tolerances
 ) -> Verdict:
-    """Compare one image with its reference: shape and dtype, finiteness, values, SSIM, FLIP.
-
-    Parameters
-    ----------
-    name : str
-        Name of the framebuffer.
-    expected, actual : ndarray
-    tolerances : Tolerances
-
-    Returns
-    -------
-    Verdict
-    """
+    """Compare one image with its reference: shape and dtype, finiteness, values, SSIM, FLIP."""
     reasons = []
     if expected.shape != actual.shape:
         reasons.append(f"its shape is {actual.shape}, not {expected.shape}")

@@ -299,19 +299,11 @@ def area_sampled(
 ) -> Image:
     """Return the share of each pixel that a rectangle covers.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image in pixels.
-    centre : (float, float)
-        x and y in pixels; the centre of the first pixel is (0, 0).
-    sides : (float, float)
-        Width and height of the rectangle in pixels.
-
-    Returns
-    -------
-    ndarray of float64, shape (H, W)
-        0 to 1. Their sum is the rectangle's area, as far as it is inside.
+    - `size`: Width and height of the image in pixels.
+    - `centre`: x and y in pixels; the centre of the first pixel is (0, 0).
+    - `sides`: Width and height of the rectangle in pixels.
+    - Returns: ndarray of float64, shape (H, W): 0 to 1. Their sum is the rectangle's area, as far
+      as it is inside.
     """
     covered = []
     for count, place, side in zip(size, centre, sides, strict=True):

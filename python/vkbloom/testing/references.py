@@ -43,16 +43,11 @@ _FILES: Final[Mapping[str, tuple[str, str]]] = {
 class Origin:
     """The adapter, machine and version that made images.
 
-    Parameters
-    ----------
-    adapter, driver : str or None
-        None if they are not known.
-    cpu_vendor : str
-        Vendor of the machine's CPU; software renderers round differently by vendor.
-    version : str
-        Version of vkbloom.
-    driver_sha256 : str or None
-        Hash of a driver whose results are bit-equal on every machine; None for other drivers.
+    - `adapter`, `driver`: None if they are not known.
+    - `cpu_vendor`: Vendor of the machine's CPU; software renderers round differently by vendor.
+    - `version`: Version of vkbloom.
+    - `driver_sha256`: Hash of a driver whose results are bit-equal on every machine; None for other
+      drivers.
     """
 
     adapter: str | None
@@ -78,11 +73,7 @@ class Origin:
 class Reference:
     """Reference images, and their origin.
 
-    Parameters
-    ----------
-    images : mapping of str to ndarray
-        Images by framebuffer, in the order of the data flow.
-    origin : Origin
+    `images`: Images by framebuffer, in the order of the data flow.
     """
 
     images: Mapping[str, NDArray[Any]]
@@ -92,10 +83,7 @@ class Reference:
 class ReferenceFolder:
     """The references of one test module.
 
-    Parameters
-    ----------
-    path : Path
-        It is created when the first reference is written.
+    `path`: It is created when the first reference is written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -110,20 +98,7 @@ class ReferenceFolder:
         return sorted(file.name.removesuffix(".json") for file in self.path.glob("*.json"))
 
     def load(self, name: str) -> list[Reference]:
-        """Read the references of a name.
-
-        Returns
-        -------
-        list of Reference
-            Empty if there are none.
-
-        Raises
-        ------
-        OSError
-            A file is missing or cannot be read; the error names it.
-        ValueError
-            A file is damaged, or differs from its entry in the list; the error names it.
-        """
+        """Read the references of a name."""
         return [
             Reference(
                 images={
@@ -140,22 +115,7 @@ class ReferenceFolder:
     ) -> None:
         """Write a reference.
 
-        Parameters
-        ----------
-        name : str
-        images : mapping of str to ndarray
-            (H, W) or (H, W, C) of up to 4 channels, uint8, uint16, float16 or float32.
-        origin : Origin
-        add : bool
-            Whether to keep the existing references, except the one of the same machine. False:
-            replace all.
-
-        Raises
-        ------
-        ValueError
-            A name is not allowed, or an image cannot be stored without loss.
-        OSError
-            A file cannot be written; the error names it.
+        `images`: (H, W) or (H, W, C) of up to 4 channels, uint8, uint16, float16 or float32.
         """
         check_name(name)
         for framebuffer, image in images.items():
@@ -267,13 +227,7 @@ def check_name(name: str) -> None:
 
 
 def cpu_vendor() -> str:
-    """Return the vendor of this machine's CPU, as the CPU reports it.
-
-    Returns
-    -------
-    str
-        "GenuineIntel", "AuthenticAMD" and so on; or `platform.processor`, or the architecture.
-    """
+    """Return the vendor of this machine's CPU, as the CPU reports it."""
     try:
         information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:

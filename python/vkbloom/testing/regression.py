@@ -46,18 +46,11 @@ class FrameDifferenceWarning(UserWarning):
 class Mode:
     """The options of the command line.
 
-    Parameters
-    ----------
-    update : bool
-        Whether to replace the references of failed checks.
-    add : bool
-        Whether to write further references for failed checks, and keep the existing ones.
-    allow_missing : bool
-        Whether a check without a reference passes.
-    expect_adapter : str or None
-        A part of the name or driver of the adapter that frames must come from.
-    parts : Path or None
-        Folder for the report's pictures of failed checks; None: no report.
+    - `update`: Whether to replace the references of failed checks.
+    - `add`: Whether to write further references for failed checks, and keep the existing ones.
+    - `allow_missing`: Whether a check without a reference passes.
+    - `expect_adapter`: A part of the name or driver of the adapter that frames must come from.
+    - `parts`: Folder for the report's pictures of failed checks; None: no report.
     """
 
     update: bool = False
@@ -411,19 +404,7 @@ class FrameRegression:
 
 
 def name_of_test(test: str) -> str:
-    """Return the name of a reference for a test's name.
-
-    Parameters
-    ----------
-    test : str
-        Name of the test within its module, such as "TestBlur::test_saucer[tutorial]".
-
-    Returns
-    -------
-    str
-        A name such as "TestBlur.test_saucer-tutorial". If characters had to be replaced, a
-        checksum is appended, so that names stay unique.
-    """
+    """Return the name of a reference for a test's name."""
     plain = test.replace("::", ".")
     if plain.endswith("]") and "[" in plain:
         head, _, parameters = plain[:-1].partition("[")

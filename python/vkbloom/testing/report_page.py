@@ -33,27 +33,7 @@ _POLICY: Final = (
 
 
 def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
-    """Write ``index.html`` and ``report.json``.
-
-    Parameters
-    ----------
-    folder : Path
-        Created if it does not exist; existing files of these names are replaced.
-    parts : Path
-        Folder of the files of `vkbloom.testing.report_parts.write`; removed at the end.
-    records : sequence of Record
-        Records of all checks of all processes.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    OSError
-        A file cannot be written; the error names it.
-    """
+    """Write ``index.html`` and ``report.json``."""
     folder.mkdir(parents=True, exist_ok=True)
     ordered = sorted(records, key=lambda record: (record["test"], record["name"]))
     (folder / "report.json").write_text(

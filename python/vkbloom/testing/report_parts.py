@@ -66,14 +66,7 @@ Part = list[Shown]
 
 
 def figures(verdict: Verdict, images: Mapping[str, NDArray[Any]]) -> Figures:
-    """Return a verdict's figures as plain values.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    images : mapping of str to ndarray
-        The actual images of the comparison.
-    """
+    """Return a verdict's figures as plain values."""
     image = images.get(verdict.name)
     found = verdict.comparison
     outcome = "within" if verdict.passed else "failed"
@@ -105,21 +98,7 @@ def write(
     expected: Mapping[str, NDArray[Any]],
     actual: Mapping[str, NDArray[Any]],
 ) -> str:
-    """Write the pictures of a check to a new file.
-
-    Parameters
-    ----------
-    folder : Path
-        Created if it does not exist.
-    verdicts : tuple of Verdict
-    expected, actual : mapping of str to ndarray
-        The images of the comparison.
-
-    Returns
-    -------
-    str
-        The file's name in the folder.
-    """
+    """Write the pictures of a check to a new file."""
     part = [
         _shown(verdict, expected.get(verdict.name), actual.get(verdict.name))
         for verdict in verdicts

@@ -1,0 +1,33 @@
+"""SPIR-V modules as words. Building the package loads this file by its path: it imports nothing."""
+
+from __future__ import annotations
+
+# Of SPIR-V: words of a module's header; the opcodes of types and of arithmetic on floats (FNegate
+# to FMod, VectorTimesScalar to Dot); the instruction OpDecorate, of three words; NoContraction.
+HEADER_WORDS = 5
+TYPES = range(19, 40)
+FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
+DECORATE = 3 << 16 | 71
+NO_CONTRACTION = 42
+
+
+def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the module with NoContraction on the result of each operation on floats.
+
+    Else a compiler may make one operation of a product and a sum, which rounds once, in one shader
+    and not in another that has the same expression: variants of a pass would differ in the last
+    bit. GLSL's `precise` does the same for a variable, but where it is forgotten only some GPUs
+    show it.
+    """
+    decorations = []
+    first_type = 0
+    position = HEADER_WORDS
+    while position < len(words):
+        opcode, count = words[position] & 0xFFFF, words[position] >> 16
+        if opcode in TYPES and not first_type:
+            first_type = position
+        if opcode in FLOAT_ARITHMETIC:
+            decorations += [DECORATE, words[position + 2], NO_CONTRACTION]
+        position += count
+    # Decorations come before all types.
+    return (*words[:first_type], *decorations, *words[first_type:])

@@ -1,0 +1,183 @@
+"""Derivatives of the framebuffers, in float64."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .framebuffers import checked, framebuffers
+from .sampling import Array
+from .tape import Traced, gradients, value_of
+
+__all__ = ["DISCRETE", "differentiable", "vjp"]
+
+#: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
+DISCRETE: Final = frozenset({"anamorphism", "bloom_scale", "pixels_per_degree", "size"})
+
+
+def vjp(
+    image: NDArray[Any],
+    settings: Any,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+) -> tuple[dict[str, Array], Callable[[Mapping[str, NDArray[Any]]], dict[str, Array]]]:
+    """Return the framebuffers, and a function for the derivatives of a sum over them.
+
+    The bloom buffers are "rgba32float", so that stores do not clamp. Rounding to 8 bits and dither
+    count as the identity.
+
+    Where the function has a kink, the subgradient is: 0 at and below a threshold; 1 at both ends of
+    a clamp; equal shares for equal channels under a maximum; the mean of both sides for the offset
+    of a tap that lies on a texel centre. A hard threshold has the derivative of what it keeps: its
+    own derivative is 0.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4)
+        As for `apply`.
+    settings : vkbloom.Settings
+    mask : ndarray, shape (H, W), optional
+    emission : ndarray, optional
+        Of the image's shape and dtype.
+
+    Returns
+    -------
+    framebuffers : dict of str to ndarray of float64
+        As of `apply`, with buffers of "rgba32float".
+    pullback : callable
+        ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum over
+        all framebuffers of (framebuffer . cotangent), it returns the derivatives of S: by "image",
+        "mask" (H, W) and "emission" if they were given, by "kernel" (of `vkbloom.Convolution`), and
+        by each real field under its name. Fields of glare have names such as "glare.0.intensity".
+        Values are derivatives by real units: for uint8, by value / 255. At NaN and infinity of the
+        image they are 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `apply`. From `pullback`: there is no such framebuffer, or a cotangent has another
+        shape, or is not finite.
+
+    See Also
+    --------
+    apply : The framebuffers alone.
+
+    Notes
+    -----
+    The formulas of the reference run on arrays that record each operation with its derivative; the
+    records are applied in reverse order (Griewank and Walther, "Evaluating Derivatives", 2008).
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> image = np.full((4, 4, 3), 0.5)
+    >>> frames, pullback = reference.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+    >>> derivatives = pullback({"final": np.ones_like(image)})
+    >>> float(derivatives["intensity"])  # the sum of the bloom
+    24.0
+    >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
+    np.float64(1.5)
+    """
+    scene, source, weights, _ = checked(image, settings, mask, emission)
+    inputs: dict[str, Traced] = {"image": Traced(scene)}
+    if emission is not None:
+        inputs["emission"] = Traced(source)
+    if weights is not None:
+        inputs["mask"] = Traced(weights)
+    traced: Any = _TracedSettings(settings, inputs)
+    arrays: dict[str, Any] = {**inputs}
+    found: dict[str, Any] = framebuffers(
+        arrays["image"],
+        arrays.get("emission", arrays["image"]),
+        traced,
+        mask=arrays.get("mask"),
+        share=0.0 if emission is not None else arrays.get("mask", 1.0),
+        format="rgba32float",
+        dtype=np.asarray(image).dtype,
+    )
+    values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+        given = {name: _cotangent(name, part, values) for name, part in cotangents.items()}
+        given = {name: part for name, part in given.items() if isinstance(found[name], Traced)}
+        derivatives = gradients(
+            [(found[name], part) for name, part in given.items()], [*inputs.values()]
+        )
+        results = dict(zip(inputs, derivatives, strict=True))
+        for name, pixels in (("image", scene), ("emission", source)):
+            if name in results:
+                results[name] = np.where(np.isfinite(pixels), results[name], 0.0)
+        if "mask" in results:
+            results["mask"] = results["mask"][..., 0]
+        return results
+
+    return values, pullback
+
+
+def differentiable(settings: Any) -> dict[str, Any]:
+    """Return the values of the real fields with a derivative, by name."""
+    found = {
+        field.name: getattr(settings, field.name)
+        for field in dataclasses.fields(settings)
+        if field.name not in DISCRETE
+        and _is_real(getattr(settings, field.name))
+        and (field.name != "knee" or settings.has_knee)
+    }
+    for place, stage in enumerate(getattr(settings, "glare", ())):
+        found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
+    return found
+
+
+def _is_real(value: Any) -> bool:
+    """Whether a value is a float, or a tuple of such or of tuples of them, all of one length."""
+    if isinstance(value, tuple) and value:
+        return all(map(_is_real, value)) and len({np.shape(one) for one in value}) == 1
+    return isinstance(value, float)
+
+
+class _TracedSettings:
+    """Settings whose real fields are traced; every other attribute is that of the settings."""
+
+    def __init__(self, settings: Any, inputs: dict[str, Traced], prefix: str = "") -> None:
+        self._settings = settings
+        self.dither = False
+        fields = differentiable(settings)
+        for name in (name for name in fields if "." not in name):
+            inputs[prefix + name] = Traced(fields[name])
+            setattr(self, name, inputs[prefix + name])
+        if stages := getattr(settings, "glare", ()):
+            self.glare = tuple(
+                _TracedSettings(stage, inputs, f"glare.{place}.")
+                for place, stage in enumerate(stages)
+            )
+        if hasattr(settings, "kernel"):
+            self._inputs = inputs
+            self.kernel = self._kernel
+
+    def _kernel(self, *sizes: tuple[int, int]) -> Traced:
+        self._inputs["kernel"] = Traced(self._settings.kernel(*sizes))
+        return self._inputs["kernel"]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._settings, name)
+
+
+def _cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Array]) -> Array:
+    """Check and return a cotangent in float64."""
+    if name not in values:
+        known = ", ".join(values)
+        raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {known}")
+
+    array = np.asarray(cotangent, np.float64)
+    if array.shape != values[name].shape:
+        raise ValueError(
+            f"cotangents: the shape of {name!r} is {array.shape}, not {values[name].shape}"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"cotangents: {name!r} has NaN or infinity")
+    return array

@@ -1,0 +1,338 @@
+"""Arrays that remember how they were computed, so that a derivative can be taken backwards.
+
+NumPy's functions call `Traced.__array_ufunc__` and `Traced.__array_function__` for these arrays. So
+the formulas of the reference compute with them unchanged. Each operation has a rule: from the
+derivative with respect to its result to those with respect to its arguments.
+
+At a kink, the rules take these subgradients: a clamp passes the derivative inside and at its ends;
+a maximum or minimum passes it to the strictly larger or smaller argument, between equal arrays or
+channels in equal shares, and nothing where it equals a constant; a power passes nothing at a base
+of 0.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Traced", "contiguous", "gradients", "operation", "value_of"]
+
+Array = NDArray[np.float64]
+# From the derivative by the result to the derivative by one argument.
+Rule = Callable[[Array], Array]
+
+_order = itertools.count()
+
+
+class _Node:
+    """One result: the nodes that it was computed from, each with its rule."""
+
+    __slots__ = ("arguments", "order")
+
+    def __init__(self, arguments: Sequence[tuple[_Node, Rule]] = ()) -> None:
+        self.arguments = arguments
+        self.order = next(_order)
+
+
+class Traced(np.lib.mixins.NDArrayOperatorsMixin):
+    """An array of float64 with the node of its computation."""
+
+    def __init__(self, value: Any, node: _Node | None = None) -> None:
+        self.value: Array = np.asarray(value, np.float64)
+        self.node = node or _Node()
+
+    shape = property(lambda self: self.value.shape)
+    ndim = property(lambda self: self.value.ndim)
+    dtype = property(lambda self: self.value.dtype)
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    def __bool__(self) -> bool:
+        return bool(self.value)
+
+    def __trunc__(self) -> int:
+        return math.trunc(self.value.item())
+
+    def __iter__(self) -> Iterator[Traced]:
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, index: Any) -> Traced:
+        value = self.value[index]
+
+        def back(derivative: Array) -> Array:
+            result = np.zeros_like(self_value)
+            np.add.at(result, index, derivative)
+            return result
+
+        self_value = self.value
+        return _traced(value, (self, back))
+
+    def __setitem__(self, index: Any, part: Any) -> None:
+        """Replace a part. The node before stays as it was, for what was computed from it."""
+        value = self.value.copy()
+        value[index] = value_of(part)
+        shape = value[index].shape
+
+        def back(derivative: Array) -> Array:
+            rest = derivative.copy()
+            rest[index] = 0
+            return rest
+
+        before = Traced(self.value, self.node)
+        new = _traced(value, (before, back), (part, lambda d: _summed(d[index], np.shape(part))))
+        assert value[index].shape == shape
+        self.value, self.node = new.value, new.node
+
+    def swapaxes(self, first: int, second: int) -> Traced:
+        """Exchange two axes."""
+        return _traced(
+            self.value.swapaxes(first, second), (self, lambda d: d.swapaxes(first, second))
+        )
+
+    def reshape(self, *shape: Any) -> Traced:
+        """Give the array another shape."""
+        return _traced(self.value.reshape(*shape), (self, lambda d: d.reshape(self.value.shape)))
+
+    def astype(self, dtype: Any) -> Traced:
+        """Return the array itself: all are of float64."""
+        return self
+
+    def sum(self, axis: Any = None, keepdims: bool = False) -> Traced:
+        """Add along axes."""
+        total = np.sum(self.value, axis=axis, keepdims=True)
+        kept = total if keepdims else np.sum(self.value, axis=axis)
+        shape = self.value.shape
+        return _traced(kept, (self, lambda d: np.broadcast_to(d.reshape(total.shape), shape)))
+
+    def mean(self, axis: Any = None, keepdims: bool = False) -> Traced:
+        """Average along axes."""
+        total = self.sum(axis, keepdims)
+        return cast("Traced", total / (self.value.size / total.value.size))
+
+    def max(self, axis: int, keepdims: bool = False) -> Traced:
+        """Return the largest along an axis."""
+        return self._extreme(np.max, axis, keepdims)
+
+    def min(self, axis: int, keepdims: bool = False) -> Traced:
+        """Return the smallest along an axis."""
+        return self._extreme(np.min, axis, keepdims)
+
+    def _extreme(self, function: Callable[..., Array], axis: int, keepdims: bool) -> Traced:
+        found = function(self.value, axis=axis, keepdims=True)
+        share = (self.value == found).astype(np.float64)
+        share /= share.sum(axis=axis, keepdims=True)
+        value = found if keepdims else function(self.value, axis=axis)
+        return _traced(value, (self, lambda d: share * d.reshape(found.shape)))
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        values = [value_of(one) for one in inputs]
+        if method != "__call__":
+            return NotImplemented
+        if ufunc in _FLAT:
+            return ufunc(*values)
+        if ufunc not in _UFUNCS:
+            return NotImplemented
+        with np.errstate(all="ignore"):
+            result = ufunc(*values)
+            if ufunc is np.matmul:
+                return _traced(result, (inputs[0], lambda d: d @ values[1].T))
+            factors = _UFUNCS[ufunc](result, *values)
+            if ufunc in (np.maximum, np.minimum) and all(isinstance(x, Traced) for x in inputs):
+                factors = tuple(factor + 0.5 * np.equal(*values) for factor in factors)
+        return _traced(
+            result,
+            *(
+                (one, lambda d, factor=factor, one=one: _summed(_times(d, factor), np.shape(one)))
+                for one, factor in zip(inputs, factors, strict=True)
+            ),
+        )
+
+    def __array_function__(
+        self, function: Callable[..., Any], types: Any, args: Any, kwargs: Mapping[str, Any]
+    ) -> Any:
+        if function in _FLAT_FUNCTIONS:
+            return function(*map(value_of, args), **kwargs)
+        if function not in _FUNCTIONS:
+            return NotImplemented
+        return _FUNCTIONS[function](*args, **kwargs)
+
+
+def value_of(array: Any) -> Any:
+    """Return the value of an array, traced or not."""
+    return array.value if isinstance(array, Traced) else array
+
+
+def operation(value: Any, *arguments: tuple[Any, Rule]) -> Any:
+    """Return the result of an operation on arrays, some of which may be traced.
+
+    Each argument has its rule. The result is traced only if an argument is.
+    """
+    if not any(isinstance(argument, Traced) for argument, _ in arguments):
+        return value
+    return _traced(value, *arguments)
+
+
+def contiguous(array: Array) -> Array:
+    """Return the array, traced or not, in C order."""
+    same: Array = operation(np.ascontiguousarray(value_of(array)), (array, lambda d: d))
+    return same
+
+
+def _traced(value: Any, *arguments: tuple[Any, Rule]) -> Traced:
+    return Traced(
+        value, _Node([(one.node, rule) for one, rule in arguments if isinstance(one, Traced)])
+    )
+
+
+def gradients(results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced]) -> list[Array]:
+    """Return the derivative of sum over the results of (result . cotangent) by each input."""
+    derivatives: dict[_Node, Array] = {}
+    waiting: dict[int, _Node] = {}
+
+    def add(node: _Node, derivative: Array) -> None:
+        waiting[node.order] = node
+        known = derivatives.get(node)
+        derivatives[node] = derivative if known is None else known + derivative
+
+    wanted = {one.node for one in inputs}
+    for result, cotangent in results:
+        add(result.node, cotangent)
+    found: dict[_Node, Array] = {}
+    while waiting:
+        node = waiting.pop(max(waiting))
+        derivative = derivatives.pop(node)
+        if node in wanted:
+            found[node] = derivative
+        for argument, rule in node.arguments:
+            add(argument, rule(derivative))
+    return [found.get(one.node, np.zeros(one.shape)) for one in inputs]
+
+
+def _times(derivative: Array, factor: Any) -> Array:
+    """Return the product; 0 where the derivative is 0, also if the factor is infinite there."""
+    with np.errstate(all="ignore"):
+        product: Array = np.where(derivative == 0, 0.0, derivative * factor)
+    return product
+
+
+def _summed(derivative: Array, shape: tuple[int, ...]) -> Array:
+    """Return the derivative by an argument that NumPy has broadcast from a shape."""
+    extra = derivative.ndim - len(shape)
+    derivative = derivative.sum(axis=tuple(range(extra)))
+    axes = tuple(i for i, side in enumerate(shape) if side == 1 and derivative.shape[i] != 1)
+    total: Array = derivative.sum(axis=axes, keepdims=True)
+    return total
+
+
+def _power(result: Array, base: Any, exponent: Any) -> tuple[Any, Any]:
+    base, exponent = np.asarray(base, np.float64), np.asarray(exponent, np.float64)
+    zero = base == 0
+    by_base = np.where(zero & (exponent != 1), 0.0, exponent * base ** (exponent - 1))
+    return by_base, np.where(base > 0, result * np.log(np.where(base > 0, base, 1.0)), 0.0)
+
+
+# Their results are counts or conditions, without a derivative.
+_FLAT = {
+    *(np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal),
+    *(np.isfinite, np.floor, np.ceil, np.sign, np.logical_and, np.logical_or),
+}
+_FLAT_FUNCTIONS = {np.shape, np.zeros_like, np.ndim, np.size}
+
+# For each argument the factor that makes its derivative from that of the result.
+_UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
+    np.add: lambda r, a, b: (1.0, 1.0),
+    np.subtract: lambda r, a, b: (1.0, -1.0),
+    np.multiply: lambda r, a, b: (b, a),
+    np.divide: lambda r, a, b: (np.divide(1, b), np.divide(-r, b)),
+    np.negative: lambda r, a: (-1.0,),
+    np.positive: lambda r, a: (1.0,),
+    np.absolute: lambda r, a: (np.sign(a),),
+    np.maximum: lambda r, a, b: (np.greater(a, b), np.greater(b, a)),
+    np.minimum: lambda r, a, b: (np.less(a, b), np.less(b, a)),
+    np.power: _power,
+    np.square: lambda r, a: (2 * a,),
+    np.sqrt: lambda r, a: (np.divide(0.5, r),),
+    np.exp: lambda r, a: (r,),
+    np.exp2: lambda r, a: (r * math.log(2),),
+    np.expm1: lambda r, a: (r + 1,),
+    np.log2: lambda r, a: (np.divide(1 / math.log(2), a),),
+    np.radians: lambda r, a: (math.pi / 180,),
+    np.sin: lambda r, a: (np.cos(a),),
+    np.cos: lambda r, a: (-np.sin(a),),
+    np.hypot: lambda r, a, b: (np.divide(a, r), np.divide(b, r)),
+    np.matmul: lambda r, a, b: (),
+}
+
+
+def _where(condition: Any, one: Any, other: Any) -> Any:
+    chosen = value_of(condition)
+
+    def rule(part: Any, mask: Any) -> Rule:
+        return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
+
+    value = np.where(chosen, value_of(one), value_of(other))
+    return operation(value, (one, rule(one, chosen)), (other, rule(other, np.logical_not(chosen))))
+
+
+def _clip(array: Any, low: Any, high: Any) -> Any:
+    value, least, most = map(value_of, (array, low, high))
+
+    def rule(part: Any, mask: Any) -> Rule:
+        return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
+
+    return operation(
+        np.clip(value, least, most),
+        (array, rule(array, (value >= least) & (value <= most))),
+        (low, rule(low, value < least)),
+        (high, rule(high, value > most)),
+    )
+
+
+def _concatenate(parts: Sequence[Any], axis: int = 0) -> Any:
+    ends = np.cumsum([np.shape(part)[axis] for part in parts])
+
+    def rule(place: int) -> Rule:
+        start = ends[place - 1] if place else 0
+        return lambda d: np.take(d, np.arange(start, ends[place]), axis=axis)
+
+    value = np.concatenate([value_of(part) for part in parts], axis=axis)
+    return operation(value, *((part, rule(i)) for i, part in enumerate(parts)))
+
+
+def _pad(array: Any, widths: Any, mode: str = "constant") -> Any:
+    places = np.arange(array.value.size).reshape(array.shape)
+    # Beside the array, constants are 0 and have no place.
+    options: dict[str, Any] = {"constant_values": -1} if mode == "constant" else {}
+    places = np.pad(places, widths, mode, **options)  # type: ignore[call-overload]
+    value = np.append(array.value.ravel(), 0.0)[places]
+
+    def back(derivative: Array) -> Array:
+        kept = places.ravel() >= 0
+        sums = np.bincount(
+            places.ravel()[kept], derivative.ravel()[kept], minlength=array.value.size
+        )
+        return sums.reshape(array.shape)
+
+    return _traced(value, (array, back))
+
+
+def _polyval(coefficients: Sequence[float], x: Any) -> Any:
+    value = np.polyval(coefficients, value_of(x))
+    slope = np.polyval(np.polyder(np.array(coefficients)), value_of(x))
+    return operation(value, (x, lambda d: _times(d, slope)))
+
+
+_FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
+    np.where: _where,
+    np.clip: _clip,
+    np.concatenate: _concatenate,
+    np.pad: _pad,
+    np.polyval: _polyval,
+    np.sum: lambda array, axis=None, keepdims=False: array.sum(axis, keepdims),
+}

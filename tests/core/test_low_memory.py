@@ -1,0 +1,83 @@
+"""A process with little address space: no driver crashes, and the message says what is short."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.processes import output, python
+from vkbloom import Convolution, Renderer, psf
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="the limit is of Linux"),
+    pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="the sanitizers need space"),
+]
+
+# Opens a renderer and applies a bloom with some MiB more than the process has.
+PROGRAM = """
+import resource, sys
+import numpy as np
+import vkbloom
+
+taken = next(int(line.split()[1]) for line in open("/proc/self/status") if "VmSize" in line)
+limit = (taken << 10) + (int(sys.argv[1]) << 20)
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+try:
+    with vkbloom.Renderer("software") as renderer:
+        renderer.apply(np.zeros((1080, 1920, 4), np.float32), vkbloom.Pyramid(levels=5))
+    print("done")
+except MemoryError as error:
+    print(type(error).__name__, error)
+"""
+#: For the same need on every machine.
+THREADS = {"LP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"}
+
+
+@pytest.mark.parametrize("room", [60, 200, 330, 480, 620, 735])
+def test_without_room_for_a_driver(room: int) -> None:
+    """Drivers that find no memory crash, or are not found."""
+    said = output("-c", PROGRAM, str(room), **THREADS)
+    assert said.startswith(
+        "OutOfMemoryError memory is short: a Vulkan driver needs 736 MiB of address space"
+    ), said
+    assert "ulimit -v" in said
+
+
+@pytest.mark.parametrize("room", [745, 800, 850, 900, 950, 1000])
+def test_without_room_for_the_frame(room: int) -> None:
+    said = output("-c", PROGRAM, str(room), **THREADS)
+    # Also NumPy's words, and "done" where the driver takes less.
+    assert "memory is short" in said or "Unable to allocate" in said or said == "done\n", said
+    if "memory is short" in said:
+        assert "MiB" in said
+        assert "bloom_scale" in said
+
+
+def test_with_room() -> None:
+    assert output("-c", PROGRAM, "2000", **THREADS) == "done\n"
+
+
+def test_adapters_without_room() -> None:
+    program = PROGRAM.replace(
+        'with vkbloom.Renderer("software")', "vkbloom.adapters()\n    with None"
+    )
+    done = python("-c", program, "200", **THREADS)
+    assert done.stdout.startswith("OutOfMemoryError memory is short: "), done.stdout + done.stderr
+
+
+def test_convolutions_beyond_the_adapter() -> None:
+    with Renderer("software") as renderer:
+        wide = np.zeros((64, 16384, 3), np.uint8)
+        spread = Convolution(psf.gaussian(3), kernel_size=(41, 41))
+        for settings in (Convolution(), spread):
+            with pytest.raises(ValueError, match=r"out of this adapter's range.*or kernel_size"):
+                renderer.plan(wide, settings)
+        large = np.zeros((8000, 8000, 3), np.uint8)
+        with pytest.raises(
+            vkbloom.OutOfMemoryError, match=r"memory is short: \d+ MiB.*bloom_scale"
+        ):
+            renderer.plan(large, Convolution(kernel_size=(15000, 15000)))

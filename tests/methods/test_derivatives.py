@@ -1,0 +1,212 @@
+"""Derivatives of the reference: exact transposes where it is linear, elsewhere differences."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import vkbloom
+from tests.methods.cases import METHODS
+from tests.methods.reference_cases import random_image
+from vkbloom import reference
+from vkbloom.reference.derivatives import DISCRETE, differentiable
+
+# Odd sides, and sides of one pixel.
+SIZES = ((17, 11), (8, 6), (1, 9), (13, 1), (1, 1))
+KERNEL = np.random.default_rng(5).random((5, 4, 3))
+GLARE = (vkbloom.Streaks(angle=10, threshold=0.1), vkbloom.Ghosts(), vkbloom.Halo())
+BOUNDARIES: tuple[Any, ...] = ("zero", "edge", "wrap", "wrap_x")
+
+LINEAR: dict[str, Any] = {
+    **{name: each for name, each in METHODS.items() if each.threshold is None},
+    **{f"convolution-{b}": vkbloom.Convolution(KERNEL, boundary=b) for b in BOUNDARIES},
+    "level-weights": vkbloom.Pyramid(levels=3, level_weights=(0.5, -0.25, 1)),
+    "mix": vkbloom.DualKawase(composite="mix", intensity=0.3),
+    "small-convolution": vkbloom.Convolution(KERNEL, bloom_scale=0.5),
+    "hdrp": vkbloom.presets["threejs_unreal"].replace(threshold=None),
+}
+CHOICES: tuple[Any, ...] = (
+    ("reinhard", "gamma22", "add"),
+    ("aces", "srgb", "screen"),
+    ("exponential", "none", "mix"),
+    ("khronos_neutral", "srgb", "add"),
+    ("agx", "gamma22", "mix"),
+)
+CURVES = {
+    f"{tonemap}-{encoding}": vkbloom.Pyramid(
+        levels=2, tonemap=tonemap, encoding=encoding, exposure=0.3, composite=composite
+    )
+    for tonemap, encoding, composite in CHOICES
+}
+# The levels of engines have a height of their own, which is more than this test needs.
+SMALLER: dict[str, dict[str, int]] = {
+    "bevy_natural": {"max_mip_dimension": 32},
+    "filament": {"resolution": 32},
+}
+CURVED: dict[str, Any] = {
+    **{name: each.replace(**SMALLER.get(name, {})) for name, each in vkbloom.presets.items()},
+    **CURVES,
+    "knee": vkbloom.Separable(threshold=0.5, knee=0.5),
+    "glare": vkbloom.Pyramid(levels=2, threshold=0.5, knee=0.3, glare=GLARE),
+    "engine-glare": vkbloom.presets["unity_urp"].replace(format=None, glare=GLARE),
+    "firefly": vkbloom.Pyramid(firefly_filter=True, level_weights=(1, 2, 3, 4, 5, 6)),
+    "soft-light": vkbloom.presets["godot_4_5"].replace(format=None, composite="soft_light"),
+    "alpha": vkbloom.Pyramid(levels=2, threshold=0.5, knee=0.5, alpha="blur"),
+    "largest-alpha": vkbloom.presets["kino"].replace(format=None, alpha="max"),
+}
+
+
+def channels_of(settings: Any) -> int:
+    return 3 if settings.alpha == "keep" else 4
+
+
+def product(one: Any, other: Any) -> float:
+    return float((np.asarray(one) * np.asarray(other)).sum())
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", LINEAR)
+def test_image_derivative_is_the_exact_transpose_of_a_linear_bloom(
+    name: str, size: tuple[int, int]
+) -> None:
+    settings = LINEAR[name]
+    x, y = random_image(*size, seed=1), random_image(*size, seed=2) - 0.5
+    frames, pullback = reference.vjp(x, settings)
+    transposed = pullback({"final": y})["image"]
+    forward, back = product(frames["final"], y), product(x, transposed)
+    assert abs(forward - back) <= 1e-12 * np.abs(frames["final"] * y).sum()
+
+
+def slope(function: Any, at: Any, direction: Any) -> float:
+    """Return the derivative along a direction, by the step of which the halves agree best."""
+    found = []
+    for step in (1e-5, 1e-6, 1e-7):
+        ends = [function(np.asarray(at) + sign * step * direction) for sign in (-1, 1)]
+        found.append((ends[1] - ends[0]) / (2 * step))
+    pairs = sorted(itertools.pairwise(found), key=lambda pair: abs(pair[1] - pair[0]))
+    return float(pairs[0][1])
+
+
+def as_field(value: Any) -> Any:
+    return tuple(map(as_field, value)) if np.ndim(value) else float(value)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_derivatives_are_those_of_central_differences(name: str) -> None:
+    settings = CURVED[name].replace(format="rgba32float")
+    random = np.random.default_rng(1)
+    shape = (11, 14, channels_of(settings))
+    image, emission = random.random(shape) * 2, random.random(shape) * 2
+    mask = random.random((11, 14)) * 0.8 + 0.1
+    given = {"mask": mask, "emission": emission} if name != "knee" else {}
+    frames, pullback = reference.vjp(image, settings, **given)
+    cotangents: dict[str, Any] = {
+        key: random.standard_normal(frames[key].shape)
+        for key in ("glow", "bloom", "final")
+        if key in frames
+    }
+    derivatives = pullback(cotangents)
+
+    def total(image: Any = image, settings: Any = settings, **arrays: Any) -> float:
+        found = reference.apply(image, settings, **(given | arrays))
+        return sum(product(found[key], part) for key, part in cotangents.items())
+
+    def check(name: str, function: Any, at: Any) -> None:
+        direction = random.standard_normal(np.shape(at))
+        expected, actual = slope(function, at, direction), product(derivatives[name], direction)
+        # The differences of sums of this size are rounded.
+        scale = max(abs(expected), 1e-3 * sum(np.abs(one).sum() for one in cotangents.values()))
+        assert abs(actual - expected) <= 1e-6 * scale, (name, actual, expected)
+
+    check("image", lambda moved: total(image=moved), image)
+    for key, array in given.items():
+        check(key, lambda moved, key=key: total(**{key: moved}), array)
+    for field, value in differentiable(settings).items():
+        inside = np.asarray(value) * 0.99 + 0.001  # not at the end of a range
+
+        def moved(at: Any, field: str = field) -> float:
+            return total(settings=settings.replace(**{field: as_field(at)}))
+
+        derivatives = reference.vjp(image, settings.replace(**{field: as_field(inside)}), **given)[
+            1
+        ](cotangents)
+        check(field, moved, inside)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_kernel_has_a_derivative(boundary: Any) -> None:
+    settings = vkbloom.Convolution(KERNEL, boundary=boundary, normalize=False)
+    image = random_image(9, 7, seed=3)
+    frames, pullback = reference.vjp(image, settings)
+    cotangent = random_image(9, 7, seed=4)
+    derivative = pullback({"final": cotangent})["kernel"]
+    # The bloom is linear in the kernel.
+    kernel = settings.kernel((9, 7))
+    bloom = product(frames["bloom"][..., :3], cotangent)
+    assert_allclose(product(derivative, kernel), bloom, rtol=1e-12)
+
+
+def test_hard_threshold_has_no_derivative_of_its_own() -> None:
+    image = np.full((3, 3, 3), 0.5)
+    image[1, 1] = 2.0
+    _, pullback = reference.vjp(image, vkbloom.Separable(threshold=0.5))
+    derivatives = pullback({"glow": np.ones((3, 3, 4))})
+    assert derivatives["threshold"] == 0
+    # A colour at the threshold counts as below it.
+    assert_allclose(derivatives["image"][..., 0], np.outer([0, 1, 0], [0, 1, 0]))
+
+
+def test_equal_channels_share_the_derivative_of_their_maximum() -> None:
+    image = np.full((1, 1, 3), 0.75)
+    settings = vkbloom.Separable(threshold=0.5, knee=0.5)
+    _, pullback = reference.vjp(image, settings)
+    shares = pullback({"glow": np.ones((1, 1, 4))})["image"]
+    assert_allclose(shares, np.full((1, 1, 3), shares[0, 0, 0]))
+
+
+def test_derivative_by_the_offset_of_a_tap_on_a_centre_is_the_mean_of_both_sides() -> None:
+    image = np.array([0.0, 1.0, 4.0]).reshape(1, 3, 1).repeat(3, axis=2)
+    settings = vkbloom.Separable(weights=(0, 1), blur_strength=1)
+    _, pullback = reference.vjp(image, settings.replace(intensity=1))
+    middle = np.zeros((1, 3, 4))
+    middle[0, 1, 0] = 1
+    # The vertical pass doubles. Left: 0 on both sides of an edge and 1, so -1/2; right: 3 and 0.
+    assert_allclose(pullback({"bloom": middle})["blur_scale"], 2 * (-0.5 + 1.5))
+
+
+def test_nan_and_infinity_of_the_image_have_the_derivative_0() -> None:
+    image = random_image(5, 5, seed=1)
+    image[2, 2] = (np.nan, np.inf, 0.5)
+    frames, pullback = reference.vjp(image, vkbloom.Pyramid(levels=1))
+    assert np.isnan(frames["final"][2, 2, 0])
+    derivative = pullback({"bloom": np.ones((5, 5, 4))})["image"]
+    assert np.isfinite(derivative).all()
+    assert (derivative[2, 2] == [0, 0, derivative[2, 2, 2]]).all()
+    assert derivative[2, 2, 2] > 0
+
+
+def test_every_real_field_has_a_derivative_by_its_name() -> None:
+    for settings in vkbloom.presets.values():
+        image = random_image(6, 5, seed=1)
+        frames, pullback = reference.vjp(image, settings)
+        found = pullback({"final": frames["final"]})
+        assert found.keys() >= {"image", *differentiable(settings)}
+        assert not DISCRETE & found.keys()
+
+
+@pytest.mark.parametrize(
+    ("cotangents", "message"),
+    [
+        ({"blom": np.ones((4, 4, 3))}, "cotangents: unknown framebuffer 'blom'; available: glow"),
+        ({"final": np.ones((4, 3, 3))}, r"cotangents: the shape of 'final' is \(4, 3, 3\)"),
+        ({"final": np.full((4, 4, 3), np.nan)}, "cotangents: 'final' has NaN or infinity"),
+    ],
+)
+def test_wrong_cotangent_is_refused_by_name(cotangents: Any, message: str) -> None:
+    _, pullback = reference.vjp(np.ones((4, 4, 3)), vkbloom.Separable())
+    with pytest.raises(ValueError, match=message):
+        pullback(cotangents)

@@ -1,0 +1,76 @@
+"""Print lines of code and of docstrings by folder; blank lines and comments are left out.
+
+``python tools/line_counts.py [REVISION]`` counts the working tree, or a commit.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import subprocess
+import sys
+import tokenize
+from collections import Counter
+from pathlib import Path
+
+LAYOUT = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT}
+C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*|(\"(?:\\.|[^\"\\\n])*\")", re.DOTALL)
+DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+C_SUFFIXES = (".c", ".h", ".comp", ".frag", ".vert", ".glsl", ".inc")
+
+
+def python_counts(text: str) -> tuple[int, int]:
+    """Return lines of code and of docstrings."""
+    documented: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            documented.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    written = {
+        line
+        for token in tokenize.generate_tokens(io.StringIO(text).readline)
+        if token.type not in LAYOUT
+        for line in range(token.start[0], token.end[0] + 1)
+    }
+    filled = {number for number, line in enumerate(text.splitlines(), 1) if line.strip()}
+    return len((written & filled) - documented), len(documented & filled)
+
+
+def c_counts(text: str) -> tuple[int, int]:
+    """Return lines of code; C has no docstrings."""
+    code = C_COMMENT.sub(lambda found: found[1] or "", text)
+    return sum(bool(line.strip()) for line in code.splitlines()), 0
+
+
+def files(revision: str | None) -> dict[str, str]:
+    """Return the text of each counted file by its path."""
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout
+
+    listed = git("ls-tree", "-r", "--name-only", revision) if revision else git("ls-files")
+    found = {}
+    for name in listed.splitlines():
+        if name.endswith((".py", *C_SUFFIXES)) and (revision or Path(name).exists()):
+            found[name] = git("show", f"{revision}:{name}") if revision else Path(name).read_text()
+    return found
+
+
+def main() -> None:
+    """Print the table."""
+    code: Counter[str] = Counter()
+    docs: Counter[str] = Counter()
+    for name, text in files(sys.argv[1] if sys.argv[1:] else None).items():
+        parts = name.split("/")[:-1] or ["."]
+        counts = (python_counts if name.endswith(".py") else c_counts)(text)
+        for depth in range(1, min(len(parts), 3 if parts[0] == "python" else 2) + 1):
+            folder = "/".join(parts[:depth])
+            code[folder] += counts[0]
+            docs[folder] += counts[1]
+    print("| folder | code | docstrings |\n|---|---:|---:|")
+    for folder in sorted(code):
+        print(f"| {folder} | {code[folder]:,} | {docs[folder]:,} |")
+
+
+if __name__ == "__main__":
+    main()
