@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io import colour as colours_of
+from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
     DTYPES,
     SPACES,
@@ -323,7 +324,13 @@ def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     return pixels
 
 
-def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = False) -> Picture:
+def decode(
+    stored: StoredImage,
+    colour: Colour | None = None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
+) -> Picture:
     """Decode a stored image to a picture of linear values.
 
     Parameters
@@ -335,6 +342,8 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
         the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
     raw : bool, default False
         Whether to keep 8-bit values without decoding.
+    expand : float, optional
+        What highlights of integer files are expanded up to; see `vkbloom.io.expansion.expanded`.
 
     Returns
     -------
@@ -368,6 +377,8 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     if not raw:
         taken_as, values, said = _linear(values, stored, colour)
         notes += said
+        if numbers in ("uint8", "uint16"):
+            values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     return Picture(
         pixels=np.ascontiguousarray(values),
