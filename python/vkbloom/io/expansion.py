@@ -42,7 +42,10 @@ def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
 
         m' = a + (m - a) / (1 - k (m - a)) for m > a, with k = 1 / (1 - a) - 1 / (E - a)
 
-    and the colour is multiplied by m' / m. It is the inverse of m = a + (m' - a) / (1 + k (m' - a)),
+    and the colour is multiplied by m' / m. It is the inverse of
+
+        m = a + (m' - a) / (1 + k (m' - a)),
+
     which compresses a..E to a..1: Reinhard et al., "Photographic Tone Reproduction for Digital
     Images", SIGGRAPH 2002, above a knee, where both have the slope 1.
     """
