@@ -49,7 +49,7 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_LOADS + 1)},
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_READS},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets},
                         },
                 },
@@ -177,8 +177,7 @@ static bool allows_in_place(const struct vkb_request *request, uint32_t image,
         const struct vkb_pass_row *pass = &graph->passes[i];
         if (vkb_pass_reads(pass, image)
             && (pass->reading != VKB_READING_WORDS
-                || (input->channels != 4
-                    && (pass->reads[0] != image || vkb_spirv[pass->shader].rgb == pass->shader))))
+                || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
             return false;
     }
     for (uint32_t i = 0; i < request->plan->output_count; ++i)
