@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import runpy
 import shutil
@@ -133,45 +134,41 @@ def compile_module(module: Module) -> tuple[int, ...]:
 
 
 def write_spirv() -> None:
-    """Write spirv.h and spirv.c: an enum of the modules, and their code, one row for each."""
+    """Write spirv.h and spirv.c: a shader object for each module (csrc/graph/shader.h)."""
     SPIRV.mkdir(parents=True, exist_ok=True)
     shaders = sorted(
         (path for path in SHADERS.rglob("*.*") if path.suffix in STAGES), key=lambda path: path.name
     )
     built = [module for shader in shaders for module in modules(shader)]
     names = {module.name for module in built}
-    enum = "".join(f"    VKB_SHADER_{module.name},\n" for module in built)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         compiled = list(threads.map(compile_module, built))
     arrays = "".join(
         f"static const uint32_t {module.name}[] = {{{','.join(map(str, words))}}};\n"
         for module, words in zip(built, compiled, strict=True)
     )
-    rows = ""
-    for module in built:
-        dispatch = f"{module.shader.stem}_dispatch"
-        packed = module.name.replace("_words_", "_packed_")
-        rgb = module.name.replace("_words_", "_words_rgb_")
-        twins = ", ".join(
-            f"VKB_SHADER_{twin if twin in names else module.name}"
-            for twin in (dispatch, packed, rgb)
+    declared = objects = ""
+    for module, words in zip(built, compiled, strict=True):
+        code = struct.pack(f"={len(words)}I", *words)
+        hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
+        twins = (
+            f"{module.shader.stem}_dispatch",
+            module.name.replace("_words_", "_packed_"),
+            module.name.replace("_words_", "_words_rgb_"),
         )
-        rows += f'    {{"{module.name}", {module.name}, sizeof {module.name}, {twins}}},\n'
+        pointers = ", ".join(
+            f"&vkb_shader_{twin}" if twin in names - {module.name} else "NULL" for twin in twins
+        )
+        declared += f"extern const struct vkb_shader vkb_shader_{module.name};\n"
+        objects += (
+            f'const struct vkb_shader vkb_shader_{module.name} = {{"{module.name}", {module.name}, '
+            f"sizeof {module.name}, {{{{{hashed}}}}}, {pointers}}};\n"
+        )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
-        "#include <stddef.h>\n#include <stdint.h>\n\n"
-        f"enum vkb_shader {{\n{enum}    VKB_SHADER_COUNT,\n}};\n\n"
-        "// `dispatch`: the same pass as a compute shader; `packed`: with a target of three\n"
-        "// channels; `rgb`: with a first image of three; each is the shader itself where there\n"
-        "// is none.\n"
-        "struct vkb_spirv {\n    const char *name;\n    const uint32_t *code;\n    size_t size;\n"
-        "    enum vkb_shader dispatch, packed, rgb;\n};\n"
-        "extern const struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT];\n\n#endif\n"
+        f'#include "graph/shader.h"\n\n{declared}\n#endif\n'
     )
-    (SPIRV / "spirv.c").write_text(
-        '#include "spirv.h"\n\n'
-        f"{arrays}\nconst struct vkb_spirv vkb_spirv[VKB_SHADER_COUNT] = {{\n{rows}}};\n"
-    )
+    (SPIRV / "spirv.c").write_text(f'#include "spirv.h"\n\n{arrays}\n{objects}')
 
 
 class BuildCore(build_ext):

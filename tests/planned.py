@@ -28,7 +28,7 @@ def scene_plan(
 ) -> _core.Plan:
     """Return the plan of all framebuffers of a frame, in the fragment variant."""
     source = scene_source(size, has_sky=has_sky, shading=shading)
-    return _core.plan(source, settings, None, "fragment")
+    return _core.plan(source, settings, None)
 
 
 class Row(NamedTuple):

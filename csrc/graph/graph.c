@@ -45,6 +45,15 @@ enum vkb_mode vkb_storage_mode(enum vkb_format format)
                                                : STORED_SINGLE;
 }
 
+// A dispatch has no vertex shader.
+static void pack_hash(const struct vkb_shader *shader, unsigned char *bytes, size_t *size)
+{
+    const struct vkb_hash hash = vkb_shader_hash(shader);
+
+    memcpy(bytes + *size, &hash, sizeof hash);
+    *size += sizeof hash;
+}
+
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
 {
     size_t size = 0;
@@ -55,8 +64,8 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(name);
     PACK(geometry);
     PACK(textured);
-    PACK(vertex);
-    PACK(shader);
+    pack_hash(pass->vertex, bytes, &size);
+    pack_hash(pass->shader, bytes, &size);
     PACK(constants);
     PACK(reads);
     PACK(read_count);

@@ -10,7 +10,8 @@
 
 enum {
     VKB_NAME_SIZE = 32,
-    VKB_MAX_READS = GATHERED_LEVELS,
+    VKB_MAX_READS = 16,               // as many as every device can sample
+    VKB_MAX_WORDS = GATHERED_LEVELS,  // images that are read as words
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
@@ -96,7 +97,7 @@ struct vkb_pass_row {
     const char *variant;  // name of the variant that replaces the method's pass; NULL: none
     enum vkb_geometry geometry;
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
-    enum vkb_shader vertex, shader;  // a dispatch has no vertex shader
+    const struct vkb_shader *vertex, *shader;  // a dispatch has no vertex shader
     struct vkb_constants constants;
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;

@@ -15,7 +15,7 @@ void vkb_planner_destroy(struct vkb_planner *planner)
     vkb_free(planner->needed);
     vkb_free(planner->wanted);
     vkb_free(planner->recipe);
-    vkb_graph_destroy(&planner->previous);
+    vkb_free(planner->previous);
     *planner = (struct vkb_planner){0};
 }
 
@@ -177,22 +177,37 @@ static uint32_t count_running(const struct vkb_graph *graph, const bool *needed,
     return count;
 }
 
-static bool same_pass(const struct vkb_graph *a, const struct vkb_graph *b, uint32_t i)
-{
-    unsigned char first[sizeof(struct vkb_pass_row)], second[sizeof first];
+// The plan before or after: its passes, packed or not.
+struct neighbour {
+    const struct vkb_packed_pass *packed;
+    const struct vkb_pass_row *rows;
+    size_t count;
+};
 
-    if (i >= a->pass_count || i >= b->pass_count)
-        return false;
-    const size_t size = vkb_pass_pack(&a->passes[i], first);
-    return size == vkb_pass_pack(&b->passes[i], second) && memcmp(first, second, size) == 0;
+static void pack(const struct vkb_pass_row *row, struct vkb_packed_pass *packed)
+{
+    packed->size = vkb_pass_pack(row, packed->bytes);
 }
 
-// Whether the plan before or after (`neighbour`) has the same passes as those that the fused pass
-// saves, except the pass that it replaces. Then running them once serves both plans.
-static bool shares(const struct vkb_graph *graph, const struct vkb_graph *neighbour, uint32_t fused,
+static bool same_pass(const struct vkb_graph *graph, const struct neighbour *neighbour, uint32_t i)
+{
+    struct vkb_packed_pass first, second;
+    const struct vkb_packed_pass *other = neighbour->packed ? &neighbour->packed[i] : &second;
+
+    if (i >= graph->pass_count || i >= neighbour->count)
+        return false;
+    pack(&graph->passes[i], &first);
+    if (neighbour->rows)
+        pack(&neighbour->rows[i], &second);
+    return first.size == other->size && memcmp(first.bytes, other->bytes, first.size) == 0;
+}
+
+// Whether the plan before or after has the same passes as those that the fused pass saves, except
+// the pass that it replaces. Then running them once serves both plans.
+static bool shares(const struct vkb_graph *graph, const struct neighbour *neighbour, uint32_t fused,
                    const bool *plain, const bool *needed, const bool *current)
 {
-    if (!neighbour || same_pass(graph, neighbour, fused - 1))
+    if (!neighbour->count || same_pass(graph, neighbour, fused - 1))
         return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (plain[i] && !needed[i] && !current[i] && i != fused - 1
@@ -206,8 +221,11 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
                         struct vkb_error *error)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    const struct vkb_graph *previous =
-        step->source == planner->previous_source ? &planner->previous : NULL;
+    const bool follows = step->source == planner->previous_source;
+    const struct neighbour previous = {planner->previous, NULL,
+                                       follows ? planner->previous_count : 0};
+    const struct neighbour next = {NULL, step->next ? step->next->passes : NULL,
+                                   step->next ? step->next->pass_count : 0};
     bool *needed = planner->needed, *wanted = planner->wanted;
     const bool *current = planner->current;
     bool *skipped = vkb_alloc(error, (size_t)2 * graph->pass_count, sizeof *skipped);
@@ -226,8 +244,8 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
         skipped[i - 1] = true;
         mark(step->plan, skipped, needed, wanted);
         if (count_running(graph, needed, current) < count_running(graph, plain, current)
-            && !shares(graph, previous, i, plain, needed, current)
-            && !shares(graph, step->next, i, plain, needed, current))
+            && !shares(graph, &previous, i, plain, needed, current)
+            && !shares(graph, &next, i, plain, needed, current))
             continue;
         skipped[i] = true;
         skipped[i - 1] = false;
@@ -237,19 +255,20 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
     return true;
 }
 
-// Copies the plan's passes: the plan may be destroyed before the next one arrives.
+// Packs the plan's passes: the plan may be destroyed before the next one arrives.
 static bool keep_previous(struct vkb_planner *planner, const struct vkb_plan_step *step,
                           struct vkb_error *error)
 {
     const struct vkb_graph *graph = &step->plan->graph;
-    struct vkb_graph *previous = &planner->previous;
 
-    previous->pass_count = 0;
-    if (!vkb_grow(error, &previous->passes, &previous->pass_capacity, graph->pass_count,
-                  sizeof *previous->passes))
+    planner->previous_count = 0;
+    if (!vkb_grow(error, &planner->previous, &planner->previous_capacity, graph->pass_count,
+                  sizeof *planner->previous))
         return false;
-    memcpy(previous->passes, graph->passes, graph->pass_count * sizeof *graph->passes);
-    previous->pass_count = graph->pass_count;
+    while (planner->previous_count < graph->pass_count) {
+        pack(&graph->passes[planner->previous_count], &planner->previous[planner->previous_count]);
+        ++planner->previous_count;
+    }
     planner->previous_source = step->source;
     return true;
 }

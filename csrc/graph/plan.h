@@ -36,14 +36,21 @@ struct vkb_plan_step {
     uint64_t scene;                 // serial of the meshes and textures that draws read
 };
 
-// The planner's result for the last plan, and a copy of that plan's passes.
+// A row without padding, by vkb_pass_pack. It refers to no shader object, which may be gone.
+struct vkb_packed_pass {
+    size_t size;
+    unsigned char bytes[sizeof(struct vkb_pass_row)];
+};
+
+// The planner's result for the last plan, and that plan's passes.
 struct vkb_planner {
     bool *current;  // by pass: its images are up to date
     bool *needed;   // by pass: a requested framebuffer needs it
     bool *wanted;   // by image: a requested framebuffer, or read or written by a needed pass
     unsigned char *recipe;
     size_t current_capacity, needed_capacity, wanted_capacity, recipe_size, recipe_capacity;
-    struct vkb_graph previous;  // without images
+    struct vkb_packed_pass *previous;
+    size_t previous_count, previous_capacity;
     uint64_t previous_source;
 };
 

@@ -35,7 +35,7 @@ static void choose_sizes(struct vkb_levels *levels)
 static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
 {
     struct vkb_pass_row row =
-        vkb_prefilter_row(levels, VKB_SHADER_bevy_prefilter_frag, from, levels->downs[0]);
+        vkb_prefilter_row(levels, &vkb_shader_bevy_prefilter_frag, from, levels->downs[0]);
 
     row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
     row.params.prefilter.step_y = (float)levels->settings->values.scale_y;

@@ -27,8 +27,8 @@ bool vkb_add_blender(const struct vkb_settings *settings, const struct vkb_bloom
         if (!vkb_levels_image(&levels, "down_%u", level, size, to, error))
             return false;
         struct vkb_pass_row row =
-            level == 0   ? vkb_prefilter_row(&levels, VKB_SHADER_blender_prefilter_frag, from, *to)
-            : level == 1 ? vkb_pyramid_row(&levels, VKB_SHADER_blender_down_frag, from, *to)
+            level == 0   ? vkb_prefilter_row(&levels, &vkb_shader_blender_prefilter_frag, from, *to)
+            : level == 1 ? vkb_pyramid_row(&levels, &vkb_shader_blender_down_frag, from, *to)
                          : vkb_down_row(&levels, false, from, *to);
         if (level == 1)
             row.constants.groups = GROUPS_BLENDER;

@@ -78,11 +78,11 @@ static bool add_placing(const struct convolution *convolution, uint32_t kernel, 
                         struct vkb_error *error)
 {
     const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
-    struct vkb_pass_row row = vkb_fullscreen_row("kernel", VKB_SHADER_fft_kernel_comp, spectrum);
+    struct vkb_pass_row row = vkb_fullscreen_row("kernel", &vkb_shader_fft_kernel_comp, spectrum);
     struct vkb_fft_kernel_params *params = &row.params.fft_kernel;
 
     row.geometry = VKB_GEOMETRY_DISPATCH;
-    row.vertex = (enum vkb_shader)0;
+    row.vertex = NULL;
     row.variant = "dispatch";
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
     row.reads[0] = kernel;

@@ -54,20 +54,20 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
     if (!add_images(source->size, graph, gbuffer, error))
         return false;
     if (source->has_sky) {
-        row = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX, VKB_SHADER_gbuffer_sky_frag, 0, 0,
+        row = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_gbuffer_sky_frag, 0, 0,
                             &stored);
         set_targets(gbuffer, &row);
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }
-    row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, VKB_SHADER_gbuffer_body_frag, 0, 0, &stored);
+    row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, &stored);
     row.constants.emitters = emitters;
     set_targets(gbuffer, &row);
-    if (!vkb_add_mesh(&row, source->body_textured, VKB_SHADER_gbuffer_textured_frag, graph, error))
+    if (!vkb_add_mesh(&row, source->body_textured, &vkb_shader_gbuffer_textured_frag, graph, error))
         return false;
     if (glow == VKB_NO_IMAGE)
         return true;
-    row = vkb_fullscreen_row("glow_light", VKB_SHADER_gbuffer_glow_frag, 0);
+    row = vkb_fullscreen_row("glow_light", &vkb_shader_gbuffer_glow_frag, 0);
     row.constants.emitters = emitters;
     row.reads[0] = glow;
     row.read_count = 1;
@@ -76,11 +76,12 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
+static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size, uint32_t scene,
                       uint32_t brightness, struct vkb_graph *graph, uint32_t *bloom,
                       struct vkb_error *error)
 {
     struct vkb_bloom_source source = {
+        .scene = scene,
         .glow = brightness,
         .mask = VKB_NO_IMAGE,
         .buffers = vkb_bloom_size(settings, size),
@@ -104,7 +105,7 @@ static bool add_lighting(const struct gbuffer *gbuffer, struct vkb_size size,
 {
     if (!vkb_add_target(graph, "scene", HDR, size, true, scene, error))
         return false;
-    struct vkb_pass_row row = vkb_fullscreen_row("scene", VKB_SHADER_lighting_frag, *scene);
+    struct vkb_pass_row row = vkb_fullscreen_row("scene", &vkb_shader_lighting_frag, *scene);
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
         row.reads[i] = gbuffer->colours[i];
     row.read_count = GBUFFER_COLOURS;
@@ -119,10 +120,13 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
     struct vkb_mesh_params params = vkb_scene_params(source);
     struct gbuffer gbuffer;
     struct vkb_composite_source composite = {
+        .scene = VKB_NO_IMAGE,
         .bloom = VKB_NO_IMAGE,
         .mask = VKB_NO_IMAGE,
         .lit = vkb_has_glare(settings),
     };
+    // Passes that were given at run time may read the scene.
+    const bool scene_first = settings->method == VKB_METHOD_OWN;
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {
@@ -133,9 +137,10 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
             return false;
     }
     return add_gbuffer(source, &params, glow, &gbuffer, graph, error)
+        && (!scene_first || add_lighting(&gbuffer, source->size, graph, &composite.scene, error))
         && (!settings->values.bloom
-            || add_bloom(settings, source->size, gbuffer.colours[BRIGHTNESS], graph,
-                         &composite.bloom, error))
-        && add_lighting(&gbuffer, source->size, graph, &composite.scene, error)
+            || add_bloom(settings, source->size, composite.scene, gbuffer.colours[BRIGHTNESS],
+                         graph, &composite.bloom, error))
+        && (scene_first || add_lighting(&gbuffer, source->size, graph, &composite.scene, error))
         && vkb_add_composite(settings, &composite, VKB_FORMAT_RGBA8_UNORM, graph, error);
 }

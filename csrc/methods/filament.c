@@ -34,7 +34,7 @@ static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32
                           struct vkb_error *error)
 {
     struct vkb_pass_row row =
-        vkb_prefilter_row(levels, VKB_SHADER_filament_prefilter_frag, from, to);
+        vkb_prefilter_row(levels, &vkb_shader_filament_prefilter_frag, from, to);
 
     if (from == levels->source->glow)
         vkb_mask_prefilter(levels, &row);
@@ -68,7 +68,7 @@ static bool add_down(const struct vkb_levels *levels, uint32_t level, struct vkb
     const bool even = above.width % 2 == 0 && above.height % 2 == 0;
     const uint32_t to = levels->downs[level];
     const struct vkb_pass_row row =
-        even ? vkb_pyramid_row(levels, VKB_SHADER_filament_down_frag, from, to)
+        even ? vkb_pyramid_row(levels, &vkb_shader_filament_down_frag, from, to)
              : vkb_down_row(levels, false, from, to);
 
     return vkb_graph_add_pass(levels->graph, &row, error);

@@ -27,13 +27,14 @@ static bool add_scene(const struct vkb_scene_source *source, const struct vkb_me
         return false;
     if (source->has_sky) {
         struct vkb_pass_row sky = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX,
-                                                VKB_SHADER_skybox_frag, *scene, depth, &stored);
+                                                &vkb_shader_skybox_frag, *scene, depth, &stored);
         if (!vkb_graph_add_pass(graph, &sky, error))
             return false;
     }
     struct vkb_pass_row body =
-        vkb_scene_row("scene", VKB_GEOMETRY_BODY, VKB_SHADER_phong_frag, *scene, depth, &stored);
-    return vkb_add_mesh(&body, source->body_textured, VKB_SHADER_phong_textured_frag, graph, error);
+        vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, *scene, depth, &stored);
+    return vkb_add_mesh(&body, source->body_textured, &vkb_shader_phong_textured_frag, graph,
+                        error);
 }
 
 bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
@@ -41,13 +42,20 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
 {
     const struct vkb_mesh_params params = vkb_scene_params(source);
     struct vkb_composite_source composite = {
+        .scene = VKB_NO_IMAGE,
         .bloom = VKB_NO_IMAGE,
         .mask = VKB_NO_IMAGE,
         .lit = vkb_has_glare(settings),
     };
 
+    // Passes that were given at run time may read the scene.
+    const bool scene_first = settings->method == VKB_METHOD_OWN;
+
+    if (scene_first && !add_scene(source, &params, graph, &composite.scene, error))
+        return false;
     if (settings->values.bloom) {
         struct vkb_bloom_source glow = {
+            .scene = composite.scene,
             .mask = VKB_NO_IMAGE,
             .buffers = vkb_forward_buffers(settings, source->size),
             .final = source->size,
@@ -62,7 +70,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
             || !vkb_add_bloom(settings, &glow, graph, &composite.bloom, error))
             return false;
     }
-    return add_scene(source, &params, graph, &composite.scene, error)
+    return (scene_first || add_scene(source, &params, graph, &composite.scene, error))
         && vkb_add_composite(settings, &composite, graph->images[composite.scene].format, graph,
                              error);
 }

@@ -38,7 +38,7 @@ static struct vkb_size size_of(const struct stage *stage, uint32_t image)
 }
 
 // Its taps may be anywhere, and its images are beside the bloom's levels.
-static struct vkb_pass_row glare_row(const struct stage *stage, enum vkb_shader fragment,
+static struct vkb_pass_row glare_row(const struct stage *stage, const struct vkb_shader *fragment,
                                      uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, from, to);
@@ -82,7 +82,7 @@ static bool add_iteration(const struct stage *stage, int ray, int rays, int iter
     const double angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays);
     const double step = values->length * pow(values->base, iteration);
     const bool last = iteration == values->iterations - 1;
-    struct vkb_pass_row row = glare_row(stage, VKB_SHADER_streaks_frag, from, to);
+    struct vkb_pass_row row = glare_row(stage, &vkb_shader_streaks_frag, from, to);
     struct vkb_streaks_params *params = &row.params.streaks;
 
     // Every binding of the shader must be filled, also one that this variant does not read.
@@ -135,7 +135,7 @@ static bool add_streaks(const struct stage *stage, uint32_t *image, struct vkb_e
 }
 
 // A stage of one pass with the block of ghosts and halo.
-static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint32_t *image,
+static bool add_flare(const struct stage *stage, const struct vkb_shader *fragment, uint32_t *image,
                       struct vkb_error *error)
 {
     const struct vkb_glare_values *values = &stage->settings->values;
@@ -162,12 +162,12 @@ static bool add_flare(const struct stage *stage, enum vkb_shader fragment, uint3
 
 static bool add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
-    return add_flare(stage, VKB_SHADER_ghosts_frag, image, error);
+    return add_flare(stage, &vkb_shader_ghosts_frag, image, error);
 }
 
 static bool add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
-    return add_flare(stage, VKB_SHADER_halo_frag, image, error);
+    return add_flare(stage, &vkb_shader_halo_frag, image, error);
 }
 
 // Dirt has no image of its own.
@@ -281,7 +281,7 @@ static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_gl
         || !vkb_levels_step(levels, "dirty_light", 0, levels->source->final, &dirty, error))
         return false;
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, dirty);
-    struct vkb_pass_row row = vkb_fetching_row(levels, VKB_SHADER_dirt_frag, *light, dirty);
+    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, *light, dirty);
     row.reach = INFINITY;  // the picture has no bands of rows
     row.reads[1] = dirt;
     row.read_count = 2;

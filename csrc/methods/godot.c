@@ -11,7 +11,7 @@ static const float LEAST_WEIGHT = 1e-4f;
 static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                      uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_prefilter_row(levels, VKB_SHADER_godot_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_godot_blur_frag, from, to);
 
     vkb_reach_nine(&row);
     row.constants.direction = direction;

@@ -65,6 +65,7 @@ static bool add_bloom(const struct vkb_settings *settings, const struct vkb_imag
 {
     const uint32_t from = image->has_emission ? inputs->emission : inputs->image;
     struct vkb_bloom_source source = {
+        .scene = inputs->image,
         .mask = inputs->mask,
         .blurs_alpha = settings->choices[VKB_CHOICE_alpha] == ALPHA_BLUR,
         .buffers = vkb_bloom_size(settings, image->size),

@@ -30,7 +30,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
         return false;
     struct vkb_pass_row prefilter =
-        vkb_prefilter_row(&levels, VKB_SHADER_kino_prefilter_frag, source->glow, from);
+        vkb_prefilter_row(&levels, &vkb_shader_kino_prefilter_frag, source->glow, from);
     prefilter.constants.anti_flicker = settings->values.anti_flicker;
     vkb_mask_prefilter(&levels, &prefilter);
     if (!vkb_graph_add_pass(graph, &prefilter, error))
@@ -40,7 +40,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
                               error))
             return false;
         struct vkb_pass_row row =
-            vkb_pyramid_row(&levels, VKB_SHADER_box_down_frag, from, levels.downs[level]);
+            vkb_pyramid_row(&levels, &vkb_shader_box_down_frag, from, levels.downs[level]);
         row.constants.groups = GROUPS_BOX;
         row.constants.firefly_filter = settings->values.anti_flicker && level == 0;
         if (!vkb_graph_add_pass(graph, &row, error))

@@ -38,8 +38,8 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
 
-static bool add_kawase(const struct vkb_levels *levels, enum vkb_shader fragment, uint32_t from,
-                       uint32_t to, struct vkb_error *error)
+static bool add_kawase(const struct vkb_levels *levels, const struct vkb_shader *fragment,
+                       uint32_t from, uint32_t to, struct vkb_error *error)
 {
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
@@ -65,12 +65,12 @@ bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_b
     vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
     for (uint32_t level = 0; level < levels.count; ++level, from = to)
         if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &to, error)
-            || !add_kawase(&levels, VKB_SHADER_kawase_down_frag, from, to, error))
+            || !add_kawase(&levels, &vkb_shader_kawase_down_frag, from, to, error))
             return false;
     for (uint32_t level = levels.count - 1; level-- > 0; from = to)
         if (!vkb_levels_image(&levels, "up_%u", level, levels.sizes[level], &to, error)
-            || !add_kawase(&levels, VKB_SHADER_kawase_up_frag, from, to, error))
+            || !add_kawase(&levels, &vkb_shader_kawase_up_frag, from, to, error))
             return false;
     return vkb_levels_image(&levels, "bloom", 0, source->final, bloom, error)
-        && add_kawase(&levels, VKB_SHADER_kawase_up_frag, from, *bloom, error);
+        && add_kawase(&levels, &vkb_shader_kawase_up_frag, from, *bloom, error);
 }

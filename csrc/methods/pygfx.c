@@ -30,7 +30,7 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         size = vkb_halved(size);
         struct vkb_pass_row row =
             level ? vkb_down_row(&levels, false, from, levels.downs[level])
-                  : vkb_pyramid_row(&levels, VKB_SHADER_pygfx_down_frag, from, levels.downs[0]);
+                  : vkb_pyramid_row(&levels, &vkb_shader_pygfx_down_frag, from, levels.downs[0]);
         if (level == 0) {
             row.constants.groups =
                 settings->values.karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX;

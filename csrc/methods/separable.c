@@ -83,7 +83,7 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
                          struct vkb_error *error)
 {
     struct vkb_pass_row row =
-        vkb_fullscreen_row(graph->images[to].name, VKB_SHADER_threshold_frag, to);
+        vkb_fullscreen_row(graph->images[to].name, &vkb_shader_threshold_frag, to);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
 
     row.constants.threshold_mode = THRESHOLD_NONE;

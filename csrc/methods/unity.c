@@ -44,7 +44,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
     if (!vkb_levels_image(&levels, "down_%u", 0, levels.sizes[0], &levels.downs[0], error))
         return false;
     struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, VKB_SHADER_urp_prefilter_frag, source->glow, levels.downs[0]);
+        vkb_prefilter_row(&levels, &vkb_shader_urp_prefilter_frag, source->glow, levels.downs[0]);
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
@@ -64,7 +64,7 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                           uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_hdrp_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_hdrp_blur_frag, from, to);
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
@@ -114,7 +114,7 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     if (!vkb_levels_step(&levels, "reduced", 0, levels.sizes[0], &from, error))
         return false;
     struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, VKB_SHADER_hdrp_prefilter_frag, source->glow, from);
+        vkb_prefilter_row(&levels, &vkb_shader_hdrp_prefilter_frag, source->glow, from);
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;

@@ -56,7 +56,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;
     struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, VKB_SHADER_unreal_prefilter_frag, source->glow, from);
+        vkb_prefilter_row(&levels, &vkb_shader_unreal_prefilter_frag, source->glow, from);
     row.constants.node = settings->values.node;
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))

@@ -36,7 +36,7 @@ static bool move_to_texels(const struct vkb_blur *blur, double step, double weig
 struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
                                  const struct vkb_blur *blur, uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = vkb_fullscreen_row(name, VKB_SHADER_blur_frag, to);
+    struct vkb_pass_row row = vkb_fullscreen_row(name, &vkb_shader_blur_frag, to);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
     const bool same_size = vkb_same_size(graph, from, to);
     const bool vertical = blur->direction == DIRECTION_VERTICAL;
@@ -74,7 +74,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
 
 bool vkb_is_line_blur(const struct vkb_pass_row *pass)
 {
-    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == VKB_SHADER_blur_frag
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == &vkb_shader_blur_frag
         && pass->constants.direction != DIRECTION_BOTH;
 }
 

@@ -9,7 +9,7 @@ static struct vkb_pass_row godots(const struct vkb_settings *settings,
     struct vkb_pass_row row = *composite;
 
     memset(&row.params, 0, sizeof row.params);
-    row.shader = VKB_SHADER_godot_final_frag;
+    row.shader = &vkb_shader_godot_final_frag;
     row.block = VKB_BLOCK_godot_final;
     VKB_TAKE_COMPOSITE(&row, godot_final, composite);
     row.params.godot_final.white = settings->values.white;
@@ -28,11 +28,24 @@ static int composite_of(const struct vkb_settings *settings,
                                                        : composite;
 }
 
+static struct vkb_composite_source composited(const struct vkb_settings *settings,
+                                              const struct vkb_composite_source *source,
+                                              const struct vkb_graph *graph)
+{
+    const uint32_t own =
+        settings->method == VKB_METHOD_OWN ? vkb_graph_find(graph, VKB_OWN_PICTURE) : VKB_NO_IMAGE;
+
+    return own == VKB_NO_IMAGE ? *source
+                               : (struct vkb_composite_source){
+                                     .scene = own, .bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
+}
+
 bool vkb_add_composite(const struct vkb_settings *settings,
-                       const struct vkb_composite_source *source, enum vkb_format format,
+                       const struct vkb_composite_source *given, enum vkb_format format,
                        struct vkb_graph *graph, struct vkb_error *error)
 {
-    const struct vkb_image_row *scene = &graph->images[source->scene];
+    const struct vkb_composite_source own = composited(settings, given, graph), *source = &own;
+    const struct vkb_image_row *scene = &graph->images[given->scene];
     uint32_t final;
     struct vkb_image_row image = {
         .name = "final",
@@ -45,7 +58,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
 
     if (!vkb_graph_add_image(graph, &image, &final, error))
         return false;
-    struct vkb_pass_row row = vkb_fullscreen_row("final", VKB_SHADER_composite_frag, final);
+    struct vkb_pass_row row = vkb_fullscreen_row("final", &vkb_shader_composite_frag, final);
     const bool off = source->bloom == VKB_NO_IMAGE;
     // Float formats have no quantization levels to dither.
     const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
@@ -72,5 +85,5 @@ bool vkb_add_composite(const struct vkb_settings *settings,
 
 bool vkb_is_composite(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_composite_frag && pass->constants.composite != COMPOSITE_OFF;
+    return pass->shader == &vkb_shader_composite_frag && pass->constants.composite != COMPOSITE_OFF;
 }

@@ -102,7 +102,7 @@ bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
             || split_group(length, FFT_MOST_GROUP_RADIX, found));
 }
 
-static const enum vkb_shader shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);
+static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);
 
 static uint32_t groups(uint32_t invocations, uint32_t side)
 {
@@ -130,7 +130,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     struct vkb_fft_params *params = &row.params.fft;
 
     row.geometry = VKB_GEOMETRY_DISPATCH;
-    row.vertex = (enum vkb_shader)0;
+    row.vertex = NULL;
     row.reading = VKB_READING_LOADED;
     row.variant = "dispatch";
     row.block_width = row.block_height = 1;

@@ -73,8 +73,8 @@ bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct v
                      levels->source->final, true, bloom, error);
 }
 
-struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                     uint32_t from, uint32_t to)
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
+                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
 
@@ -87,8 +87,8 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_s
     return row;
 }
 
-struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                    uint32_t from, uint32_t to)
+struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
+                                    const struct vkb_shader *fragment, uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
@@ -122,7 +122,7 @@ static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t sma
 struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
                                  uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_down_frag, from, to);
+    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_pyramid_down_frag, from, to);
 
     if (!firefly_filter && is_twice(levels->graph, from, to))
         row.constants.sampling = SAMPLING_TEXEL;
@@ -147,17 +147,18 @@ struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool fi
 
 bool vkb_halves(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_pyramid_down_frag
+    return pass->shader == &vkb_shader_pyramid_down_frag
         && pass->constants.sampling == SAMPLING_TEXEL;
 }
 
 bool vkb_doubles(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_pyramid_up_frag && pass->constants.sampling == SAMPLING_TEXEL;
+    return pass->shader == &vkb_shader_pyramid_up_frag
+        && pass->constants.sampling == SAMPLING_TEXEL;
 }
 
-struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                      uint32_t from, uint32_t to)
+struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
+                                      const struct vkb_shader *fragment, uint32_t from, uint32_t to)
 {
     const struct vkb_settings *settings = levels->settings;
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
@@ -239,7 +240,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
                    double coarse_share, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, VKB_SHADER_pyramid_up_frag, from, to);
+    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_pyramid_up_frag, from, to);
     struct vkb_pyramid_params *params = &row.params.pyramid;
     const struct vkb_image_row *smaller = &levels->graph->images[from];
     const struct vkb_image_row *larger = &levels->graph->images[to];
@@ -309,7 +310,7 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
 {
     const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
     struct vkb_pass_row row =
-        vkb_fetching_row(levels, VKB_SHADER_gather_frag, levels->downs[0], to);
+        vkb_fetching_row(levels, &vkb_shader_gather_frag, levels->downs[0], to);
 
     row.constants.upsample = kernel;
     row.constants.levels = (int32_t)levels->count;

@@ -49,12 +49,13 @@ bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t
 
 // The row of a pass from one image to another that filters its taps in the shader: without a block
 // yet; with the pyramid's block; with the prefilter's block.
-struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                     uint32_t from, uint32_t to);
-struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                    uint32_t from, uint32_t to);
-struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels, enum vkb_shader fragment,
-                                      uint32_t from, uint32_t to);
+struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
+                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to);
+struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
+                                    const struct vkb_shader *fragment, uint32_t from, uint32_t to);
+struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
+                                      const struct vkb_shader *fragment, uint32_t from,
+                                      uint32_t to);
 
 // Sets the distances of the taps of a row with the pyramid's block, in texels of what it reads. The
 // outer ones are two steps away.

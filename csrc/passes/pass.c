@@ -3,7 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
-struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target)
+struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader *fragment,
+                                       uint32_t target)
 {
     struct vkb_pass_row row;
 
@@ -11,7 +12,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragmen
     memset(&row, 0, sizeof row);
     snprintf(row.name, sizeof row.name, "%s", name);
     row.geometry = VKB_GEOMETRY_FULLSCREEN;
-    row.vertex = VKB_SHADER_fullscreen_vert;
+    row.vertex = &vkb_shader_fullscreen_vert;
     row.shader = fragment;
     row.targets[0] = target;
     row.target_count = 1;

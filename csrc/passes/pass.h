@@ -12,6 +12,7 @@ struct vkb_size {
 // The input of a method: the glow image, and sizes and format of the bloom buffers. The method's
 // last image is "bloom" with the final size.
 struct vkb_bloom_source {
+    uint32_t scene;  // the frame; VKB_NO_IMAGE: not there yet
     uint32_t glow;
     uint32_t mask;     // multiplies the thresholded image; VKB_NO_IMAGE: none
     bool blurs_alpha;  // alpha is a fourth channel of the bloom
@@ -22,10 +23,10 @@ struct vkb_bloom_source {
 // A shader that is compiled once for each format that it loads.
 #define VKB_BY_FORMAT(shader) \
     { \
-        [VKB_FORMAT_RGBA8_UNORM] = VKB_SHADER_##shader##_rgba8unorm, \
-        [VKB_FORMAT_RGBA16_FLOAT] = VKB_SHADER_##shader##_rgba16float, \
-        [VKB_FORMAT_RGBA32_FLOAT] = VKB_SHADER_##shader##_rgba32float, \
-        [VKB_FORMAT_RG11B10_UFLOAT] = VKB_SHADER_##shader##_rgba32float, \
+        [VKB_FORMAT_RGBA8_UNORM] = &vkb_shader_##shader##_rgba8unorm, \
+        [VKB_FORMAT_RGBA16_FLOAT] = &vkb_shader_##shader##_rgba16float, \
+        [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_##shader##_rgba32float, \
+        [VKB_FORMAT_RG11B10_UFLOAT] = &vkb_shader_##shader##_rgba32float, \
     }
 
 // Adds an image that a pass will write.
@@ -50,7 +51,8 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 enum { VKB_FILTER_REACH = 4 };
 
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
-struct vkb_pass_row vkb_fullscreen_row(const char *name, enum vkb_shader fragment, uint32_t target);
+struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader *fragment,
+                                       uint32_t target);
 
 // Makes a pass that reads one image read the mask after it; VKB_NO_IMAGE: no mask.
 void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);

@@ -13,15 +13,15 @@ struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
 }
 
 struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
-                                  enum vkb_shader fragment, uint32_t target, uint32_t depth,
-                                  const struct vkb_mesh_params *params)
+                                  const struct vkb_shader *fragment, uint32_t target,
+                                  uint32_t depth, const struct vkb_mesh_params *params)
 {
     struct vkb_pass_row row = vkb_fullscreen_row(name, fragment, target);
 
     row.geometry = geometry;
-    row.vertex = geometry == VKB_GEOMETRY_SKYBOX ? VKB_SHADER_skybox_vert
-               : geometry == VKB_GEOMETRY_GLOW   ? VKB_SHADER_glow_vert
-                                                 : VKB_SHADER_mesh_vert;
+    row.vertex = geometry == VKB_GEOMETRY_SKYBOX ? &vkb_shader_skybox_vert
+               : geometry == VKB_GEOMETRY_GLOW   ? &vkb_shader_glow_vert
+                                                 : &vkb_shader_mesh_vert;
     row.depth = depth;
     row.load = VKB_LOAD_CLEAR;
     row.block = VKB_BLOCK_mesh;
@@ -29,8 +29,9 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
     return row;
 }
 
-bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_shader textured,
-                  struct vkb_graph *graph, struct vkb_error *error)
+bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures,
+                  const struct vkb_shader *textured, struct vkb_graph *graph,
+                  struct vkb_error *error)
 {
     struct vkb_pass_row second;
 
@@ -41,8 +42,8 @@ bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_sh
     memcpy(&second, row, sizeof second);
     snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
     second.textured = true;
-    second.vertex = row->geometry == VKB_GEOMETRY_GLOW ? VKB_SHADER_glow_textured_vert
-                                                       : VKB_SHADER_mesh_textured_vert;
+    second.vertex = row->geometry == VKB_GEOMETRY_GLOW ? &vkb_shader_glow_textured_vert
+                                                       : &vkb_shader_mesh_textured_vert;
     second.shader = textured;
     return vkb_graph_add_pass(graph, &second, error);
 }
@@ -59,10 +60,10 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_so
                            error))
         return false;
     struct vkb_pass_row row =
-        vkb_scene_row("glow", VKB_GEOMETRY_GLOW, VKB_SHADER_glow_frag, *glow, depth, params);
+        vkb_scene_row("glow", VKB_GEOMETRY_GLOW, &vkb_shader_glow_frag, *glow, depth, params);
     row.constants.threshold_mode = threshold;
     row.params.mesh.limit = vkb_formats[format].limit;
     if (threshold != THRESHOLD_NONE)
         vkb_params_read(row.block, &settings->values, &row.params);
-    return vkb_add_mesh(&row, source->glow_textured, VKB_SHADER_glow_textured_frag, graph, error);
+    return vkb_add_mesh(&row, source->glow_textured, &vkb_shader_glow_textured_frag, graph, error);
 }

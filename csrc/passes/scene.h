@@ -27,12 +27,13 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_so
 
 // A row that draws a mesh or the sky with a depth test. The caller may add targets.
 struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
-                                  enum vkb_shader fragment, uint32_t target, uint32_t depth,
-                                  const struct vkb_mesh_params *params);
+                                  const struct vkb_shader *fragment, uint32_t target,
+                                  uint32_t depth, const struct vkb_mesh_params *params);
 
 // Adds the row, which draws a mesh. If some triangles have textures, adds a second row that draws
 // these with the fragment shader `textured`.
-bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures, enum vkb_shader textured,
-                  struct vkb_graph *graph, struct vkb_error *error);
+bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures,
+                  const struct vkb_shader *textured, struct vkb_graph *graph,
+                  struct vkb_error *error);
 
 #endif

@@ -2,10 +2,7 @@
 #ifndef VKB_SETTINGS_H
 #define VKB_SETTINGS_H
 
-#include "graph/params.h"
-#include "vulkan/format.h"
-
-#include <stdbool.h>
+#include "graph/graph.h"
 
 // Every method: METHOD(name in C, name in Python and of its vkb_add_ function, published). A
 // published method starts from the complete frame: it reduces and thresholds in its own way.
@@ -22,7 +19,8 @@
     METHOD(UNREAL, unreal, true) \
     METHOD(GODOT, godot, true) \
     METHOD(BLENDER, blender, true) \
-    METHOD(PYGFX, pygfx, true)
+    METHOD(PYGFX, pygfx, true) \
+    METHOD(OWN, own, false)
 
 enum vkb_method {
 #define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
@@ -67,6 +65,21 @@ struct vkb_stage {
     uint32_t ghost_count;
 };
 
+// A pass of a method that was given at run time (methods/own.c). The owner of the settings keeps
+// the shader as long as there are rows of it.
+struct vkb_own_pass {
+    char name[VKB_NAME_SIZE];  // of the image that it writes
+    const struct vkb_shader *shader;
+    uint32_t width, height;
+    enum vkb_format format;  // VKB_FORMAT_NONE: that of the bloom buffers
+    uint32_t block_width,
+        block_height;  // of a compute shader: pixels of a workgroup; 0: a fragment shader
+    bool framebuffer;
+    char reads[VKB_MAX_READS][VKB_NAME_SIZE];
+    uint32_t read_count;
+    struct vkb_own_params params;
+};
+
 struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
@@ -83,7 +96,9 @@ struct vkb_settings {
     struct vkb_kernel_data kernel;
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
-    struct vkb_kernel_data dirt;  // the picture of the stage of dirt
+    struct vkb_kernel_data dirt;        // the picture of the stage of dirt
+    const struct vkb_own_pass *passes;  // of VKB_METHOD_OWN
+    uint32_t pass_count;
 };
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)

@@ -37,7 +37,7 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
                           struct vkb_error *error)
 {
     struct vkb_pass_row row =
-        vkb_fullscreen_row(graph->images[glow].name, VKB_SHADER_threshold_frag, glow);
+        vkb_fullscreen_row(graph->images[glow].name, &vkb_shader_threshold_frag, glow);
     const struct vkb_sampling sampling = vkb_sampling_into(graph, glow);
 
     row.constants.threshold_mode = mode;
@@ -63,6 +63,6 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
 
 bool vkb_is_threshold(const struct vkb_pass_row *pass)
 {
-    return pass->shader == VKB_SHADER_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL
+    return pass->shader == &vkb_shader_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL
         && !pass->constants.masked && !pass->constants.alpha;
 }

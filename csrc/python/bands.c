@@ -99,6 +99,7 @@ PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
     uint32_t height;
     struct vkb_settings settings;
     struct vkb_graph graph = {0};
+    struct vkb_held_passes passes = {0};
     struct vkb_bands bands;
     struct vkb_error error = {0};
 
@@ -106,18 +107,23 @@ PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
                           vkb_read_uint32, &height)
         || !vkb_read_settings(state, settings_object, &settings))
         return NULL;
-    struct vkb_source whole = ((struct vkb_source_object *)source)->source;
+    struct vkb_source complete = ((struct vkb_source_object *)source)->source;
     PyObject *result = NULL;
-    whole.image.size.height = height;
-    if (whole.kind != VKB_SOURCE_IMAGE)
+    if (complete.kind != VKB_SOURCE_IMAGE) {
         vkb_fail(&error, VKB_ERROR_VALUE, "bands: only images have bands");
-    if (whole.kind != VKB_SOURCE_IMAGE || !vkb_require_open(renderer, &error)
-        || !vkb_source_build(&whole, &settings, VKB_MAX_SIDE, &graph, &error))
-        vkb_raise(state, &error);
-    else if (vkb_graph_bands(&graph, vkb_graph_find(&graph, "final"), height, &bands))
-        result = describe_bands(&graph, &bands);
-    else
-        result = Py_NewRef(Py_None);
+        return vkb_raise(state, &error);
+    }
+    complete.image.size.height = height;
+    if (vkb_hold_passes(state, settings_object, VKB_MAX_SIDE, &complete, &passes, &settings)) {
+        if (!vkb_require_open(renderer, &error)
+            || !vkb_source_build(&complete, &settings, VKB_MAX_SIDE, &graph, &error))
+            vkb_raise(state, &error);
+        else if (vkb_graph_bands(&graph, vkb_graph_find(&graph, "final"), height, &bands))
+            result = describe_bands(&graph, &bands);
+        else
+            result = Py_NewRef(Py_None);
+    }
     vkb_graph_destroy(&graph);
+    vkb_release_passes(&passes);
     return result;
 }

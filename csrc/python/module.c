@@ -75,7 +75,7 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
     if (instance)
         vkb_instance_close(instance);
     if (!done)
-        vkb_instance_explain_fork(&error);
+        vkb_instance_explain(&error);
     Py_END_ALLOW_THREADS
     if (!done)
         return vkb_raise(vkb_module_state(module), &error);
@@ -98,9 +98,12 @@ static PyMethodDef functions[] = {
      "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
+    {"shader", vkb_make_shader, METH_VARARGS,
+     "shader(name, spirv, dispatch=None) -> Shader. `dispatch` is the same pass as a compute "
+     "shader."},
     {"plan", vkb_any_plan, METH_VARARGS,
-     "plan(source, settings, names, variants) -> Plan. For no renderer: what one with those "
-     "variants would do."},
+     "plan(source, settings, names, variants=\"fragment\") -> Plan. For no renderer: what one with "
+     "those variants would do; by default it draws every pass as its method defines it."},
     {"dry_run", vkb_dry_run_names, METH_O,
      "dry_run(((source, plan), ...)) -> [[name, ...], ...]. The passes that a renderer that has "
      "run "
@@ -270,6 +273,7 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
+                && add_type(module, &vkb_shader_spec, "Shader", &state->shader_type)
                 && vkb_make_attributes(state)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
@@ -292,6 +296,7 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->plan_type);
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
+    Py_VISIT(state->shader_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -307,6 +312,7 @@ static int clear(PyObject *module)
     Py_CLEAR(state->plan_type);
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
+    Py_CLEAR(state->shader_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

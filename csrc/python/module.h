@@ -14,7 +14,7 @@
 #include <stdatomic.h>
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
@@ -39,7 +39,7 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec;
+    vkb_pages_spec, vkb_shader_spec;
 
 // The data of a submission until the device has finished it. If nobody waits for it any more, it is
 // abandoned: the renderer owns it.
@@ -187,6 +187,22 @@ bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size bu
                      struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
 void vkb_release_kernel(struct vkb_held_kernel *held);
 
+// The passes of a method that was given at run time, held until vkb_release_passes, which may be
+// called on a zeroed one. The tuple keeps their shaders, to which the rows of a graph refer.
+struct vkb_held_passes {
+    PyObject *tuple;
+    struct vkb_own_pass *rows;
+};
+
+// Asks the settings of such a method for its passes.
+bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uint32_t max_side,
+                     const struct vkb_source *source, struct vkb_held_passes *held,
+                     struct vkb_settings *settings);
+void vkb_release_passes(struct vkb_held_passes *held);
+
+// In hex.
+PyObject *vkb_hash_text(const struct vkb_hash *hash);
+
 // An image is the caller's array, or one that stays on the device of a renderer.
 struct vkb_source_object {
     PyObject_HEAD
@@ -212,6 +228,7 @@ struct vkb_plan_object {
     uint64_t renderer;  // serial of its renderer; 0: none, for inspection only
     PyObject *outputs;  // ((name, shape, dtype), ...)
     struct vkb_held_kernel kernel, dirt;
+    struct vkb_held_passes passes;
 };
 
 // Size in bytes of an output in the caller's array.
@@ -230,6 +247,7 @@ bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
+PyObject *vkb_make_shader(PyObject *module, PyObject *arguments);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 

@@ -165,6 +165,18 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     return false;
 }
 
+static bool hold_passes(const struct vkb_module_state *state, const struct vkb_device *device,
+                        PyObject *settings_object, const struct vkb_part *part,
+                        struct vkb_settings *settings, struct vkb_plan_object *self)
+{
+    struct vkb_source complete = self->source;
+
+    if (part)
+        complete.image.size.height = part->height;
+    return vkb_hold_passes(state, settings_object, part ? VKB_MAX_SIDE : device->max_side,
+                           &complete, &self->passes, settings);
+}
+
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
                           enum vkb_variants variants, uint64_t renderer, PyObject *source,
                           PyObject *settings_object, struct vkb_settings *settings,
@@ -178,7 +190,8 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     self->source = ((struct vkb_source_object *)source)->source;
     self->renderer = renderer;
     if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
-        || !hold_kernel(state, device, settings_object, settings, self)) {
+        || !hold_kernel(state, device, settings_object, settings, self)
+        || !hold_passes(state, device, settings_object, part, settings, self)) {
         Py_DECREF(self);
         return NULL;
     }
@@ -238,9 +251,9 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     struct vkb_device device = any_device;
     struct vkb_error error = {0};
     enum vkb_variants variants;
-    const char *name;
+    const char *name = "fragment";
 
-    if (!PyArg_ParseTuple(arguments, "O!OOs:plan", state->source_type, &source, &settings_object,
+    if (!PyArg_ParseTuple(arguments, "O!OO|s:plan", state->source_type, &source, &settings_object,
                           &names, &name)
         || !vkb_read_settings(state, settings_object, &settings))
         return NULL;
@@ -276,7 +289,7 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
     const uint32_t read_count = read_images(pass, reads);
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
-    return Py_BuildValue("(ssNNsI)", name, vkb_spirv[pass->shader].name,
+    return Py_BuildValue("(ssNNsI)", name, pass->shader->name,
                          vkb_image_names(graph, reads, read_count),
                          vkb_image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
@@ -485,6 +498,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
         Py_VISIT(self->kernel.view.obj);
     if (self->dirt.held)
         Py_VISIT(self->dirt.view.obj);
+    Py_VISIT(self->passes.tuple);
     return 0;
 }
 
@@ -496,6 +510,7 @@ static void dealloc(PyObject *object)
     vkb_plan_destroy(&self->plan);
     vkb_release_kernel(&self->kernel);
     vkb_release_kernel(&self->dirt);
+    vkb_release_passes(&self->passes);
     Py_XDECREF(self->outputs);
     vkb_free_object(object);
 }

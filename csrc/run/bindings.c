@@ -32,7 +32,7 @@ static const struct binding_kind {
                            VKB_MAX_LOADS},
     [VKB_BINDINGS_WORDS] = {{VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
                              VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
-                            VKB_MAX_READS},
+                            VKB_MAX_WORDS},
 };
 
 static bool create_layouts(const struct vkb_device *device, struct vkb_bindings *bindings,

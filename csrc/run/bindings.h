@@ -17,7 +17,7 @@ enum vkb_binding_kind {
 // Push constants: the sizes of images that are accessed as words (variants/pixels.glsl).
 struct vkb_words {
     int32_t target[4];  // width, height, words in a row, first row of the bound buffer
-    int32_t reads[VKB_MAX_READS][4];  // width, height, words in a row, 0
+    int32_t reads[VKB_MAX_WORDS][4];  // width, height, words in a row, 0
 };
 
 struct vkb_bindings {

@@ -49,7 +49,7 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
                             {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_LOADS + 1)},
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_READS},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
                             {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets},
                         },
                 },
@@ -177,8 +177,7 @@ static bool allows_in_place(const struct vkb_request *request, uint32_t image,
         const struct vkb_pass_row *pass = &graph->passes[i];
         if (vkb_pass_reads(pass, image)
             && (pass->reading != VKB_READING_WORDS
-                || (input->channels != 4
-                    && (pass->reads[0] != image || vkb_spirv[pass->shader].rgb == pass->shader))))
+                || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
             return false;
     }
     for (uint32_t i = 0; i < request->plan->output_count; ++i)
@@ -395,7 +394,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     VkSemaphore rendered = VK_NULL_HANDLE;
 
     if (run->show) {
-        if (!vkb_screen_acquire(device, run->show, submission->commands.available, error))
+        if (!vkb_screen_acquire(device, &run->frame->submissions, run->show,
+                                submission->commands.available, error))
             return false;
         if (!run->show->acquired)
             return true;
@@ -576,5 +576,13 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
 
 bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_submissions_end(device, &frame->submissions, error);
+    if (!vkb_submissions_end(device, &frame->submissions, error))
+        return false;
+    // A lost device has ended everything, except one that is lost because it does not end.
+    if (!frame->screens || (device->lost && !device->timed_out))
+        return true;
+    // The first wait may fail for lack of memory, too.
+    return vkb_device_wait_idle(device, error)
+        || (error->kind != VKB_ERROR_INTERRUPTED && error->result != VK_TIMEOUT
+            && (vkb_device_wait_idle(device, error) || error->result == VK_ERROR_DEVICE_LOST));
 }

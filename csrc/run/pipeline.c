@@ -25,16 +25,17 @@ struct vkb_render_pass_entry {
 
 struct pipeline_key {
     VkRenderPass render_pass;
-    uint32_t vertex, shader;     // enum vkb_shader
+    struct vkb_hash vertex, shader;
     uint32_t geometry, reading;  // enum vkb_geometry, enum vkb_reading
     uint32_t textured;
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
+    uint32_t image_count;  // of the descriptors
     struct vkb_constants constants;
-    uint32_t unused;  // fills the 8 bytes
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + (8 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                   == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
+                          + (6 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
@@ -71,8 +72,6 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
     for (size_t i = 0; i < pipelines->render_pass_count; ++i)
         vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
     vkb_bindings_destroy(device, &pipelines->bindings);
-    for (uint32_t i = 0; i < VKB_SHADER_COUNT; ++i)
-        vk->vkDestroyShaderModule(device->handle, pipelines->modules[i], NULL);
     vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
     vkb_free(pipelines->entries);
     vkb_free(pipelines->render_passes);
@@ -114,25 +113,6 @@ bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipeli
     vkb_free(*data);
     *data = NULL;
     return false;
-}
-
-static bool get_module(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                       enum vkb_shader shader, VkShaderModule *module, struct vkb_error *error)
-{
-    VkShaderModule *kept = &pipelines->modules[shader];
-
-    if (!*kept
-        && !VK(error, device->vk.vkCreateShaderModule(
-                          device->handle,
-                          &(VkShaderModuleCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                              .codeSize = vkb_spirv[shader].size,
-                              .pCode = vkb_spirv[shader].code,
-                          },
-                          NULL, kept)))
-        return false;
-    *module = *kept;
-    return true;
 }
 
 // Colour images whose memory is also a buffer stay in the general layout.
@@ -262,14 +242,12 @@ static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
     };
 }
 
-static bool create_compute(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                           const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
-                           VkPipeline *pipeline, struct vkb_error *error)
+static bool create_compute(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                           const struct vkb_pass_row *pass, VkShaderModule module,
+                           const VkSpecializationInfo *constants, VkPipeline *pipeline,
+                           struct vkb_error *error)
 {
-    VkShaderModule module;
-
-    return get_module(device, pipelines, pass->shader, &module, error)
-        && VK(error, device->vk.vkCreateComputePipelines(
+    return VK(error, device->vk.vkCreateComputePipelines(
                          device->handle, pipelines->cache, 1,
                          &(VkComputePipelineCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
@@ -362,20 +340,17 @@ static VkPipelineColorBlendAttachmentState blending(enum vkb_blend blend)
     };
 }
 
-static bool create_graphics(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                            const struct vkb_pass_row *pass, const VkSpecializationInfo *constants,
-                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
+static bool create_graphics(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, const VkShaderModule modules[2],
+                            const VkSpecializationInfo *constants, VkRenderPass render_pass,
+                            VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
     const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
     const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
-    VkShaderModule vertex, fragment;
 
-    if (!get_module(device, pipelines, pass->vertex, &vertex, error)
-        || !get_module(device, pipelines, pass->shader, &fragment, error))
-        return false;
     for (uint32_t i = 0; i < pass->target_count; ++i)
         blends[i] = blending(pass->blend);
     return VK(error,
@@ -386,8 +361,8 @@ static bool create_graphics(const struct vkb_device *device, struct vkb_pipeline
                       .stageCount = 2,
                       .pStages =
                           (VkPipelineShaderStageCreateInfo[]){
-                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, vertex, NULL),
-                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment, constants),
+                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], NULL),
+                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], constants),
                           },
                       .pVertexInputState = &vertices,
                       .pInputAssemblyState = &triangles,
@@ -408,7 +383,20 @@ static bool create_graphics(const struct vkb_device *device, struct vkb_pipeline
                   NULL, pipeline));
 }
 
-static bool create_pipeline(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
+                          VkShaderModule *module, struct vkb_error *error)
+{
+    return VK(error, device->vk.vkCreateShaderModule(
+                         device->handle,
+                         &(VkShaderModuleCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                             .codeSize = shader->size,
+                             .pCode = shader->code,
+                         },
+                         NULL, module));
+}
+
+static bool create_pipeline(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
                             const struct vkb_pass_row *pass, VkRenderPass render_pass,
                             VkPipeline *pipeline, struct vkb_error *error)
 {
@@ -424,9 +412,18 @@ static bool create_pipeline(const struct vkb_device *device, struct vkb_pipeline
         .dataSize = sizeof pass->constants,
         .pData = &pass->constants,
     };
-    if (pass->geometry == VKB_GEOMETRY_DISPATCH)
-        return create_compute(device, pipelines, pass, &constants, pipeline, error);
-    return create_graphics(device, pipelines, pass, &constants, render_pass, pipeline, error);
+    // A driver copies what it needs of a module: none has to be kept.
+    VkShaderModule modules[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};
+    const bool done =
+        (!pass->vertex || create_module(device, pass->vertex, &modules[0], error))
+        && create_module(device, pass->shader, &modules[1], error)
+        && (pass->geometry == VKB_GEOMETRY_DISPATCH
+                ? create_compute(device, pipelines, pass, modules[1], &constants, pipeline, error)
+                : create_graphics(device, pipelines, pass, modules, &constants, render_pass,
+                                  pipeline, error));
+    for (int i = 0; i < 2; ++i)
+        device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);
+    return done;
 }
 
 // lavapipe compiles in this process, and ends it where that fails.
@@ -448,13 +445,14 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     struct pipeline_key key;
 
     memset(&key, 0, sizeof key);
-    key.vertex = pass->vertex;
-    key.shader = pass->shader;
+    key.vertex = vkb_shader_hash(pass->vertex);
+    key.shader = vkb_shader_hash(pass->shader);
     key.geometry = pass->geometry;
     key.reading = pass->reading;
     key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
+    key.image_count = vkb_pass_descriptor_images(pass);
     key.constants = pass->constants;
     key.render_pass = render_pass;
 

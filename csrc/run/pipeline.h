@@ -1,5 +1,5 @@
-// The Vulkan objects of a pass row: shader modules, render pass, pipeline. Each is created once for
-// its key. If there are many pipelines, the old ones are destroyed. The other objects are few.
+// The Vulkan objects of a pass row: render pass and pipeline. Each is created once for its key. If
+// there are many pipelines, the old ones are destroyed. The other objects are few.
 #ifndef VKB_PIPELINE_H
 #define VKB_PIPELINE_H
 
@@ -12,7 +12,6 @@ struct vkb_pipeline_entry;
 struct vkb_pipelines {
     VkPipelineCache cache;
     struct vkb_bindings bindings;
-    VkShaderModule modules[VKB_SHADER_COUNT];
     struct vkb_render_pass_entry *render_passes;
     struct vkb_pipeline_entry *entries;
     size_t render_pass_count, render_pass_capacity;

@@ -234,8 +234,7 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
             return NULL;
     for (uint32_t i = 0; i < plan->output_count; ++i) {
         struct vkb_output *output = &run->request->outputs[i];
-        if (plan->outputs[i] == image
-            && (vkb_readback_is_complete(output) || vkb_spirv[pass->shader].packed != pass->shader)
+        if (plan->outputs[i] == image && (vkb_readback_is_complete(output) || pass->shader->packed)
             && vkb_readback_takes_words(run->device, output, run->graph->images[image].height))
             return output;
     }
@@ -340,9 +339,9 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
     if (words) {
         memcpy(&known, pass, sizeof known);
         if (run->images[pass->reads[0]]->image.channels == 3)
-            known.shader = vkb_spirv[known.shader].rgb;
+            known.shader = known.shader->rgb;
         if (output && !vkb_readback_is_complete(output))
-            known.shader = vkb_spirv[known.shader].packed;
+            known.shader = known.shader->packed;
         known.constants.finite = reads_finite(run, pass);
         pass = &known;
     }

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const enum vkb_shader line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
-static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
+static const struct vkb_shader *const line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
+static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
 
 // The row of a line blur. `origin` is the position of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
@@ -110,7 +110,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
         return false;
     struct vkb_pass_row line = line_row(choice, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
-        vkb_fullscreen_row(pass->name, VKB_SHADER_enlarge_frag, pass->targets[0]);
+        vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
@@ -218,8 +218,8 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
     if (vkb_is_composite(pass))
         enlarging = vkb_writer_of(choice->graph, pass->reads[1]);
     *fits = enlarging
-         && (enlarging->shader == VKB_SHADER_enlarge_frag
-             || enlarging->shader == VKB_SHADER_enlarge_dispatch);
+         && (enlarging->shader == &vkb_shader_enlarge_frag
+             || enlarging->shader == &vkb_shader_enlarge_dispatch);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -247,7 +247,7 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
     while (radius < chain.vertical_kernel.radius || radius < chain.horizontal_kernel.radius)
         radius *= 2;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    vkb_make_dispatch(&row, VKB_SHADER_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
+    vkb_make_dispatch(&row, &vkb_shader_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row.constants.radius = radius;
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);

@@ -20,7 +20,7 @@ enum {
     MOST_INVOCATIONS = 640,
 };
 
-static const enum vkb_shader shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_lines_comp);
+static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_lines_comp);
 
 static bool group_fits(const struct vkb_device *device, const struct group *group, uint32_t length)
 {

@@ -3,7 +3,8 @@
 
 #include <string.h>
 
-static const enum vkb_shader streaks_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(streaks);
+static const struct vkb_shader *const streaks_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(streaks);
 
 bool vkb_add_streaks(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                      bool *fits, struct vkb_error *error)
@@ -11,7 +12,7 @@ bool vkb_add_streaks(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     struct vkb_pass_row row;
 
-    *fits = pass->shader == VKB_SHADER_streaks_frag && vkb_fits_words(choice, pass)
+    *fits = pass->shader == &vkb_shader_streaks_frag && vkb_fits_words(choice, pass)
          && vkb_has_format_of(choice->graph, pass->reads[0], pass->targets[0]);
     if (!*fits)
         return true;

@@ -6,21 +6,25 @@
 #include <math.h>
 #include <string.h>
 
-static const enum vkb_shader halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
-static const enum vkb_shader double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(double_comp);
-static const enum vkb_shader double_final_shaders[VKB_FORMAT_COUNT] =
+static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
+static const struct vkb_shader *const double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(double_comp);
+static const struct vkb_shader *const double_final_shaders[VKB_FORMAT_COUNT] =
     VKB_BY_FORMAT(double_final_comp);
-static const enum vkb_shader halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
-static const enum vkb_shader halve_taps_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_taps);
-static const enum vkb_shader reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
-static const enum vkb_shader grid_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve_grid);
-static const enum vkb_shader shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
-static const enum vkb_shader godot_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(godot_rows);
-static const enum vkb_shader hdrp_rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(hdrp_rows);
-static const enum vkb_shader hdrp_columns_words[VKB_FORMAT_COUNT] =
+static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
+static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(halve_taps);
+static const struct vkb_shader *const reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
+static const struct vkb_shader *const grid_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(halve_grid);
+static const struct vkb_shader *const shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
+static const struct vkb_shader *const godot_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(godot_rows);
+static const struct vkb_shader *const hdrp_rows_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(hdrp_rows);
+static const struct vkb_shader *const hdrp_columns_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(hdrp_columns);
-static const enum vkb_shader double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
-static const enum vkb_shader double_final_words[VKB_FORMAT_COUNT] =
+static const struct vkb_shader *const double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
+static const struct vkb_shader *const double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
 
 // Sets the shader, and the block of pixels that each invocation writes, for storage images or
@@ -37,8 +41,8 @@ static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pas
 }
 
 static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                          const enum vkb_shader *shaders, const enum vkb_shader *words,
-                          enum vkb_format format)
+                          const struct vkb_shader *const *shaders,
+                          const struct vkb_shader *const *words, enum vkb_format format)
 {
     if (choice->variants == VKB_VARIANTS_CPU) {
         vkb_make_words(row, words[format], DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size),
@@ -115,16 +119,12 @@ static bool add_from_image(const struct vkb_variant_choice *choice, const struct
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
-    switch (pass->shader) {
-    case VKB_SHADER_pyramid_down_frag:
+    if (pass->shader == &vkb_shader_pyramid_down_frag)
         return pass->params.pyramid.step_x == 1.0f && pass->params.pyramid.step_y == 1.0f;
-    case VKB_SHADER_pygfx_down_frag:
-    case VKB_SHADER_blender_down_frag:
-    case VKB_SHADER_box_down_frag:
-        return !pass->constants.masked;
-    default:
-        return false;
-    }
+    return !pass->constants.masked
+        && (pass->shader == &vkb_shader_pygfx_down_frag
+            || pass->shader == &vkb_shader_blender_down_frag
+            || pass->shader == &vkb_shader_box_down_frag);
 }
 
 // Whether the target has exactly half of the size of the image that the pass reads.
@@ -138,7 +138,7 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
 
 // Adds the pass as one of words, which loads the texels of its first image.
 static bool add_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      enum vkb_shader shader, uint32_t columns, uint32_t rows,
+                      const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
                       struct vkb_error *error)
 {
     struct vkb_pass_row row;
@@ -156,7 +156,7 @@ bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vk
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
 
-    *fits = pass->shader == VKB_SHADER_godot_blur_frag
+    *fits = pass->shader == &vkb_shader_godot_blur_frag
          && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
          && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
          && vkb_fits_words(choice, pass);
@@ -178,25 +178,26 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
 // What reduce.comp makes of its taps, as GROUPS_*; 0: it has no such taps.
 static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
 {
-    switch (pass->shader) {
-    case VKB_SHADER_filament_prefilter_frag:
-        return GROUPS_FILAMENT;
-    case VKB_SHADER_hdrp_prefilter_frag:
-        return GROUPS_HDRP;
-    case VKB_SHADER_urp_prefilter_frag:
-        return GROUPS_URP;
-    case VKB_SHADER_unreal_prefilter_frag:
-        return GROUPS_UNREAL;
-    case VKB_SHADER_bevy_prefilter_frag:
-        return GROUPS_BEVY;
-    default:
-        return 0;
-    }
+    static const struct {
+        const struct vkb_shader *shader;
+        enum vkb_mode groups;
+    } rows[] = {
+        {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
+        {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
+        {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
+        {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
+        {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
+    };
+
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
+        if (pass->shader == rows[i].shader)
+            return rows[i].groups;
+    return 0;
 }
 
 // Adds the pass as one of words, and a fused pass that reads the image itself.
 static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                          enum vkb_shader shader, uint32_t columns, uint32_t rows,
+                          const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
                           struct vkb_error *error)
 {
     struct vkb_pass_row row;
@@ -249,7 +250,7 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const uint32_t word = 4 / vkb_formats[format].channel_size;
 
-    *fits = pass->shader == VKB_SHADER_hdrp_blur_frag
+    *fits = pass->shader == &vkb_shader_hdrp_blur_frag
          && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
          && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
     if (!*fits)
@@ -266,19 +267,19 @@ static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
 
     memcpy(row, pass, sizeof *row);
     row->block = VKB_BLOCK_kawase;
-    if (pass->shader == VKB_SHADER_filament_down_frag) {
+    if (pass->shader == &vkb_shader_filament_down_frag) {
         memset(&row->params, 0, sizeof row->params);
         // The distance of the taps is half of the offset.
         params->offset = 2.0f * 1.761629f;
         params->limit = pass->params.pyramid.limit;
         params->row_offset = pass->params.pyramid.row_offset;
-    } else if (pass->shader != VKB_SHADER_kawase_down_frag) {
+    } else if (pass->shader != &vkb_shader_kawase_down_frag) {
         return false;
     }
     const float distance = 0.5f * params->offset;
     const bool next = floorf(0.5f + distance) == 2.0f && floorf(0.5f - distance) == -2.0f;
     row->constants.groups =
-        pass->shader == VKB_SHADER_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
+        pass->shader == &vkb_shader_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
     row->constants.sampling = 0;
     row->constants.radius = next;
     return params->row_offset == 0 && (next || distance <= 0.5f);

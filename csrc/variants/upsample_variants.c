@@ -6,13 +6,18 @@
 #include <stdio.h>
 #include <string.h>
 
-static const enum vkb_shader strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(upsample);
-static const enum vkb_shader final_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(upsample_final);
-static const enum vkb_shader rows_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(filter_rows);
-static const enum vkb_shader columns_shaders[VKB_FORMAT_COUNT] =
+static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(upsample);
+static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(upsample_final);
+static const struct vkb_shader *const rows_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(filter_rows);
+static const struct vkb_shader *const columns_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(filter_columns);
-static const enum vkb_shader gather_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(gather_columns);
-static const enum vkb_shader kawase_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kawase_up);
+static const struct vkb_shader *const gather_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(gather_columns);
+static const struct vkb_shader *const kawase_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(kawase_up);
 
 // The size of an image that is filtered along rows.
 static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
@@ -73,7 +78,7 @@ static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_p
 }
 
 static void make_columns(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                         const enum vkb_shader *shaders)
+                         const struct vkb_shader *const *shaders)
 {
     const enum vkb_format format = choice->graph->images[row->targets[0]].format;
 
@@ -105,7 +110,7 @@ static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row
     const struct vkb_pyramid_params *params = &pass->params.pyramid;
     const int32_t kind = pass->constants.upsample;
 
-    if (pass->shader != VKB_SHADER_pyramid_up_frag || vkb_doubles(pass)
+    if (pass->shader != &vkb_shader_pyramid_up_frag || vkb_doubles(pass)
         || vkb_only_scales(graph, pass))
         return false;
     return (kind == UPSAMPLE_LINEAR || kind == UPSAMPLE_CUBIC || kind == UPSAMPLE_UNIT_TENT)
@@ -114,7 +119,7 @@ static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row
 }
 
 static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                        const enum vkb_shader *shaders)
+                        const struct vkb_shader *const *shaders)
 {
     const enum vkb_format format = choice->graph->images[row->targets[0]].format;
 
@@ -181,7 +186,7 @@ bool vkb_add_upsampled(const struct vkb_variant_choice *choice, const struct vkb
 {
     struct vkb_pass_row row;
 
-    *fits = pass->shader == VKB_SHADER_pyramid_up_frag && !vkb_doubles(pass)
+    *fits = pass->shader == &vkb_shader_pyramid_up_frag && !vkb_doubles(pass)
          && !vkb_only_scales(&choice->plain, pass) && fits_rows(choice, pass, 1)
          && (!pass->constants.add_own
              || vkb_has_format_of(&choice->plain, pass->reads[1], pass->targets[0]));
@@ -210,7 +215,7 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
                   && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
                   && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
 
-    *fits = pass->shader == VKB_SHADER_gather_frag && fits_rows(choice, pass, levels);
+    *fits = pass->shader == &vkb_shader_gather_frag && fits_rows(choice, pass, levels);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -237,7 +242,7 @@ bool vkb_add_kawase_up(const struct vkb_variant_choice *choice, const struct vkb
     const enum vkb_format format = plain->images[pass->targets[0]].format;
     struct vkb_pass_row row;
 
-    *fits = pass->shader == VKB_SHADER_kawase_up_frag
+    *fits = pass->shader == &vkb_shader_kawase_up_frag
          && is_enlarged(plain, pass, params->source_height, params->target_height)
          && plain->images[pass->reads[0]].width <= plain->images[pass->targets[0]].width
          && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])

@@ -68,11 +68,11 @@ bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *p
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
 // Turns a pass over all pixels into a dispatch.
-void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
-                       uint32_t block_height);
+void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                       uint32_t block_width, uint32_t block_height);
 // Turns a pass into a dispatch that accesses its images as words. Each of the ROW_INVOCATIONS
 // invocations of a workgroup writes a block of `columns` x `rows` pixels.
-void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+void vkb_make_words(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
                     uint32_t rows);
 // Whether all images that the pass accesses are small enough for a view of their words.
 bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);

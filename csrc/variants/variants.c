@@ -61,17 +61,17 @@ void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
         row->reads[--row->read_count] = 0;
 }
 
-void vkb_make_dispatch(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t block_width,
-                       uint32_t block_height)
+void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                       uint32_t block_width, uint32_t block_height)
 {
     row->geometry = VKB_GEOMETRY_DISPATCH;
-    row->vertex = (enum vkb_shader)0;
+    row->vertex = NULL;
     row->shader = shader;
     row->block_width = block_width;
     row->block_height = block_height;
 }
 
-void vkb_make_words(struct vkb_pass_row *row, enum vkb_shader shader, uint32_t columns,
+void vkb_make_words(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
                     uint32_t rows)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
@@ -109,11 +109,14 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
              : NULL;
 }
 
-static const enum vkb_shader blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
-static const enum vkb_shader threshold_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(threshold);
-static const enum vkb_shader kino_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(kino_bright);
-static const enum vkb_shader highlights_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(highlights);
-static const enum vkb_shader scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
+static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
+static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(threshold);
+static const struct vkb_shader *const kino_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(kino_bright);
+static const struct vkb_shader *const highlights_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(highlights);
+static const struct vkb_shader *const scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
 
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -133,28 +136,23 @@ static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass
 
 // The shaders for a pass from an image of the target's size and format; NULL: it is none of those
 // that need no filter then.
-static const enum vkb_shader *unfiltered_shaders(const struct vkb_graph *graph,
-                                                 const struct vkb_pass_row *pass)
+static const struct vkb_shader *const *unfiltered_shaders(const struct vkb_graph *graph,
+                                                          const struct vkb_pass_row *pass)
 {
     if (pass->constants.masked || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
         || !vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
         return NULL;
-    switch (pass->shader) {
-    case VKB_SHADER_kino_prefilter_frag:
-        return kino_shaders;
-    case VKB_SHADER_blender_prefilter_frag:
-        return highlights_shaders;
-    case VKB_SHADER_pyramid_up_frag:
-        return vkb_only_scales(graph, pass) ? scale_shaders : NULL;
-    default:
-        return NULL;
-    }
+    return pass->shader == &vkb_shader_kino_prefilter_frag    ? kino_shaders
+         : pass->shader == &vkb_shader_blender_prefilter_frag ? highlights_shaders
+         : pass->shader == &vkb_shader_pyramid_up_frag && vkb_only_scales(graph, pass)
+             ? scale_shaders
+             : NULL;
 }
 
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first
 // `read_count` images.
-static void load_pixels(struct vkb_pass_row *row, enum vkb_shader shader, enum vkb_format format,
-                        uint32_t read_count)
+static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                        enum vkb_format format, uint32_t read_count)
 {
     vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
     vkb_drop_reads(row, read_count);
@@ -165,13 +163,12 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
 {
     const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
-    const enum vkb_shader *unfiltered = unfiltered_shaders(graph, pass);
+    const struct vkb_shader *const *unfiltered = unfiltered_shaders(graph, pass);
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
     if (choice->variants == VKB_VARIANTS_GPU)
-        vkb_make_dispatch(&row, vkb_spirv[pass->shader].dispatch, PIXEL_INVOCATIONS,
-                          PIXEL_INVOCATIONS);
+        vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_words(choice, pass) && blends(graph, pass))
         load_pixels(&row, blend_shaders[format], format, 2);
     else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
@@ -184,14 +181,14 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
 static bool add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        bool *fits, struct vkb_error *error)
 {
-    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN
-         && vkb_spirv[pass->shader].dispatch != pass->shader
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
     return !*fits || vkb_add_fullscreen(choice, pass, error);
 }
 
-static const enum vkb_shader fft_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft);
-static const enum vkb_shader fft_stored_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft_stored);
+static const struct vkb_shader *const fft_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft);
+static const struct vkb_shader *const fft_stored_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(fft_stored);
 
 // A storage buffer must reach the complete target: an invocation stores to places far apart.
 static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)

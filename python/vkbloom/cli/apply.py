@@ -266,12 +266,14 @@ def command(  # noqa: PLR0915  one step after the other
                 )
                 with written_behind() as write_next, contextlib.closing(results):
                     for (picture, frames), (name, target) in zip(bar, files, strict=True):
+                        said = [*no_bloom.empty_stages(frames, settings)]
                         if no_bloom.is_without(frames):
-                            said = no_bloom.reason(settings, no_bloom.brightest_of(picture.pixels))
-                        else:
-                            said = no_bloom.darkening(picture.pixels, frames)
-                        if said:
-                            note(f"{name}: {said}" if several else said)
+                            brightest = no_bloom.brightest_of(picture.pixels)
+                            said.insert(0, no_bloom.reason(settings, brightest))
+                        elif text := no_bloom.darkening(picture.pixels, frames):
+                            said.insert(0, text)
+                        for text in said:
+                            note(f"{name}: {text}" if several else text)
                         kept = no_bloom.only(frames, names)
                         write_next(functools.partial(write, picture, kept, target))
     if several:

@@ -1,26 +1,38 @@
-"""Notes for settings with which the bloom is zero, or darkens what it should make glow."""
+"""Notes for a bloom or a stage of glare that is zero, and for a bloom that darkens."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
+from vkbloom.glare.base import GlareLight
 
 # Highlights that keep this share are as bright as before: a level of 8 bits near white is 0.9 %.
 _DARKER = 0.985
 
-__all__ = ["brightest_of", "darkening", "is_without", "only", "reason", "with_bloom"]
+__all__ = [
+    "brightest_of",
+    "darkening",
+    "empty_stages",
+    "is_without",
+    "only",
+    "reason",
+    "with_bloom",
+]
 
 
 def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
-    """Return the framebuffers to request: also the bloom, unless it is turned off."""
+    """Return the framebuffers to request: also bloom and glare, unless the bloom is off."""
     if isinstance(names, str):
         return names
-    return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
+    if not settings.bloom:
+        return [*names]
+    noted = ["bloom", *(name for name, _ in _stages(settings))]
+    return [*names, *(name for name in noted if name not in names)]
 
 
 def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
@@ -78,3 +90,25 @@ def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
     if settings.threshold is not None:
         text += f": no value is above the threshold {settings.threshold:g}"
     return text if brightest is None else f"{text}; the brightest value is {brightest:.3g}"
+
+
+def empty_stages(frames: vkbloom.Frames, settings: vkbloom.Settings) -> Iterator[str]:
+    """Yield a text for each stage of glare whose threshold leaves nothing."""
+    for name, stage in _stages(settings):
+        if name in frames and not frames[name][:, :, :3].any():
+            halved = f" after {stage.halvings} halvings" * bool(stage.halvings)
+            hint = ", in which small highlights vanish; use fewer" * bool(stage.halvings)
+            yield (
+                f"{name} is zero everywhere: no value is above its threshold "
+                f"{stage.threshold:g}{halved}{hint or '; use a lower one'}"
+            )
+
+
+def _stages(settings: vkbloom.Settings) -> Iterator[tuple[str, GlareLight]]:
+    """Yield the stages that have a threshold, with the names of their framebuffers."""
+    kinds = [stage.stage for stage in settings.glare]
+    for index, stage in enumerate(settings.glare):
+        if isinstance(stage, GlareLight) and stage.threshold > 0:
+            kind = stage.stage
+            number = f"_{kinds[:index].count(kind)}" if kinds.count(kind) > 1 else ""
+            yield f"{kind}{number}", stage

@@ -18,7 +18,6 @@ from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
 from vkbloom.fits.search import Search
 from vkbloom.fits.space import Bounds, Space, space_of
-from vkbloom.grid.plan import UNFUSED
 from vkbloom.image import Image
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
@@ -249,7 +248,7 @@ def _costs(renderer: Renderer, stage: _Stage, space: Space, framebuffer: str) ->
             point = space.origin.copy()
             point[index] = place
             one = space.settings(point)
-            steps.append((source, _core.plan(source, one, (framebuffer,), UNFUSED)))
+            steps.append((source, _core.plan(source, one, (framebuffer,))))
         costs.append(max(map(len, _core.dry_run(tuple(steps))[1:])))
         if not costs[-1]:
             raise ValueError(

@@ -28,9 +28,6 @@ __all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
-#: The variants without fused passes.
-UNFUSED: Final = "fragment"
-
 _CHANNELS: Final = ("r", "g", "b", "a")
 
 
@@ -251,7 +248,7 @@ def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.P
     points = [grid.point(index) for index in path]
     sources = {place: grid.source.for_core(place) for place in {point.place for point in points}}
     return tuple(
-        (sources[point.place], _core.plan(sources[point.place], point.settings, None, UNFUSED))
+        (sources[point.place], _core.plan(sources[point.place], point.settings, None))
         for point in points
     )
 
@@ -285,7 +282,7 @@ def _graph_of(
     wanted = grid.wanted
     names = None if wanted == "all" else tuple(name for name in wanted if name in found)
     source = grid.source.for_core(point.place)
-    alone = _core.plan(source, point.settings, names, UNFUSED)
+    alone = _core.plan(source, point.settings, names)
     return found, len({name for name, *_ in alone.passes})
 
 
