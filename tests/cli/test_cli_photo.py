@@ -174,7 +174,7 @@ class TestRead:
 
     @pytest.mark.parametrize("value", [0.5, 2000.0, float("nan")])
     def test_out_of_range(self, value: float) -> None:
-        with pytest.raises(ValueError, match="expand: .* is out of range, 1 to 1024"):
+        with pytest.raises(ValueError, match=r"expand: .* is out of range, 1 to 1024"):
             vkbloom.read("missing.png", expand=value)
 
 
