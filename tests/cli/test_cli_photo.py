@@ -54,7 +54,7 @@ def sunset() -> Image:
     down, across = np.mgrid[:SIDE, :SIDE] / SIDE
     sun = np.exp(-((np.hypot(down - 0.6, across - 0.5) / 0.08) ** 2))[..., None] * 255
     sky = np.stack([230 * down, 120 + 60 * down, 200 * (1 - down)], axis=2)
-    return np.clip(sky + sun, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(sky + sun, 0, 255), np.uint8)
 
 
 # Ten kinds of photographs; those of scikit-image are in its wheel.
@@ -114,7 +114,7 @@ def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.R
 
 def test_what_the_first_user_tried_says_so(tmp_path: Path) -> None:
     path = png(tmp_path / "city.png", room())
-    words = [path, tmp_path / "o.png", "--threshold", "0.7", "--intensity", "0.5"]
+    words: list[str | Path] = [path, tmp_path / "o.png", "--threshold", "0.7", "--intensity", "0.5"]
     assert apply(*words).stderr == ""
     result = apply(*words, "--preset", "bevy_natural")
     assert result.exit_code == 0
