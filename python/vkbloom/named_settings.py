@@ -82,6 +82,8 @@ class _Presets(dict[str, "Settings"]):
 #:   energy of its centre, `vkbloom.psf.unreal`. The kernel image is that of ``"iris_6"``.
 #: - ``"camera_lens"``: the scattered light of a lens with 14 surfaces, `vkbloom.psf.harvey_shack`,
 #:   which is 2.5 % of all light.
+#: - ``"photo"``: for pictures without values above 1, whose highlights ``vkbloom.read(...,
+#:   expand=4)`` expands: Bevy's chain, added, with a soft threshold at 1. Nothing becomes darker.
 #: - ``"iris_6"``: diffraction at an iris of six blades at f/8, `vkbloom.psf.aperture`.
 presets: Mapping[str, Settings] = MappingProxyType(
     _Presets(
@@ -123,6 +125,7 @@ presets: Mapping[str, Settings] = MappingProxyType(
                 harvey_shack(), boundary="edge", composite="mix", intensity=0.025
             ),
             "iris_6": Convolution(aperture(iris(blades=6)), boundary="edge", composite="mix"),
+            "photo": BevyBloom(composite="add", threshold=1.0, knee=0.5),
         }
     )
 )

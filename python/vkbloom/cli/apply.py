@@ -48,6 +48,7 @@ from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import divided
+from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.settings import Encoding
 
@@ -99,6 +100,13 @@ from vkbloom.settings import Encoding
     "of at least 64 million pixels]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
+@click.option(
+    "--expand",
+    metavar="X",
+    type=click.FloatRange(1, 1024),
+    help="What the highlights of a file of integers are expanded up to, so that they can glow; 1: "
+    f"they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
+)
 @subimage_option
 @layer_option
 @glow_options
@@ -116,6 +124,7 @@ def command(  # noqa: PLR0915  one step after the other
     raw: bool,
     half: bool | None,
     overwrite: bool,
+    expand: float | None,
     subimage: int,
     layer: str | None,
     mask: str | None,
@@ -131,8 +140,9 @@ def command(  # noqa: PLR0915  one step after the other
     be patterns of numbers (f.%04d.exr, f.####.exr) or - for a pipe. IN may also be a glob, or
     several files.
 
-    The settings are those of the preset bevy_natural, unless --preset or --method selects others.
-    Further options change them.
+    Without --preset and --method, files of integers (JPEG, PNG) start from the preset photo, whose
+    bloom is added, and their highlights are expanded; see --expand. Files of floats start from
+    bevy_natural. Further options change the settings.
 
     Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
     with Rec. 709 colours. The decoding uses the ICC profile, the cICP chunk or the gamma of the
@@ -181,7 +191,9 @@ def command(  # noqa: PLR0915  one step after the other
         def taken(source: str) -> Picture:
             file = _piped_in(folder) if source == PIPE else source
             try:
-                picture = read_picture(file, subimage, input_colour, layer=layer, raw=raw)
+                picture = read_picture(
+                    file, subimage, input_colour, layer=layer, raw=raw, expand=expand
+                )
             except ValueError as error:
                 # The user does not know the temporary folder of standard input.
                 raise ValueError(str(error).replace(f"{folder}{os.sep}", "")) from error
@@ -198,7 +210,7 @@ def command(  # noqa: PLR0915  one step after the other
                 for path in written:
                     click.echo(f"wrote {path}")
 
-        how = Large(mask, emission, layer, subimage, input_colour, raw, half)
+        how = Large(mask, emission, layer, subimage, input_colour, raw, half, expand)
 
         def by_rows(name: str) -> bool:
             is_piped = PIPE in (name, out)
@@ -261,6 +273,8 @@ def command(  # noqa: PLR0915  one step after the other
                         if no_bloom.is_without(frames):
                             brightest = no_bloom.brightest_of(picture.pixels)
                             said.insert(0, no_bloom.reason(settings, brightest))
+                        elif text := no_bloom.darkening(picture.pixels, frames):
+                            said.insert(0, text)
                         for text in said:
                             note(f"{name}: {text}" if several else text)
                         kept = no_bloom.only(frames, names)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import glob
 import os
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr, suppress
 from typing import Any, Final
 
 import click
@@ -97,13 +99,14 @@ def read_picture(
     *,
     layer: str | None = None,
     raw: bool = False,
+    expand: float | None = None,
 ) -> Picture:
     """Read an image file, decode it for a renderer, and print notes about its contents."""
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise not_of_bytes(source, stored.numbers[0])
-    picture = decoded(stored, source, colour, raw=raw)
+    picture = decoded(stored, source, colour, raw=raw, expand=expand)
     note_parts(source, stored, layer)
     note_specials(source, int(np.isnan(picture.values).sum()), int(np.isinf(picture.values).sum()))
     for text in picture.notes:
@@ -112,13 +115,38 @@ def read_picture(
 
 
 def decoded(
-    stored: StoredImage, source: str, colour: Colour | None, *, raw: bool = False
+    stored: StoredImage,
+    source: str,
+    colour: Colour | None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
 ) -> Picture:
     """Decode an image as `image_reading.decode` does; a ValueError names the file."""
     try:
-        return image_reading.decode(stored, colour, raw=raw)
+        return image_reading.decode(stored, colour, raw=raw, expand=expand)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
+
+
+def has_integers(source: str) -> bool:
+    """Whether a file holds integers; of a folder or a glob the first file, of a pipe its content.
+
+    False for what cannot be read: the error comes from the command that reads it.
+    """
+    if source == "-":
+        peek = getattr(sys.stdin.buffer, "peek", None)
+        head = bytes(peek(4)[:4]) if peek is not None else b""
+        return bool(head) and not head.startswith((b"v/1\x01", b"#?"))
+    files = [source]
+    if os.path.isdir(source):
+        files = [os.path.join(source, name) for name in sorted(os.listdir(source))]
+    elif not os.path.exists(source):
+        files = sorted(glob.glob(re.sub(r"%0?\d*d", "*", source)))
+    for file in files:
+        with suppress(OSError, ValueError), image_reading.opened(file, "Reading images") as reader:
+            return str(reader.spec().format) in ("uint8", "uint16")
+    return False
 
 
 def not_of_bytes(source: str, numbers: str) -> click.UsageError:

@@ -48,6 +48,7 @@ class Large(NamedTuple):
     raw : bool
     half : bool or None
         None: 8-bit files of `HALVED` pixels or more become half floats.
+    expand : float or None
     """
 
     mask: str | None = None
@@ -57,6 +58,7 @@ class Large(NamedTuple):
     colour: Colour | None = None
     raw: bool = False
     half: bool | None = None
+    expand: float | None = None
 
 
 def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
@@ -213,7 +215,9 @@ class _Reading:
         return Band(image, glow, values)
 
     def _decoded(self, stored: StoredImage, colour: Colour | None, notes: _Notes) -> Picture:
-        picture = decoded(stored, notes.file, colour, raw=self._how.raw)
+        # Only the picture's own highlights are expanded, not those of an emission.
+        expand = self._how.expand if notes.file == self._source else None
+        picture = decoded(stored, notes.file, colour, raw=self._how.raw, expand=expand)
         notes.add(picture)
         if self._is_blended:
             picture = premultiplied(picture)

@@ -1,4 +1,4 @@
-"""Notes for settings with which the bloom or a stage of glare is zero."""
+"""Notes for a bloom or a stage of glare that is zero, and for a bloom that darkens."""
 
 from __future__ import annotations
 
@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.glare.base import GlareLight
 
-__all__ = ["brightest_of", "empty_stages", "is_without", "only", "reason", "with_bloom"]
+# Highlights that keep this share are as bright as before: a level of 8 bits near white is 0.9 %.
+_DARKER = 0.985
+
+__all__ = [
+    "brightest_of",
+    "darkening",
+    "empty_stages",
+    "is_without",
+    "only",
+    "reason",
+    "with_bloom",
+]
 
 
 def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
@@ -46,6 +57,31 @@ def brightest_of(pixels: NDArray[Any]) -> float:
     colours = pixels[:, :, :3]
     scale = np.float32(255 if pixels.dtype == np.uint8 else 1)
     return float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
+
+
+def darkening(pixels: NDArray[Any], frames: vkbloom.Frames) -> str:
+    """Return a text if the bloom darkens the highlights that a display shows; "" if not.
+
+    Highlights are the pixels of at least 0.9 of the brightest value, or of white. Curves are left
+    out: what they darken is asked for.
+    """
+    settings = frames.settings
+    if not settings.bloom or (settings.tonemap, settings.exposure) != ("none", 0):
+        return ""
+    before, after = (
+        np.clip(np.nan_to_num(image[:, :, :3].astype(np.float32)) / scale, 0, 1).max(axis=2)
+        for image, scale in (
+            (one, 255 if one.dtype == np.uint8 else 1) for one in (pixels, frames["final"])
+        )
+    )
+    lit = before >= 0.9 * max(float(before.max()), 1e-6)
+    change = float(after[lit].mean()) / max(float(before[lit].mean()), 1e-6)
+    if settings.encoding != "none" or change > _DARKER:
+        return ""
+    return (
+        f"the bloom darkens the highlights to {100 * change:.0f} % of their light: the composite "
+        f"{settings.composite} takes light from them; add it with --composite add or --preset photo"
+    )
 
 
 def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:

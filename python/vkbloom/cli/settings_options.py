@@ -10,12 +10,16 @@ import click
 
 import vkbloom
 from vkbloom.cli import fields
+from vkbloom.cli.image_files import has_integers
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.fields import fields_of
+from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.registry import METHODS
 
 #: The preset for images if there is no --preset and no --method.
 PRESET_OF_IMAGES: Final = "bevy_natural"
+#: The preset for image files of integers, where a command can expand their highlights.
+PRESET_OF_PHOTOS: Final = "photo"
 _PRESET_OF_SCENES: Final = "tutorial"
 # Names of the commands' arguments for image files; explore and grid may be called without one.
 _IMAGES: Final = ("source", "sources", "images")
@@ -28,7 +32,8 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--preset",
         type=click.Choice(list(vkbloom.presets)),
         help="Published settings to start from "
-        f"[default {PRESET_OF_IMAGES} for images, {_PRESET_OF_SCENES} for scenes]",
+        f"[default {PRESET_OF_IMAGES} for images, {_PRESET_OF_SCENES} for scenes; apply: "
+        f"{PRESET_OF_PHOTOS} for files of integers]",
     )
     @click.option(
         "--method",
@@ -49,6 +54,10 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     ) -> object:
         if preset is None and method is None:
             preset = default_preset(any(rest.get(name) for name in _IMAGES))
+            if "expand" in rest and not rest.get("raw") and has_integers(_first_of(rest)):
+                preset = PRESET_OF_PHOTOS
+        if preset == PRESET_OF_PHOTOS and "expand" in rest and rest["expand"] is None:
+            rest["expand"] = PHOTO_EXPANSION
         begun = _begun(preset, method)
         if added:
             shared["glare"] = (*shared.get("glare", begun.glare), *added)
@@ -84,6 +93,12 @@ def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(added=tuple(added), **rest)
 
     return run
+
+
+def _first_of(rest: dict[str, Any]) -> str:
+    """Return the first of a command's image files."""
+    names = next(value for name in _IMAGES if (value := rest.get(name)))
+    return str(names if isinstance(names, str) else names[0])
 
 
 def default_preset(is_image: bool) -> str:

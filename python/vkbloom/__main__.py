@@ -1,0 +1,8 @@
+"""``python -m vkbloom``: the command line."""
+
+from __future__ import annotations
+
+from vkbloom.cli import main
+
+if __name__ == "__main__":
+    main()

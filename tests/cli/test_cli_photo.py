@@ -1,0 +1,195 @@
+"""Photographs on the command line: highlights are expanded and glow, and nothing becomes darker."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom.cli.program import program
+from vkbloom.io.expansion import KNEE, expanded
+from vkbloom.io.image_reading import load
+from vkbloom.io.srgb import decode_srgb
+
+pytest.importorskip("OpenImageIO")
+data = pytest.importorskip("skimage.data")
+
+Image = NDArray[Any]
+SIDE = 160
+
+
+def night() -> Image:
+    """Return lamps of several colours before a dark wall."""
+    image = np.full((SIDE, SIDE, 3), 12, np.uint8)
+    for index, colour in enumerate(((255, 240, 200), (255, 60, 40), (255, 255, 255))):
+        image[30 + 40 * index : 36 + 40 * index, 70:78] = colour
+    return image
+
+
+def room() -> Image:
+    """Return bright windows in a dark wall."""
+    image = np.full((SIDE, SIDE, 3), (90, 80, 70), np.uint8)
+    image[30:90, 20:60] = image[30:90, 100:140] = 254
+    return image
+
+
+def snow() -> Image:
+    """Return a field that is nearly white, with trees."""
+    noise = np.random.default_rng(0).integers(225, 256, (SIDE, SIDE, 1))
+    image = np.repeat(noise, 3, axis=2).astype(np.uint8)
+    image[60:120, ::20] = 30
+    return image
+
+
+def sunset() -> Image:
+    """Return a sun, and a gradient from orange to blue."""
+    down, across = np.mgrid[:SIDE, :SIDE] / SIDE
+    sun = np.exp(-((np.hypot(down - 0.6, across - 0.5) / 0.08) ** 2))[..., None] * 255
+    sky = np.stack([230 * down, 120 + 60 * down, 200 * (1 - down)], axis=2)
+    return np.asarray(np.clip(sky + sun, 0, 255), np.uint8)
+
+
+# Ten kinds of photographs; those of scikit-image are in its wheel.
+PHOTOS: dict[str, Callable[[], Image]] = {
+    "night": night,
+    "room": room,
+    "snow": snow,
+    "sunset": sunset,
+    "astronaut": lambda: data.astronaut()[::3, ::3],
+    "coffee": lambda: data.coffee()[::3, ::3],
+    "cat": lambda: data.chelsea()[::2, ::2],
+    "rocket": lambda: data.rocket()[::2, ::2],
+    "galaxies": lambda: data.hubble_deep_field()[::5, ::5],
+    "moon": lambda: np.repeat(data.moon()[::3, ::3, None], 3, axis=2),
+}
+
+
+def apply(*words: str | Path) -> Result:
+    return CliRunner().invoke(program, ["apply", *map(str, words)])
+
+
+def png(path: Path, image: Image) -> Path:
+    return vkbloom.write(path, np.ascontiguousarray(image))
+
+
+@pytest.mark.parametrize("name", PHOTOS)
+def test_nothing_becomes_darker(name: str, tmp_path: Path) -> None:
+    image = PHOTOS[name]()
+    result = apply(png(tmp_path / "a.png", image), tmp_path / "b.png")
+    assert result.exit_code == 0, result.output
+    after = load(tmp_path / "b.png").pixels.astype(int)
+    assert (after - image).min() >= -1
+    has_lights = (image.max(axis=2) == 255).mean() > 1e-3
+    if has_lights:
+        assert (after - image).mean() > 0.1
+        assert result.stderr == ""
+
+
+def test_lights_glow(tmp_path: Path) -> None:
+    image = night()
+    assert apply(png(tmp_path / "a.png", image), tmp_path / "b.png").exit_code == 0
+    after = load(tmp_path / "b.png").pixels.astype(int)
+    # Beside the red lamp the wall is red; far from all lamps it is as before.
+    red, green, blue = after[73, 84] - image[73, 84]
+    assert red > 10 > max(green, blue)
+    assert np.abs(after[:4, :4] - image[:4, :4]).max() <= 2
+
+
+def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.Renderer) -> None:
+    path = png(tmp_path / "a.png", room())
+    assert apply(path, tmp_path / "b.png").exit_code == 0
+    photo = vkbloom.read(path, expand=4)
+    final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
+    written = vkbloom.write(tmp_path / "c.png", final)
+    np.testing.assert_array_equal(load(tmp_path / "b.png").pixels, load(written).pixels)
+
+
+def test_what_the_first_user_tried_says_so(tmp_path: Path) -> None:
+    path = png(tmp_path / "city.png", room())
+    words: list[str | Path] = [path, tmp_path / "o.png", "--threshold", "0.7", "--intensity", "0.5"]
+    assert apply(*words).stderr == ""
+    result = apply(*words, "--preset", "bevy_natural")
+    assert result.exit_code == 0
+    assert result.stderr.startswith("vkbloom: note: the bloom darkens the highlights to ")
+    assert result.stderr.endswith("add it with --composite add or --preset photo\n")
+
+
+def test_a_bloom_of_nothing_says_so(tmp_path: Path) -> None:
+    dark = np.full((32, 32, 3), 100, np.uint8)
+    result = apply(png(tmp_path / "a.png", dark), tmp_path / "b.png", "--preset", "kino")
+    assert "vkbloom: note: the bloom is zero everywhere" in result.stderr
+
+
+def test_expand(tmp_path: Path) -> None:
+    path = png(tmp_path / "a.png", room())
+    files = {value: tmp_path / f"{value}.exr" for value in ("1", "2", "8")}
+    for value, file in files.items():
+        assert apply(path, file, "--expand", value, "--no-bloom").exit_code == 0
+    decoded = decode_srgb(room().astype(np.float32) / 255)
+    np.testing.assert_allclose(vkbloom.read(files["1"]), decoded, atol=1e-3)
+    largest = [float(vkbloom.read(file).max()) for file in files.values()]
+    assert largest == sorted(largest)
+    assert largest[0] < 1 < largest[1] < 2 < largest[2] < 8
+    assert apply(path, tmp_path / "o.png", "--expand", "0.5").exit_code == 2
+
+
+class TestRead:
+    def test_formula(self, tmp_path: Path) -> None:
+        levels = np.arange(256, dtype=np.uint8)
+        path = png(tmp_path / "a.png", np.repeat(levels[None, :, None], 3, axis=2))
+        plain, found = vkbloom.read(path), vkbloom.read(path, expand=4)
+        steep = 1 / (1 - KNEE) - 1 / (4 - KNEE)
+        over = np.maximum(plain.astype(np.float64) - KNEE, 0)
+        expected = np.where(plain > KNEE, KNEE + over / (1 - steep * over), plain)
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+        assert found.max() == pytest.approx(4, rel=1e-5)
+        for off in (None, 1):
+            np.testing.assert_array_equal(vkbloom.read(path, expand=off), plain)
+
+    def test_it_is_the_inverse_of_the_compression(self) -> None:
+        bright = np.linspace(0, 4, 50, dtype=np.float32)[None, :, None].repeat(3, axis=2)
+        steep = 1 / (1 - KNEE) - 1 / (4 - KNEE)
+        over = np.maximum(bright - KNEE, 0)
+        compressed = np.where(bright > KNEE, KNEE + over / (1 + steep * over), bright)
+        np.testing.assert_allclose(expanded(compressed, 4.0), bright, rtol=1e-4)
+
+    def test_hue_is_kept(self) -> None:
+        red = np.array([[[0.95, 0.19, 0.095]]], np.float32)
+        found = expanded(red, 8.0)
+        np.testing.assert_allclose(found / found[0, 0, 0], red / red[0, 0, 0], rtol=1e-5)
+        assert found[0, 0, 0] > 1
+
+    def test_floats_stay(self, tmp_path: Path) -> None:
+        image = np.random.default_rng(0).random((4, 4, 3), np.float32) * 3
+        path = vkbloom.write(tmp_path / "a.exr", image)
+        np.testing.assert_array_equal(vkbloom.read(path, expand=4), image)
+
+    @pytest.mark.parametrize("value", [0.5, 2000.0, float("nan")])
+    def test_out_of_range(self, value: float) -> None:
+        with pytest.raises(ValueError, match=r"expand: .* is out of range, 1 to 1024"):
+            vkbloom.read("missing.png", expand=value)
+
+
+def test_files_of_floats_start_from_bevy_natural(
+    tmp_path: Path, renderer: vkbloom.Renderer
+) -> None:
+    image = np.random.default_rng(0).random((24, 32, 3), np.float32) * 2
+    path = vkbloom.write(tmp_path / "a.exr", image)
+    assert apply(path, tmp_path / "b.exr").exit_code == 0
+    expected = renderer.apply(image, vkbloom.presets["bevy_natural"])["final"]
+    np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
+
+
+def test_python_m_vkbloom() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "vkbloom", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip().endswith(vkbloom.__version__)
