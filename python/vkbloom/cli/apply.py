@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom.cli import no_bloom
+from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
 from vkbloom.cli.glow_options import (

@@ -8,23 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import vkbloom
+from vkbloom.frames import Frames
+from vkbloom.settings import Settings
 
 __all__ = ["brightest_of", "is_without", "only", "reason", "with_bloom"]
 
 
-def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
+def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
     """Return the framebuffers to request: also the bloom, unless it is turned off."""
     if isinstance(names, str):
         return names
     return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
 
 
-def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
+def only(frames: Frames, names: str | Sequence[str]) -> Frames:
     """Return frames with only these framebuffers; "all": with all."""
     if isinstance(names, str) or set(frames) == set(names):
         return frames
-    return vkbloom.Frames(
+    return Frames(
         {name: array for name, array in frames.items() if name in names},
         timings=frames.timings,
         settings=frames.settings,
@@ -32,7 +33,7 @@ def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
     )
 
 
-def is_without(frames: vkbloom.Frames) -> bool:
+def is_without(frames: Frames) -> bool:
     """Whether the frames have a bloom that is zero everywhere."""
     return "bloom" in frames and not frames["bloom"][:, :, :3].any()
 
@@ -44,7 +45,7 @@ def brightest_of(pixels: NDArray[Any]) -> float:
     return float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
 
 
-def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
+def reason(settings: Settings, brightest: float | None = None) -> str:
     """Return a text that the bloom is zero, with the reason if it is known."""
     text = "the bloom is zero everywhere"
     if settings.threshold is not None:
