@@ -75,7 +75,7 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
     if (instance)
         vkb_instance_close(instance);
     if (!done)
-        vkb_instance_explain_fork(&error);
+        vkb_instance_explain(&error);
     Py_END_ALLOW_THREADS
     if (!done)
         return vkb_raise(vkb_module_state(module), &error);

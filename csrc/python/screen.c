@@ -46,7 +46,7 @@ PyObject *vkb_close_screen(PyObject *object, PyObject *number)
     if (done) {
         // A closed renderer has destroyed it, one with a lost device will.
         if (!renderer->device.lost && vkb_require_screen(renderer, screen, &error)) {
-            done = vkb_submissions_wait(&renderer->device, &renderer->frame.submissions, &error);
+            done = vkb_frame_end(&renderer->device, &renderer->frame, &error);
             if (done)
                 vkb_screen_destroy(&renderer->device, screen, &renderer->frame.screens);
         }

@@ -394,7 +394,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     VkSemaphore rendered = VK_NULL_HANDLE;
 
     if (run->show) {
-        if (!vkb_screen_acquire(device, run->show, submission->commands.available, error))
+        if (!vkb_screen_acquire(device, &run->frame->submissions, run->show,
+                                submission->commands.available, error))
             return false;
         if (!run->show->acquired)
             return true;
@@ -575,5 +576,13 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
 
 bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
 {
-    return vkb_submissions_end(device, &frame->submissions, error);
+    if (!vkb_submissions_end(device, &frame->submissions, error))
+        return false;
+    // A lost device has ended everything, except one that is lost because it does not end.
+    if (!frame->screens || (device->lost && !device->timed_out))
+        return true;
+    // The first wait may fail for lack of memory, too.
+    return vkb_device_wait_idle(device, error)
+        || (error->kind != VKB_ERROR_INTERRUPTED && error->result != VK_TIMEOUT
+            && (vkb_device_wait_idle(device, error) || error->result == VK_ERROR_DEVICE_LOST));
 }

@@ -92,7 +92,6 @@ void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *scre
     while (*screens != screen)
         screens = &(*screens)->next;
     *screens = screen->next;
-    (void)VK_RESULT(device->vk.vkQueueWaitIdle(device->queue));
     destroy_swapchain(device, screen);
     if (screen->surface)
         device->instance->vk.vkDestroySurfaceKHR(device->instance->handle, screen->surface, NULL);
@@ -154,13 +153,15 @@ static bool create_images(const struct vkb_device *device, struct vkb_screen *sc
 }
 
 // Creates the swapchain as large as the surface is now; none if the surface has no area.
-static bool renew(const struct vkb_device *device, struct vkb_screen *screen,
-                  const struct vkb_show *show, struct vkb_error *error)
+static bool renew(struct vkb_device *device, struct vkb_screen *screen, const struct vkb_show *show,
+                  struct vkb_submissions *submissions, struct vkb_error *error)
 {
     VkSurfaceCapabilitiesKHR surface;
     VkFormat format;
 
-    if (!VK(error, device->vk.vkQueueWaitIdle(device->queue))
+    if ((screen->swapchain
+         && !(vkb_submissions_wait(device, submissions, error)
+              && vkb_device_wait_idle(device, error)))
         || !VK(error, device->instance->vk.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
                           device->adapter.physical, screen->surface, &surface)))
         return false;
@@ -202,8 +203,8 @@ static bool renew(const struct vkb_device *device, struct vkb_screen *screen,
     return screen->swapchain && create_images(device, screen, extent, error);
 }
 
-bool vkb_screen_acquire(const struct vkb_device *device, struct vkb_show *show,
-                        VkSemaphore available, struct vkb_error *error)
+bool vkb_screen_acquire(struct vkb_device *device, struct vkb_submissions *submissions,
+                        struct vkb_show *show, VkSemaphore available, struct vkb_error *error)
 {
     const uint64_t patience = 1000000000;  // ns; some compositors give a hidden window no image
     struct vkb_screen *screen = show->screen;
@@ -213,7 +214,7 @@ bool vkb_screen_acquire(const struct vkb_device *device, struct vkb_show *show,
 
     // Until the image is presented: without that, it comes back with its swapchain alone.
     screen->stale = true;
-    if (!fits && !renew(device, screen, show, error))
+    if (!fits && !renew(device, screen, show, submissions, error))
         return false;
     if (!screen->swapchain)
         return true;

@@ -3,6 +3,7 @@
 #ifndef VKB_SCREEN_H
 #define VKB_SCREEN_H
 
+#include "run/submission.h"
 #include "vulkan/memory.h"
 
 enum { VKB_MAX_SCREEN_IMAGES = 16 };
@@ -35,13 +36,13 @@ struct vkb_show {
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceKHR surface,
                                      bool mailbox, struct vkb_screen **screens,
                                      struct vkb_error *error);
-// Waits until the queue is idle. The submissions that show something must be over.
+// After vkb_device_wait_idle, if something was shown.
 void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *screen,
                         struct vkb_screen **screens);
 
 // Acquires an image. `available` is signalled when the image can be written.
-bool vkb_screen_acquire(const struct vkb_device *device, struct vkb_show *show,
-                        VkSemaphore available, struct vkb_error *error);
+bool vkb_screen_acquire(struct vkb_device *device, struct vkb_submissions *submissions,
+                        struct vkb_show *show, VkSemaphore available, struct vkb_error *error);
 // Copies a framebuffer to the image that was acquired, scaled to the surface. If the proportions
 // differ, black bars are added.
 void vkb_screen_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -280,7 +280,7 @@ bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, co
     vkb_messages_end(before);
     if (!done) {
         vkb_device_destroy(device);
-        vkb_instance_explain_fork(error);
+        vkb_instance_explain(error);
     }
     return done;
 }
@@ -291,6 +291,9 @@ void vkb_device_destroy(struct vkb_device *device)
 
     vkb_workers_destroy(device->workers);
     device->workers = NULL;
+    if (device->idle)
+        device->vk.vkDestroyFence(device->handle, device->idle, NULL);
+    device->idle = VK_NULL_HANDLE;
     if (device->handle)
         device->vk.vkDestroyDevice(device->handle, NULL);
     device->handle = VK_NULL_HANDLE;
@@ -395,5 +398,30 @@ bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
     done = result == VK_TIMEOUT ? fail_hung(device, limit, error)
                                 : vkb_check(error, result, "vkWaitForFences")
                                       && VK(error, vk->vkResetFences(device->handle, 1, &fence));
+    return remember_loss(device, done, error);
+}
+
+static bool finish_idle(struct vkb_device *device, struct vkb_error *error)
+{
+    device->idle_pending = device->idle_pending && !vkb_device_wait(device, device->idle, 1, error);
+    return !device->idle_pending;
+}
+
+bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error)
+{
+    const VkFenceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+
+    if (!device->idle
+        && !VK(error, device->vk.vkCreateFence(device->handle, &info, NULL, &device->idle)))
+        return false;
+    // That of an interrupted wait is older than what the queue has got since.
+    if (!finish_idle(device, error))
+        return false;
+    device->idle_pending =
+        VK(error, device->vk.vkQueueSubmit(device->queue, 0, NULL, device->idle));
+    // By the specification, no fence tells whether presentations have waited for their semaphores.
+    // In drivers they are over with the fence, so that this wait without a limit is short.
+    const bool done = device->idle_pending && finish_idle(device, error)
+                   && VK(error, device->vk.vkQueueWaitIdle(device->queue));
     return remember_loss(device, done, error);
 }

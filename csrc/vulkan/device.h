@@ -32,6 +32,8 @@ struct vkb_device {
     VkDeviceSize import_alignment;
     atomic_bool lost;  // other threads read it while the device is in use
     bool timed_out;    // lost because a wait took too long; it may still be busy
+    VkFence idle;      // of vkb_device_wait_idle; null: not needed so far
+    bool idle_pending;
     // Called between the slices of a long wait; true ends the wait. May be NULL.
     bool (*interrupted)(void *context);
     void *context;
@@ -62,5 +64,8 @@ bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkSe
 // be busy.
 bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
                      struct vkb_error *error);
+// Waits until the queue has done everything, as long as a frame may take after the submissions,
+// which must be over.
+bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error);
 
 #endif

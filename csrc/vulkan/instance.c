@@ -321,9 +321,18 @@ void vkb_instance_close(struct vkb_instance *instance)
     vkb_lock_release(&lock);
 }
 
-void vkb_instance_explain_fork(struct vkb_error *error)
+void vkb_instance_explain(struct vkb_error *error)
 {
+    size_t users = 0;
+
     vkb_lock_acquire(&lock);
+    for (size_t i = 0; i < MAX_INSTANCES; ++i)
+        users += instances[i].handle ? instances[i].users : 0;
+    if (strcmp(error->call, "vkCreateDevice") == 0)
+        vkb_add_words(error,
+                      ". Renderers open in this process: %zu. Drivers limit their number (NVIDIA's "
+                      "to fewer than 100): close those that are not needed",
+                      users);
     if (forked)
         vkb_add_words(error,
                       ". This process was forked from one that had used Vulkan, after which some "

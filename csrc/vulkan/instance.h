@@ -70,9 +70,9 @@ struct vkb_instance *vkb_instance_open(const char *driver, bool validation,
                                        struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
 
-// If this process was forked from one with an instance, adds the probable cause and the remedy to
-// an error.
-void vkb_instance_explain_fork(struct vkb_error *error);
+// Adds probable causes and remedies to an error of opening something: too many renderers, or a fork
+// from a process with an instance.
+void vkb_instance_explain(struct vkb_error *error);
 
 // Loads the functions of a device of this instance.
 void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice device,

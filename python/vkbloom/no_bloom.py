@@ -1,24 +1,29 @@
-"""Notes for settings with which the bloom is zero."""
+"""Notes for settings with which the bloom or a stage of glare is zero."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
+from vkbloom.glare.base import GlareLight
 from vkbloom.settings import Settings
 
-__all__ = ["brightest_of", "is_without", "only", "reason", "with_bloom"]
+__all__ = ["brightest_of", "empty_stages", "is_without", "notes", "only", "reason", "with_bloom"]
 
 
-def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
-    """Return the framebuffers to request: also the bloom, unless it is turned off."""
+from vkbloom.frames import Frames
+from vkbloom.glare.base import GlareLight
+from vkbloom.settings import Settings
     if isinstance(names, str):
         return names
-    return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
+    if not settings.bloom:
+        return [*names]
+    noted = ["bloom", *(name for name, _ in _stages(settings))]
+    return [*names, *(name for name in noted if name not in names)]
 
 
 def only(frames: Frames, names: str | Sequence[str]) -> Frames:
@@ -51,3 +56,32 @@ def reason(settings: Settings, brightest: float | None = None) -> str:
     if settings.threshold is not None:
         text += f": no value is above the threshold {settings.threshold:g}"
     return text if brightest is None else f"{text}; the brightest value is {brightest:.3g}"
+
+
+def notes(frames: Frames, image: NDArray[Any]) -> Iterator[str]:
+    """Yield what is zero everywhere in the frames of an image: the bloom, or stages of glare."""
+    if is_without(frames):
+        yield reason(frames.settings, brightest_of(image))
+    yield from empty_stages(frames, frames.settings)
+
+
+def empty_stages(frames: Frames, settings: Settings) -> Iterator[str]:
+    """Yield a text for each stage of glare whose threshold leaves nothing."""
+    for name, stage in _stages(settings):
+        if name in frames and not frames[name][:, :, :3].any():
+            halved = f" after {stage.halvings} halvings" * bool(stage.halvings)
+            hint = ", in which small highlights vanish; use fewer" * bool(stage.halvings)
+            yield (
+                f"{name} is zero everywhere: no value is above its threshold "
+                f"{stage.threshold:g}{halved}{hint or '; use a lower one'}"
+            )
+
+
+def _stages(settings: Settings) -> Iterator[tuple[str, GlareLight]]:
+    """Yield the stages that have a threshold, with the names of their framebuffers."""
+    kinds = [stage.stage for stage in settings.glare]
+    for index, stage in enumerate(settings.glare):
+        if isinstance(stage, GlareLight) and stage.threshold > 0:
+            kind = stage.stage
+            number = f"_{kinds[:index].count(kind)}" if kinds.count(kind) > 1 else ""
+            yield f"{kind}{number}", stage

@@ -27,6 +27,7 @@
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
+    FUNCTION(vkQueueSubmit) \
     FUNCTION(vkWaitForFences) \
     FUNCTION(vkAcquireNextImageKHR) \
     FUNCTION(vkQueuePresentKHR) \
@@ -369,7 +370,19 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_surface(VkPhysicalDevice physical, VkS
 static VKAPI_ATTR VkResult VKAPI_CALL wait_idle(VkQueue queue)
 {
     presented.count = 0;
+    if (lacks("end"))
+        object("this wait would not end");
     return below.vkQueueWaitIdle(queue);
+}
+
+static VkFence after_all;  // of a submission of nothing
+
+static VKAPI_ATTR VkResult VKAPI_CALL submit(VkQueue queue, uint32_t count,
+                                             const VkSubmitInfo *infos, VkFence fence)
+{
+    if (count == 0)
+        after_all = fence;
+    return below.vkQueueSubmit(queue, count, infos, fence);
 }
 
 static VKAPI_ATTR void VKAPI_CALL destroy_semaphore(VkDevice handle, VkSemaphore semaphore,
@@ -384,10 +397,12 @@ static VKAPI_ATTR void VKAPI_CALL destroy_semaphore(VkDevice handle, VkSemaphore
 }
 
 // Without "patience", the user presses Ctrl-C during the wait, after the validation layer has
-// objected.
+// objected. Without "end", presentations never end.
 static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, const VkFence *fences,
                                            VkBool32 all, uint64_t timeout)
 {
+    if (lacks("end") && fences[0] == after_all)
+        return VK_TIMEOUT;
     if (!lacks("patience"))
         return below.vkWaitForFences(handle, count, fences, all, timeout);
     object("an objection");
@@ -479,6 +494,7 @@ static const struct entry {
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
+    ENTRY(vkQueueSubmit, submit, true),
     ENTRY(vkWaitForFences, wait, true),
     ENTRY(vkAcquireNextImageKHR, acquire, true),
     ENTRY(vkQueuePresentKHR, present, true),

@@ -122,6 +122,37 @@ def test_one_instance_with_the_validation_layer_and_one_without(faulty: dict[str
     assert output("-c", INSTANCES, **faulty).split() == ["2"]
 
 
+# Opens renderers until a device is refused.
+MANY = """
+import vkbloom
+from vkbloom import _core
+
+renderers = [vkbloom.Renderer("software") for _ in range(3)]
+_core.arm_fault(1, -3, "vkCreateDevice")
+try:
+    vkbloom.Renderer("software")
+except vkbloom.Error as error:
+    print(error)
+renderers.pop().close()
+_core.arm_fault(1, -3, "vkCreateDevice")
+try:
+    vkbloom.Renderer("software")
+except vkbloom.Error as error:
+    print(error)
+renderers.append(vkbloom.Renderer("software"))
+"""
+
+
+def test_the_driver_refuses_one_renderer_more(faulty: dict[str, str]) -> None:
+    """NVIDIA's driver 580 refuses 100 devices at once, without a reason."""
+    for count, line in zip((3, 2), output("-c", MANY, **faulty).splitlines(), strict=True):
+        assert line == (
+            "vkCreateDevice failed with VK_ERROR_INITIALIZATION_FAILED. Renderers open in this "
+            f"process: {count}. Drivers limit their number (NVIDIA's to fewer than 100): close "
+            "those that are not needed"
+        )
+
+
 def test_memory_that_python_does_not_get(
     faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:

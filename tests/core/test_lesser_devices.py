@@ -293,6 +293,46 @@ def test_swapchains_are_renewed(layer: Path, name: str, display: dict[str, str])
     ]
 
 
+# Presentations that never end, while the size changes or when the surface is closed.
+ENDLESS = """
+import contextlib
+import os
+import sys
+import glfw
+import vkbloom
+from tests.core.windows import UFO, open_window, settle
+
+window = open_window((64, 36))
+renderer = vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True)
+surface = vkbloom.Surface(renderer, window)
+surface.present(UFO)
+glfw.set_window_size(window, 80, 36)
+settle(window, (80, 36))
+os.environ["VKBLOOM_LESSER"] = "end"
+calls = {"present": lambda: surface.present(UFO), "close": surface.close, "end": renderer.close}
+for name in sys.argv[1:]:
+    try:
+        calls[name]()
+    except vkbloom.Error as error:
+        print(name, type(error).__name__, str(error).split(";")[0])
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+@pytest.mark.parametrize("first", ["present", "close"])
+def test_waits_for_presentations_have_a_limit(
+    layer: Path, name: str, display: dict[str, str], first: str
+) -> None:
+    program = ("-c", ENDLESS, first, "end")
+    done = run(layer, name, "", program, VKBLOOM_TIMEOUT="0.2", **display)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [
+        f"{first} DeviceLostError the device has not finished within 0.2 s",
+        "end DeviceLostError the device is still busy",
+    ]
+
+
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     done = run(layer, name, "bindings")
     assert "ValidationError" in done.stderr

@@ -65,9 +65,8 @@ def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
 def check_part_is_given(path: str, stored: StoredImage) -> None:
     """Raise click.UsageError if a file has several parts and --subimage is not given."""
     if len(stored.parts) > 1 and not given("subimage"):
-        raise click.UsageError(
-            f"{path}: has several parts; choose one with --subimage: {image_reading.listed_parts(stored)}"
-        )
+        parts = image_reading.listed_parts(stored)
+        raise click.UsageError(f"{path}: has several parts; choose one with --subimage: {parts}")
 
 
 def note(text: str) -> None:

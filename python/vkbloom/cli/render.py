@@ -114,6 +114,8 @@ def command(
                 )
                 if index == 0 and loaded.glow is not None and no_bloom.is_without(frames):
                     note(no_bloom.reason(settings))
+                for text in no_bloom.empty_stages(frames, settings) if index == 0 else ():
+                    note(text)
                 shown = no_bloom.only(frames, names)
                 if add is not None:
                     add(shown[wanted])

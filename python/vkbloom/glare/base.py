@@ -83,7 +83,9 @@ class GlareLight(Glare):
         Factor of the stage's light, 0 to 65504.
     threshold : float
         Subtracted from each channel that the stage reads, 0 to 65504. Negative differences become
-        0. If alpha is blurred, it is multiplied by the factor of the brightest channel.
+        0. It is subtracted after the halvings, in which small highlights become dark and vanish:
+        one, two or three halvings leave at most 1/16, 1/68 or 1/276 of a single pixel's value. If
+        alpha is blurred, it is multiplied by the factor of the brightest channel.
     halvings : int
         Number of times that the stage's input is halved, 0 to 4, by the 13 taps of `Pyramid`. Each
         halving makes the stage four times as fast, and its light coarser.
