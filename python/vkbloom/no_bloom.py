@@ -15,9 +15,8 @@ from vkbloom.settings import Settings
 __all__ = ["brightest_of", "empty_stages", "is_without", "notes", "only", "reason", "with_bloom"]
 
 
-from vkbloom.frames import Frames
-from vkbloom.glare.base import GlareLight
-from vkbloom.settings import Settings
+def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
+    """Return the framebuffers to request: also bloom and glare, unless the bloom is off."""
     if isinstance(names, str):
         return names
     if not settings.bloom:

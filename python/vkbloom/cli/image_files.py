@@ -115,9 +115,8 @@ def not_of_bytes(source: str, numbers: str) -> click.UsageError:
 def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
     """Print a note if the first of several parts was read without --subimage."""
     if len(stored.parts) > 1 and layer is None and not given("subimage"):
-        note(
-            f"{source}: read the first of its {image_reading.listed_parts(stored)}; --subimage reads another"
-        )
+        parts = image_reading.listed_parts(stored)
+        note(f"{source}: read the first of its {parts}; --subimage reads another")
 
 
 _quiet = threading.Lock()
