@@ -33,6 +33,7 @@ from vkbloom.frames import Frames
 from vkbloom.image import Image
 from vkbloom.methods.mip_chain import DualKawase, Pyramid
 from vkbloom.methods.separable import TUTORIAL, Separable, gaussian_weights
+from vkbloom.registry import METHODS, STAGES
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings
 from vkbloom.version import installed_version
@@ -70,7 +71,8 @@ if TYPE_CHECKING:
 #: Version of the installed package, read from its metadata on first access.
 __version__: str
 
-# Imported on first use, because a program that only calls `apply` needs none of them. A module must
+# Imported on first use, because a program that only calls `apply` needs none of them. So are the
+# classes of the registries. A module must
 # not have the name of something else that is public: its import would take the name.
 _LATE_MODULES = {
     "psf": "vkbloom.psf",
@@ -80,29 +82,15 @@ _LATE_MODULES = {
     "testing": "vkbloom.testing",
 }
 _LATE = {
-    "BevyBloom": "vkbloom.methods.bevy",
-    "BlenderGlare": "vkbloom.methods.blender",
     "Camera": "vkbloom.scene",
-    "Convolution": "vkbloom.methods.convolution",
-    "Dirt": "vkbloom.glare.dirt",
-    "FilamentBloom": "vkbloom.methods.filament",
     "FitResult": "vkbloom.fits",
-    "Ghosts": "vkbloom.glare.flares",
     "Glare": "vkbloom.glare.base",
     "GlareLight": "vkbloom.glare.base",
-    "GodotBloom": "vkbloom.methods.godot",
     "GridReport": "vkbloom.grid.checking",
-    "Halo": "vkbloom.glare.flares",
-    "HdrpBloom": "vkbloom.methods.unity",
-    "KinoBloom": "vkbloom.methods.kino",
     "Pass": "vkbloom.plans",
     "Plan": "vkbloom.plans",
-    "PygfxBloom": "vkbloom.methods.pygfx",
     "Scene": "vkbloom.scene",
-    "Streaks": "vkbloom.glare.streaks",
     "Surface": "vkbloom.surface",
-    "UnrealBloom": "vkbloom.methods.unreal",
-    "UrpBloom": "vkbloom.methods.unity",
     "apply_file": "vkbloom.large_files",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
@@ -186,6 +174,9 @@ def __getattr__(name: str) -> Any:
         return import_module(_LATE_MODULES[name])
     if name in _LATE:
         return getattr(import_module(_LATE[name]), name)
+    kind = METHODS.class_named(name) or STAGES.class_named(name)
+    if kind is not None:
+        return kind
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

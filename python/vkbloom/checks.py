@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 __all__ = [
     "FLT_MAX",
     "as_float",
+    "check_above",
     "check_attachments",
     "check_emission",
     "check_floats",
     "check_image",
     "check_index",
-    "check_like",
+    "check_integer",
     "check_mask",
     "check_number",
     "check_size",
@@ -100,16 +101,20 @@ def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
     return numbers
 
 
-def check_like(example: object, name: str, value: Any, low: float, high: float) -> float:
-    """Return a number as an example's type: float, int or bool; NumPy scalars print otherwise."""
-    number = check_number(name, value, low, high)
-    if not isinstance(example, int):
-        return number
-    integer = int(number)
+def check_integer(name: str, value: Any, low: float, high: float) -> int:
+    """Return a number that is an integer as an int, or raise TypeError or ValueError."""
+    integer = int(check_number(name, value, low, high))
     if integer != value:
         raise ValueError(f"{name}: {value!r} is not an integer")
-    # Converts flags to bool.
-    return type(example)(integer)
+    return integer
+
+
+def check_above(name: str, value: Any, low: float = 0.0) -> float:
+    """Return a finite number above `low` as a float, or raise TypeError or ValueError."""
+    number = as_float(name, value)
+    if not low < number < math.inf:
+        raise ValueError(f"{name}: {value!r} is out of range, above {low:g}")
+    return number
 
 
 def check_size(name: str, size: Any) -> tuple[int, int]:

@@ -1,69 +1,276 @@
-"""Fields of settings and stages, and objects that can be stored as their fields.
+"""Fields of settings, stages and point-spread functions, and objects that are stored as fields.
 
-The core declares the numbers of fields: their defaults and ranges are in its tables.
+A `FieldInfo` is the one description of a field. Checks, JSON, the command line, the explorer, the
+axes of grids and fits read it. It comes from the field's declaration in its class: the annotation,
+the declared values, and the text about the parameter in the class's docstring. The core declares
+defaults and ranges of numbers (``shaders/params.h``), which a class can replace.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from importlib import import_module
-from typing import Any, ClassVar, Self
+import inspect
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Final, Literal, Self
 
 from vkbloom import _core
+from vkbloom.checks import check_above, check_integer, check_number, check_size
 
 __all__ = [
+    "FieldInfo",
+    "Kind",
     "Record",
+    "check_fields",
     "choice_field",
-    "field_range",
+    "fields_of",
     "flag_field",
-    "import_class",
     "number_field",
+    "plain_value",
+    "value_field",
 ]
+
+Kind = Literal[
+    "flag",
+    "integer",
+    "number",
+    "choice",
+    "size",
+    "numbers",
+    "vector",
+    "pairs",
+    "glare",
+    "psf",
+    "object",
+]
+#: A range of numbers; one that ends at infinity does not contain its beginning.
+Range = tuple[float, float]
+
+_KINDS: Final[Mapping[object, Kind]] = {
+    bool: "flag",
+    int: "integer",
+    float: "number",
+    tuple[int, int]: "size",
+    tuple[float, ...]: "numbers",
+    tuple[float, float, float]: "vector",
+    tuple[tuple[float, float], ...]: "pairs",
+}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FieldInfo:
+    """The description of a field.
+
+    Attributes
+    ----------
+    name : str
+    kind : Kind
+    default : object
+        `dataclasses.MISSING` if there is none.
+    owner : type
+        The class that has the field.
+    optional : bool
+        Whether the value may be None.
+    choices : tuple
+        The values of a choice.
+    range : (float, float) or None
+        The least and the largest value of a number. An infinite one stands for finite numbers
+        above the least.
+    slider : (float, float) or None
+        The ends of a slider; an empty tuple for no slider. None: those of the range.
+    unit : str
+        "1" for numbers without a unit, "" for others.
+    option : str
+        The field's name on the command line.
+    fixed : str
+        Why the method takes only the default; "" for other fields.
+    narrowed : bool
+        Whether the class has fewer choices than the annotation.
+    read : callable or None
+        Checks a value of another kind and returns the value to store.
+    text : str
+        The help of a class without a docstring.
+    """
+
+    name: str
+    kind: Kind
+    default: Any
+    owner: type
+    optional: bool = False
+    choices: tuple[Any, ...] = ()
+    range: Range | None = None
+    slider: Range | tuple[()] | None = None
+    unit: str = ""
+    option: str = ""
+    fixed: str = ""
+    narrowed: bool = False
+    read: Callable[[Any], Any] | None = None
+    text: str = ""
+
+    @property
+    def help(self) -> str:
+        """The first sentence about the parameter in the docstring of the class, or of a base."""
+        from vkbloom.views.descriptions import described_parameters  # noqa: PLC0415  rarely needed
+
+        texts = (described_parameters(kind).get(self.name) for kind in self.owner.__mro__)
+        return self.text or next(filter(None, texts), "")
+
+    @property
+    def ends(self) -> Range | None:
+        """The ends of the field's slider; None for fields without a slider."""
+        if self.kind not in ("number", "integer") or self.fixed or self.slider == ():
+            return None
+        return self.slider or (self.range if self.is_bounded else None)
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether the field is a number with a least and a largest value."""
+        return self.range is not None and math.isfinite(self.range[1])
+
+    def check(self, value: Any) -> Any:
+        """Return the value to store, or raise TypeError or ValueError."""
+        if value is None and self.optional:
+            return None
+        checked = value
+        if self.read is not None:
+            checked = self.read(value)
+        elif self.kind == "choice":
+            checked = self._choice(value)
+        elif self.kind == "size":
+            checked = check_size(self.name, value)
+        elif self.range is not None:
+            checked = self._number(value, self.range)
+        if self.fixed and checked != self.default:
+            only = f"{self.default:g}" if isinstance(self.default, float) else self.default
+            raise ValueError(f"{self.name}: {value!r} is not {only}; {self.fixed}")
+        return checked
+
+    def _number(self, value: Any, ends: Range) -> float:
+        """Return a Python number, since NumPy scalars print differently."""
+        if self.kind != "number":
+            integer = check_integer(self.name, value, *ends)
+            return bool(integer) if self.kind == "flag" else integer
+        if not self.is_bounded:
+            return check_above(self.name, value, ends[0])
+        return check_number(self.name, value, *ends)
+
+    def _choice(self, value: Any) -> Any:
+        """Return a plain str, also for a subclass of str, such as an enum."""
+        # An array compares with a name element by element.
+        if not isinstance(value, str) or value not in self.choices:
+            of = ""
+            if self.narrowed and issubclass(self.owner, Record):
+                of = f", which the {self.owner._class_key} {self.owner._class_name()} has"
+            raise ValueError(f"{self.name}: {value!r} is not one of {', '.join(self.choices)}{of}")
+        # Not with str(), which returns an enum's own name.
+        return self.choices[self.choices.index(value)]
 
 
 def number_field(
-    name: str,
+    name: str = "",
     *,
-    default: float | None = None,
-    unit: str = "1",
-    range: tuple[float, float] | None = None,
-    option: str | None = None,
+    default: Any = dataclasses.MISSING,
     table: Mapping[str, tuple[float, float, float]] = _core.VALUES,
+    **declared: Any,
 ) -> Any:
-    """Declare a field that is a number in one of the core's tables, which gives its default.
+    """Declare a field that is a number.
 
-    The table also gives the range. A method whose source has a narrower range declares it here.
-    `option` is the field's name on the command line, if it differs.
+    Parameters
+    ----------
+    name : str
+        The row of the core's table that gives the default and the range, unless they are declared.
+    default : float or None
+    table : mapping
+        One of the core's tables.
+    **declared
+        Values of a `FieldInfo`: range, unit, slider, option, fixed, text.
     """
-    initial, _, _ = table[name]
-    return dataclasses.field(
-        default=initial if default is None else default,
-        metadata={"unit": unit, "range": range, "option": option or name},
-    )
+    if name:
+        initial, low, high = table[name]
+        default = initial if default is dataclasses.MISSING else default
+        # A class that declares no range keeps the range of its base.
+        declared["table_range"] = low, high
+    return dataclasses.field(default=default, metadata=declared)
 
 
-def field_range(field: dataclasses.Field[Any]) -> tuple[float, float]:
-    """Return the least and the largest value of a field that is a number."""
-    narrowed: tuple[float, float] | None = field.metadata.get("range")
-    _, low, high = _core.VALUES[field.name]
-    return narrowed or (low, high)
-
-
-def flag_field(name: str) -> Any:
+def flag_field(name: str, **declared: Any) -> Any:
     """Declare a bool field, which is 0 or 1 in the core's table."""
-    return dataclasses.field(default=bool(_core.VALUES[name][0]))
+    return dataclasses.field(default=bool(_core.VALUES[name][0]), metadata=declared)
 
 
-def choice_field(name: str) -> Any:
-    """Declare a field whose value is one of the core's names; the first is the default."""
-    return dataclasses.field(default=_core.CHOICES[name][0])
+def choice_field(name: str, choices: tuple[Any, ...] = ()) -> Any:
+    """Declare a field whose value is one of the core's names, or of some; the first is default."""
+    declared = {"choices": choices} if choices else {}
+    return dataclasses.field(default=(choices or _core.CHOICES[name])[0], metadata=declared)
 
 
-def import_class(place: str) -> Any:
-    """Return the class at a place such as "package.module:Class"."""
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
+def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
+    """Declare a field of any type; `kind` and `read` are values of a `FieldInfo`."""
+    return dataclasses.field(default=default, metadata=declared)
+
+
+def fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
+    """Return the descriptions of a dataclass's fields, by name."""
+    found: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")
+    if found is None:
+        inherited: dict[str, FieldInfo] = {}
+        for base in reversed(kind.__bases__):
+            if dataclasses.is_dataclass(base):
+                inherited.update(fields_of(base))
+        # Without the annotations of bases, which are in `inherited`.
+        own = inspect.get_annotations(kind, eval_str=True)
+        found = types.MappingProxyType(
+            {
+                field.name: _described(kind, field, own[field.name], inherited.get(field.name))
+                if field.name in own
+                else dataclasses.replace(inherited[field.name], owner=kind)
+                for field in dataclasses.fields(kind)
+            }
+        )
+        kind.__field_infos__ = found
+    return found
+
+
+def _described(
+    owner: type, field: dataclasses.Field[Any], annotation: Any, base: FieldInfo | None
+) -> FieldInfo:
+    """Return the description of a field that a class declares; `base` is that of its base class."""
+    declared = dict(field.metadata)
+    table = declared.pop("table_range", None)
+    if base is None and table is not None:
+        declared.setdefault("range", table)
+    parts = typing.get_args(annotation)
+    optional = types.NoneType in parts
+    if optional and len(parts) == 2:
+        (annotation,) = (part for part in parts if part is not types.NoneType)
+    kind = _KINDS.get(annotation, "object")
+    if typing.get_origin(annotation) is Literal:
+        kind = "choice"
+        declared["narrowed"] = "choices" in declared or (base is not None and base.narrowed)
+        declared.setdefault("choices", base.choices if base else typing.get_args(annotation))
+    found = {"kind": kind, "default": field.default, "owner": owner, "optional": optional}
+    if base is not None:
+        if "range" in declared:
+            declared.setdefault("slider", None)
+        return dataclasses.replace(base, **{**found, "kind": base.kind, **declared})
+    if kind == "flag":
+        declared["range"] = 0, 1
+    if kind in ("number", "integer"):
+        declared.setdefault("unit", "1")
+    return FieldInfo(**{"name": field.name, "option": field.name, **found, **declared})
+
+
+def check_fields(record: Any) -> None:
+    """Check the fields of a frozen dataclass, and store the values that `FieldInfo.check` returns.
+
+    A default is not checked: `Settings.replace` makes settings often, with few other values.
+    """
+    for name, info in fields_of(type(record)).items():
+        value = getattr(record, name)
+        if value is not info.default:
+            object.__setattr__(record, name, info.check(value))
 
 
 class Record:
@@ -76,6 +283,9 @@ class Record:
     _class_key: ClassVar[str]
     #: The beginning of error messages about the fields.
     _subject: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     @classmethod
     def _class_name(cls) -> str | None:
@@ -111,12 +321,8 @@ class Record:
         >>> vkbloom.psf.gaussian(sigma=2).to_dict()
         {'psf': 'gaussian', 'sigma': 2.0}
         """
-        itself: Any = self
-        values = {each.name: getattr(self, each.name) for each in dataclasses.fields(itself)}
-        return {
-            self._class_key: self._class_name(),
-            **{k: plain_value(v) for k, v in values.items()},
-        }
+        values = {name: plain_value(getattr(self, name)) for name in fields_of(type(self))}
+        return {self._class_key: self._class_name(), **values}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
@@ -161,19 +367,17 @@ class Record:
         if own not in (None, name):
             raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
         values = {field: value for field, value in fields.items() if field != key}
-        declared = dataclasses.fields(classes[name])
-        known = [field.name for field in declared]
-        unknown = [field for field in values if field not in known]
+        declared = fields_of(classes[name])
+        unknown = [field for field in values if field not in declared]
         if unknown:
             raise ValueError(
                 f"{cls._subject}: {name} has no {', '.join(map(repr, unknown))}; "
-                f"it has {', '.join(known)}"
+                f"it has {', '.join(declared)}"
             )
-        without = (dataclasses.MISSING, dataclasses.MISSING)
         lacking = [
-            field.name
-            for field in declared
-            if field.name not in values and (field.default, field.default_factory) == without
+            field
+            for field, info in declared.items()
+            if field not in values and info.default is dataclasses.MISSING
         ]
         if lacking:
             raise ValueError(f"{cls._subject}: {name} needs a value for {', '.join(lacking)}")

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Final, Literal, Self, get_args
+from typing import Any, ClassVar, Literal, Self, get_args
 
-from vkbloom import _core
-from vkbloom.checks import check_like, check_size
 from vkbloom.fields import (
+    FieldInfo,
     Record,
     choice_field,
-    field_range,
+    fields_of,
     flag_field,
-    import_class,
     number_field,
+    value_field,
 )
 from vkbloom.glare.base import Glare, replaced_stages, stage_field_of
+from vkbloom.registry import METHODS
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -32,23 +32,11 @@ BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 BLOOM_FORMATS: tuple[BloomFormat, ...] = get_args(BloomFormat)
 
-#: The class of each method. The order is that of `methods`, and of the methods in the core. The
-#: classes are imported on first use, because some of them import much.
-METHODS: Final = {
-    "separable": "vkbloom.methods.separable:Separable",
-    "pyramid": "vkbloom.methods.mip_chain:Pyramid",
-    "dual_kawase": "vkbloom.methods.mip_chain:DualKawase",
-    "convolution": "vkbloom.methods.convolution:Convolution",
-    "bevy": "vkbloom.methods.bevy:BevyBloom",
-    "kino": "vkbloom.methods.kino:KinoBloom",
-    "filament": "vkbloom.methods.filament:FilamentBloom",
-    "urp": "vkbloom.methods.unity:UrpBloom",
-    "hdrp": "vkbloom.methods.unity:HdrpBloom",
-    "unreal": "vkbloom.methods.unreal:UnrealBloom",
-    "godot": "vkbloom.methods.godot:GodotBloom",
-    "blender": "vkbloom.methods.blender:BlenderGlare",
-    "pygfx": "vkbloom.methods.pygfx:PygfxBloom",
-}
+
+def _read_glare(glare: object) -> tuple[Glare, ...]:
+    from vkbloom.named_glares import read_glare  # noqa: PLC0415  costs start-up time
+
+    return read_glare(glare)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -142,67 +130,29 @@ class Settings(Record):
     _class_key: ClassVar[str] = "method"
     _subject: ClassVar[str] = "fields"
     method: ClassVar[str]
-    #: The composites that the method has.
-    composites: ClassVar[tuple[Composite, ...]] = ("add", "mix", "screen")
-    #: Whether the method's threshold has a knee.
-    has_knee: ClassVar[bool] = True
+    #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
+    published: ClassVar[bool] = False
 
     bloom: bool = flag_field("bloom")
-    threshold: float | None = None
+    threshold: float | None = number_field("threshold", default=None, slider=(0, 4))
     knee: float = number_field("knee")
-    composite: Composite = choice_field("composite")
-    intensity: float = number_field("intensity")
+    composite: Composite = choice_field("composite", ("add", "mix", "screen"))
+    intensity: float = number_field("intensity", slider=(0, 4))
     alpha: Alpha = choice_field("alpha")
     tonemap: ToneMap = choice_field("tonemap")
-    exposure: float = number_field("exposure", unit="stop")
+    exposure: float = number_field("exposure", unit="stop", slider=(-8, 8))
     encoding: Encoding = choice_field("encoding")
     dither: bool = flag_field("dither")
-    dither_seed: int = number_field("dither_seed")
-    bloom_size: tuple[int, int] | None = dataclasses.field(default=None, metadata={"unit": "pixel"})
-    bloom_scale: float = number_field("bloom_scale")
+    dither_seed: int = number_field("dither_seed", slider=(0, 100))
+    bloom_size: tuple[int, int] | None = value_field(None, unit="pixel")
+    bloom_scale: float = number_field("bloom_scale", slider=(0.05, 1))
     format: BloomFormat | None = None
-    glare: tuple[Glare, ...] = ()
+    glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
 
     def __post_init__(self) -> None:
         if type(self) is Settings:
             raise TypeError("Settings is abstract; use a method, such as Separable")
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if value is field.default:
-                continue  # `replace` makes settings often, with few other values
-            optional = str(field.type).endswith("None")
-            if field.name in _core.VALUES and not (value is None and optional):
-                self._check_value(field, value)
-            elif field.name in _core.CHOICES and field.name != "composite":
-                self._check_name(field.name, _core.CHOICES[field.name])
-        self._check_name("composite", self.composites, f", which the method {self.method} has")
-        if self.knee != 0 and not self.has_knee:
-            raise ValueError(
-                f"knee: {self.knee!r} is not 0; the threshold of the method {self.method} has no "
-                "knee"
-            )
-        if self.format is not None:
-            self._check_name("format", BLOOM_FORMATS)
-        if self.bloom_size is not None:
-            object.__setattr__(self, "bloom_size", check_size("bloom_size", self.bloom_size))
-        if not isinstance(self.glare, tuple) or self.glare:
-            from vkbloom.named_glares import read_glare  # noqa: PLC0415  costs start-up time
-
-            object.__setattr__(self, "glare", read_glare(self.glare))
-
-    def _check_value(self, field: dataclasses.Field[Any], value: Any) -> None:
-        """Check a number and store it as a Python number; NumPy scalars print differently."""
-        number = check_like(field.default, field.name, value, *field_range(field))
-        object.__setattr__(self, field.name, number)
-
-    def _check_name(self, field: str, names: tuple[str, ...], of: str = "") -> None:
-        """Check a name and store it as a plain str, also from a subclass of str."""
-        value = getattr(self, field)
-        # An array compares with a name element by element.
-        if not isinstance(value, str) or value not in names:
-            raise ValueError(f"{field}: {value!r} is not one of {', '.join(names)}{of}")
-        # Not with str(), which returns an enum's own name.
-        object.__setattr__(self, field, names[names.index(value)])
+        super().__post_init__()
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed, as `dataclasses.replace` does.
@@ -236,9 +186,8 @@ class Settings(Record):
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
-            from vkbloom.named_glares import read_glare  # noqa: PLC0415  costs start-up time
-
-            changes["glare"] = replaced_stages(read_glare(changes.get("glare", self.glare)), nested)
+            glare = _read_glare(changes.get("glare", self.glare))
+            changes["glare"] = replaced_stages(glare, nested)
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:
@@ -260,7 +209,7 @@ class Settings(Record):
 
     @classmethod
     def _classes(cls) -> Mapping[str, type[Settings]]:
-        return methods()
+        return METHODS
 
     def _repr_html_(self) -> str:
         """Return the table of `display.fields_html`."""
@@ -270,9 +219,17 @@ class Settings(Record):
         return display.fields_html(self)
 
 
-def methods() -> dict[str, type[Settings]]:
-    """Return the settings class of each method, by the method's name, in the order of the core."""
-    return {name: import_class(place) for name, place in METHODS.items()}
+def field_info(settings: Settings, name: str) -> FieldInfo:
+    """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""
+    if "." not in name:
+        return fields_of(type(settings))[name]
+    place, field = stage_field_of(settings.glare, name)
+    return fields_of(type(settings.glare[place]))[field]
+
+
+def no_knee(method: str) -> Any:
+    """Declare the knee of a method whose threshold has none."""
+    return number_field("knee", fixed=f"the threshold of the method {method} has no knee")
 
 
 def check_shading(shading: str) -> Shading:
@@ -285,7 +242,7 @@ def check_shading(shading: str) -> Shading:
 def check_settings(settings: Settings | None) -> Settings:
     """Return the settings, `Separable()` for None; raise TypeError for anything else."""
     if settings is None:
-        default: Settings = import_class(METHODS["separable"])()
+        default: Settings = METHODS["separable"]()
         return default
     if not isinstance(settings, Settings):
         raise TypeError(f"settings: {settings!r} is not a Settings")

@@ -22,7 +22,9 @@ import vkbloom
 from tests.processes import python
 from vkbloom.cli import fields
 from vkbloom.cli.program import COMMANDS, as_wrong_use, program
-from vkbloom.cli.settings_options import METHODS, settings_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.fields import fields_of
+from vkbloom.registry import METHODS
 from vkbloom.scene import Camera, Scene
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -162,7 +164,7 @@ def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch)
 # Options from fields
 
 
-@click.command()
+@click.command(cls=fields.Command)
 @settings_options
 def chosen(settings: vkbloom.Settings) -> vkbloom.Settings:
     return settings
@@ -174,9 +176,9 @@ def settings_from(*arguments: str) -> Any:
 
 @pytest.mark.parametrize("kind", METHODS.values(), ids=list(METHODS))
 def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) -> None:
-    names = {option for parameter in chosen.params for option in parameter.opts}
-    options = (field.metadata.get("option", field.name) for field in dataclasses.fields(kind))
-    assert names >= {f"--{option.replace('_', '-')}" for option in options}
+    parameters = chosen.get_params(click.Context(chosen))
+    names = {option for parameter in parameters for option in parameter.opts}
+    assert names >= {f"--{info.option.replace('_', '-')}" for info in fields_of(kind).values()}
 
 
 def test_every_method_is_there() -> None:
@@ -297,6 +299,11 @@ def test_a_method_has_no_field_of_another() -> None:
         settings_from("--method", "pyramid", "--preset", "tutorial")
 
 
+def command_of(kinds: dict[str, type[Any]]) -> click.Command:
+    """Return a command whose result is the values of the classes' fields."""
+    return click.command(cls=fields.Command)(fields.options(kinds, "found")(lambda found: found))
+
+
 def test_the_help_of_an_option_is_the_fields_docstring() -> None:
     @dataclasses.dataclass
     class Lens:
@@ -320,8 +327,9 @@ def test_the_help_of_an_option_is_the_fields_docstring() -> None:
         height: float = 0.5
         shape: Literal["round", "flat"] = "flat"
 
-    command = click.command(fields.options({"": Lens, "big": Lens}, "lens")(lambda lens: lens))
-    assert [(option.name, getattr(option, "help", None)) for option in command.params] == [
+    command = command_of({"": Lens, "big": Lens})
+    parameters = command.get_params(click.Context(command))
+    assert [(option.name, getattr(option, "help", None)) for option in parameters[:-1]] == [
         ("width", "In mm, 0.5 to 2 [default 1] In mm, 0.5 to 2 [big, default 1]"),
         ("height", "In mm, 0.5 to 2 [default 0.5] In mm, 0.5 to 2 [big, default 0.5]"),
         (
@@ -357,7 +365,7 @@ def test_none_that_is_given_is_not_the_default() -> None:
     class Cut:
         level: float | None = 1.0
 
-    command = click.command(fields.options({"": Cut}, "cut")(lambda cut: cut))
+    command = command_of({"": Cut})
     assert command.main(["--level", "none"], standalone_mode=False) == {"level": None}
     assert command.main([], standalone_mode=False) == {}
 
@@ -367,15 +375,15 @@ def test_a_field_that_no_option_can_give_is_refused() -> None:
     class Odd:
         table: dict[str, float]
 
-    with pytest.raises(TypeError, match=r"dict\[str, float\]"):
-        fields.options({"": Odd}, "odd")(lambda odd: odd)
+    with pytest.raises(TypeError, match="table: a field of this type has no option"):
+        command_of({"": Odd}).main([], standalone_mode=False)
 
 
 def test_fields_of_one_name_and_two_types_are_refused() -> None:
     one = dataclasses.make_dataclass("one", [("radius", float, 1.0)])
     other = dataclasses.make_dataclass("other", [("radius", int, 1)])
     with pytest.raises(TypeError, match="radius is"):
-        fields.options({"one": one, "other": other}, "both")
+        command_of({"one": one, "other": other}).main([], standalone_mode=False)
 
 
 @pytest.mark.parametrize("error", [TypeError, ValueError])

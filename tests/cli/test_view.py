@@ -13,7 +13,7 @@ import vkbloom
 from tests.core.builds import ROOT
 from vkbloom import Camera, Pyramid, Scene, Separable
 from vkbloom.cli.live import Live
-from vkbloom.settings import methods
+from vkbloom.registry import METHODS
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 
@@ -30,7 +30,7 @@ def test_keys_change_settings() -> None:
     assert pressed(live, "b", "down", "left").settings == Separable(blur_strength=1.6)
 
 
-@pytest.mark.parametrize("method", methods().values())
+@pytest.mark.parametrize("method", METHODS.values())
 def test_scale_and_strength_stay_in_their_ranges(method: type[vkbloom.Settings]) -> None:
     live = Live(method(), None)
     for key in ("up", "down", "right", "left"):
@@ -48,8 +48,8 @@ def test_scale_goes_from_a_tenth_to_two() -> None:
 
 def test_keys_go_through_methods_and_presets() -> None:
     live = Live(Separable(tonemap="aces", encoding="srgb"), None)
-    found = [pressed(live, "m").settings for _ in methods()]
-    assert [type(one) for one in found] == [*list(methods().values())[1:], Separable]
+    found = [pressed(live, "m").settings for _ in METHODS]
+    assert [type(one) for one in found] == [*list(METHODS.values())[1:], Separable]
     assert all((one.tonemap, one.encoding) == ("aces", "srgb") for one in found)
     found = [pressed(live, "p").settings for _ in vkbloom.presets]
     assert found == list(vkbloom.presets.values())

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
+from vkbloom.fields import fields_of
 
 #: The core's bounds (csrc/run/age.h, pipeline.h, image_cache.h).
 LEAST_AGE = 64
@@ -75,10 +76,10 @@ def test_pipelines_that_are_old_go(
     # quickly.
     monkeypatch.setenv("VKBLOOM_FORM", "fragment")
     renderer = new_renderer()
-    composites = Separable.composites
+    composites = fields_of(Separable)["composite"].choices
     names = (composites, *(_core.CHOICES[name] for name in ("tonemap", "encoding")))
     chosen = [
-        Separable(composite=composite, tonemap=tonemap, encoding=encoding)  # type: ignore[arg-type]
+        Separable(composite=composite, tonemap=tonemap, encoding=encoding)
         for composite, tonemap, encoding in itertools.product(*names)
     ]
     chosen += [dataclasses.replace(one, bloom=False) for one in chosen if one.composite == "add"]

@@ -20,8 +20,8 @@ import pytest
 import vkbloom
 from tests.processes import output
 from vkbloom import TUTORIAL, Separable, Settings, _core, gaussian_weights, presets
-from vkbloom.fields import field_range
-from vkbloom.settings import methods
+from vkbloom.fields import fields_of
+from vkbloom.registry import METHODS
 
 DEFAULTS = {
     "bloom": True,
@@ -413,17 +413,17 @@ def test_methods_have_the_order_of_the_core() -> None:
     header = Path(__file__).parents[2] / "csrc/passes/settings.h"
     rows = re.findall(r"^    METHOD\(\w+, (\w+), ", header.read_text(), re.MULTILINE)
     assert rows.pop() == "own", "the method whose passes are given at run time has no class here"
-    code = "import vkbloom.methods.pygfx; from vkbloom.settings import methods; print(*methods())"
+    code = "import vkbloom.methods.pygfx; from vkbloom.registry import METHODS; print(*METHODS)"
     assert output("-c", code).split() == rows
-    assert [kind.method for kind in methods().values()] == rows
+    assert [kind.method for kind in METHODS.values()] == rows
 
 
-@pytest.mark.parametrize("kind", methods().values())
+@pytest.mark.parametrize("kind", METHODS.values())
 def test_the_ranges_in_docstrings(kind: type[Settings]) -> None:
-    for field in dataclasses.fields(kind):
-        if field.name not in _core.VALUES or isinstance(field.default, bool):
+    for name, info in fields_of(kind).items():
+        if name not in _core.VALUES or info.kind == "flag" or info.range is None:
             continue
-        own = documented_range(kind, field.name)
-        narrowed = field_range(field) != tuple(_core.VALUES[field.name][1:])
-        assert own is not None or not narrowed, f"{field.name}: {kind.__name__} says no range"
-        assert (own or documented_range(Settings, field.name)) == field_range(field), field.name
+        own = documented_range(kind, name)
+        narrowed = info.range != tuple(_core.VALUES[name][1:])
+        assert own is not None or not narrowed, f"{name}: {kind.__name__} says no range"
+        assert (own or documented_range(Settings, name)) == info.range, name

@@ -17,9 +17,10 @@ import pytest
 import vkbloom
 from tests.framebuffers import decode, make, noise
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
-from vkbloom.explorer.controls import METHODS, as_code, controls, settings_from
+from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.explorer.viewer import Viewer
+from vkbloom.registry import METHODS
 
 EXAMPLES = [
     *presets.values(),

@@ -290,7 +290,7 @@ def test_a_flat_image(renderer: Renderer) -> None:
         (lambda: Convolution([[np.nan]]), "psf: some numbers are not finite"),
         (lambda: Convolution({"psf": "lens"}), "psf: 'lens' is not one of"),
         (lambda: Convolution(boundary=cast("Any", "mirror")), "boundary: 'mirror' is not one of"),
-        (lambda: Convolution(normalize=cast("Any", 2)), "normalize: 2 is not True or False"),
+        (lambda: Convolution(normalize=cast("Any", 2)), "normalize: 2 is out of range, 0 to 1"),
         (lambda: Convolution(pixels_per_degree=0), "pixels_per_degree: 0 is out of range"),
         (lambda: Convolution(kernel_size=(0, 3)), "kernel_size: .* out of range"),
     ],

@@ -29,6 +29,7 @@ from vkbloom import (
     psf,
     reference,
 )
+from vkbloom.reference import bevy, kino, unreal, urp
 
 Array = NDArray[Any]
 
@@ -179,7 +180,7 @@ def test_bevys_shares_are_the_published_ones() -> None:
     for factor, share in zip([*factors[1:], 0.0], shares, strict=True):
         assert rest * (1 - factor) == pytest.approx(share, abs=1e-5)
         rest *= factor
-    own, coarse = reference.bevy._shares(BevyBloom())
+    own, coarse = bevy._shares(BevyBloom())
     assert_allclose(coarse, factors[1:], atol=1e-6)
     assert_allclose(np.add(own, coarse), 1, rtol=1e-12)
 
@@ -251,7 +252,7 @@ def test_bevy_has_no_screen_and_ends_at_1() -> None:
     [(720, 2.5, 3, 1.49185), (1080, 2.5, 4, 1.07682), (45, 1.0, 1, 0.5 + 5.49185 - 7 + 1)],
 )
 def test_kinos_levels_and_step(height: int, radius: float, levels: int, step: float) -> None:
-    actual = reference.kino._count_and_step(KinoBloom(radius=radius), height)
+    actual = kino._count_and_step(KinoBloom(radius=radius), height)
     assert actual[0] == levels
     assert actual[1] == pytest.approx(step, abs=1e-5)
 
@@ -362,7 +363,7 @@ def test_urps_levels_and_shares(renderer: Renderer) -> None:
     frames = renderer.apply(lights((1280, 720), "uint8"), presets["unity_urp"])
     sizes = [frames[name].shape[1::-1] for name in frames if name.startswith("down")]
     assert sizes == [(640, 360), (320, 180), (160, 90), (80, 45), (40, 22), (20, 11)]
-    own, coarse = reference.urp._shares(UrpBloom(), 6)
+    own, coarse = urp._shares(UrpBloom(), 6)
     shares = np.cumprod([1, *coarse[:5]]) * [*own[:5], 1]
     assert_allclose(shares, [0.32, 0.2176, 0.14797, 0.10062, 0.06842, 0.14539], atol=1e-5)
 
@@ -487,14 +488,14 @@ def test_unreals_sizes_are_rounded() -> None:
 
 def test_unreals_kernels_are_the_published_ones() -> None:
     """Their sums, worked out from the formula in UnrealBloomPass.js."""
-    sums = [sum(weight for _, weight in reference.unreal._kernel(k)) for k in range(5)]
+    sums = [sum(weight for _, weight in unreal._kernel(k)) for k in range(5)]
     assert_allclose(sums, [0.99454, 0.99577, 0.99624, 0.99649, 0.99665], atol=1e-5)
 
 
 def test_unreals_radius_keeps_the_sum_of_the_factors() -> None:
-    assert reference.unreal._factors(1.0) == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert unreal._factors(1.0) == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
     for radius in (0.0, 0.35, 1.0):
-        assert sum(reference.unreal._factors(radius)) == pytest.approx(3)
+        assert sum(unreal._factors(radius)) == pytest.approx(3)
 
 
 @pytest.mark.parametrize(

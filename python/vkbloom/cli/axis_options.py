@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -15,7 +13,8 @@ from vkbloom import reductions
 from vkbloom.cli import fields
 from vkbloom.cli.image_files import read
 from vkbloom.cli.program import as_wrong_use
-from vkbloom.glare.base import stage_field_of
+from vkbloom.fields import FieldInfo, fields_of
+from vkbloom.settings import field_info
 
 __all__ = ["REDUCTIONS", "axis_bounds", "axis_values", "chunk_counts", "named_reductions"]
 
@@ -48,14 +47,15 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
         name, _, text = word.partition("=")
         if name.strip() == _PRESET:
             named = [preset_named(one.strip()) for one in text.split(",")]
-            types = {**_types_of(named), _PRESET: str}
+            types = {**_types_of(named), _PRESET: click.STRING}
             lacking = "not all of these presets have the field"
     found: dict[str, Sequence[Any]] = {}
     for word in words:
         name, sign, text = word.partition("=")
         name = name.strip().replace("-", "_")
         if name.startswith("glare."):
-            types[name] = _type_in_stage(settings, name)
+            with as_wrong_use():
+                types[name] = _type_of(field_info(settings, name))
         if not sign or not text:
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
@@ -67,13 +67,6 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     return found
 
 
-def _type_in_stage(settings: vkbloom.Settings, name: str) -> Any:
-    """Return the type of a stage's field, such as glare.0.intensity."""
-    with as_wrong_use():
-        place, field = stage_field_of(settings.glare, name)
-    return typing.get_type_hints(type(settings.glare[place]))[field]
-
-
 def preset_named(name: str) -> vkbloom.Settings:
     """Return the settings of a preset, or raise click.UsageError."""
     try:
@@ -82,29 +75,32 @@ def preset_named(name: str) -> vkbloom.Settings:
         raise click.UsageError(f"--axis {_PRESET}: {error.args[0]}") from None
 
 
-def _types_of(settings: Sequence[vkbloom.Settings]) -> dict[str, Any]:
+def _type_of(info: FieldInfo) -> click.ParamType[Any] | None:
+    """Return the type of a field's option, so that axes and options have one syntax."""
+    try:
+        return fields.option_type(info)
+    except TypeError:
+        return None
+
+
+def _types_of(settings: Sequence[vkbloom.Settings]) -> dict[str, click.ParamType[Any] | None]:
     """Return the types of the time and of the fields that all settings have."""
-    # Class variables are left out, because an axis cannot change the method.
-    shared = [{field.name for field in dataclasses.fields(one)} for one in settings]
-    hints = typing.get_type_hints(type(settings[0]))
-    return {"time": float, **{name: hints[name] for name in set.intersection(*shared)}}
+    first, *others = (fields_of(type(one)) for one in settings)
+    shared = {name: info for name, info in first.items() if all(name in one for one in others)}
+    return {"time": click.FLOAT, **{name: _type_of(info) for name, info in shared.items()}}
 
 
-def _values(word: str, text: str, annotation: object, room: int) -> Sequence[Any]:
+def _values(word: str, text: str, kind: click.ParamType[Any] | None, room: int) -> Sequence[Any]:
     parts = text.split(":")
     if len(parts) in _RANGE_PARTS and "," not in text and ";" not in text:
         return _range(word, parts, room)
     values = [part for part in text.split(";" if ";" in text else ",") if part]
     if not values:
         raise click.UsageError(f"--axis {word}: there are no values; give at least one")
-    # The option's own type converts each value, so that axes and options have one syntax.
-    plain = {bool: click.BOOL, str: click.STRING}
-    try:
-        kind = plain[annotation] if annotation in plain else fields.option_type(annotation)
-    except TypeError:
+    if kind is None:
         raise click.UsageError(
             f"--axis {word}: values of this field cannot be written here; use Renderer.grid"
-        ) from None
+        )
     try:
         return [kind.convert(part.strip(), None, None) for part in values]
     except click.BadParameter as error:

@@ -32,7 +32,7 @@ def _limit(name: str, text: str) -> Callable[[Callable[..., Any]], Callable[...,
     """Make the option of a limit: a number, or none."""
     return click.option(
         f"--{name.replace('_', '-')}",
-        type=fields.option_type(float | None),
+        type=fields.or_none(click.FLOAT),
         help=f"{text} [default none]",
     )
 

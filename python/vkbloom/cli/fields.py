@@ -1,29 +1,26 @@
-"""Generate options from the fields of dataclasses, so that a new field needs no code here."""
+"""Make options from the descriptions of fields, so that a new field needs no code here."""
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import json
 import os
 import re
-import types
-import typing
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import click
+from click.shell_completion import CompletionItem
 from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import psf
 from vkbloom.cli.image_files import silenced
 from vkbloom.cli.program import given
-from vkbloom.glare.base import STAGES, Glare
-from vkbloom.methods.convolution import PSFLike
+from vkbloom.fields import FieldInfo, Kind, fields_of
+from vkbloom.glare.base import Glare
 from vkbloom.named_glares import glares
-from vkbloom.psf.base import PSF
-from vkbloom.views.descriptions import described_parameters
+from vkbloom.psf.base import PSF, functions
+from vkbloom.registry import STAGES
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]
@@ -71,20 +68,13 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
     return tuple(_read_numbers(pair, ":") for pair in word.split(","))
 
 
-_PSFS: Final = [
-    name
-    for name, kind in vars(psf).items()
-    if isinstance(kind, type) and issubclass(kind, PSF) and kind is not PSF
-]
-
-
 def _read_psf(word: str) -> PSF:
     """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
     name, _, rest = word.partition(":")
-    if name in _PSFS:
+    if name in functions():
         return PSF.from_dict({"psf": name} | _read_fields(rest))
     if not os.path.exists(word):
-        raise ValueError(f"is neither a file nor one of {', '.join(_PSFS)}")
+        raise ValueError(f"is neither a file nor one of {', '.join(functions())}")
     return psf.samples(read_colours(word))
 
 
@@ -139,37 +129,33 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
     return tuple(found)
 
 
-_OPTION_TYPES: Final[Mapping[object, _ParamType]] = {
-    PSFLike: _Word("NAME[:A=1,...]|FILE", _read_psf, explains=True),
-    tuple[Glare, ...]: _Word("NAME[:A=1,...]+...", _read_glare, explains=True),
-    float: click.FLOAT,
-    int: click.INT,
-    tuple[int, int]: SIZE,
-    tuple[float, ...]: _Word("A,B,...", _read_numbers),
-    tuple[float, float, float]: _Word("X,Y,Z", _read_numbers),
-    tuple[tuple[float, float], ...]: _Word("A:B,C:D,...", _read_pairs),
+_OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
+    "psf": _Word("NAME[:A=1,...]|FILE", _read_psf, explains=True),
+    "glare": _Word("NAME[:A=1,...]+...", _read_glare, explains=True),
+    "flag": click.BOOL,
+    "number": click.FLOAT,
+    "integer": click.INT,
+    "size": SIZE,
+    "numbers": _Word("A,B,...", _read_numbers),
+    "vector": _Word("X,Y,Z", _read_numbers),
+    "pairs": _Word("A:B,C:D,...", _read_pairs),
 }
 
 
-def option_type(annotation: object) -> _ParamType:
-    """Return the option type of a field's annotation.
-
-    Raises
-    ------
-    TypeError
-        The annotation has no option type.
-    """
-    if annotation in _OPTION_TYPES:
-        return _OPTION_TYPES[annotation]
-    if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
-        (inner,) = (part for part in typing.get_args(annotation) if part is not types.NoneType)
-        return _or_none(option_type(inner))
-    if typing.get_origin(annotation) is Literal:
-        return click.Choice(typing.get_args(annotation))
-    raise TypeError(f"annotation: {annotation!r} has no option type; add one to _OPTION_TYPES")
+def option_type(info: FieldInfo) -> _ParamType:
+    """Return the option type of a field, or raise TypeError if its kind has none."""
+    if info.kind == "choice":
+        kind: _ParamType = click.Choice(info.choices)
+    elif info.kind in _OPTION_TYPES:
+        kind = _OPTION_TYPES[info.kind]
+    else:
+        raise TypeError(f"{info.name}: a field of this type has no option")
+    return or_none(kind) if info.optional else kind
 
 
-def _or_none(kind: _ParamType) -> _Word:
+def or_none(kind: _ParamType) -> _ParamType:
+    """Return a type that also takes the word none."""
+
     def read(word: str) -> object:
         return None if word.lower() == "none" else kind.convert(word, None, None)
 
@@ -194,18 +180,109 @@ def _spelled(value: object, separator: str = ",") -> str:
             return str(value).lower()
 
 
-class _Dataclass(Protocol):
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
-
-
 class FieldOption(click.Option):
-    """An option of a field. `Command` lists it under the labels of the classes that have it."""
+    """An option of a field, whose value `FieldOptions` collects.
 
-    labels: tuple[str, ...] = ()
+    `Command` lists it under the labels of the classes that have it; None: with its own options.
+    """
+
+    def __init__(self, infos: Mapping[str, FieldInfo], into: str, prefix: str) -> None:
+        first = next(iter(infos.values()))
+        kinds = {(info.kind, info.choices) for info in infos.values()}
+        if len(kinds) > 1:
+            raise TypeError(f"{first.name} is {' as well as '.join(one for one, _ in kinds)}")
+        # The option accepts none if one of the classes does.
+        widest = next((info for info in infos.values() if info.optional), first)
+        option = f"{prefix}{first.option}".replace("_", "-")
+        is_flag = first.kind == "flag"
+        super().__init__(
+            [
+                f"--{option}/--no-{option}" if is_flag else f"--{option}",
+                option.replace("-", "_"),
+            ],
+            default=None,
+            type=None if is_flag else option_type(widest),
+            help=" ".join(_help(label, info) for label, info in infos.items()),
+            expose_value=False,
+        )
+        self.field = first.name
+        self.into = into
+        self.labels = None if prefix else tuple(filter(None, infos))
+
+    def handle_parse_result(
+        self, ctx: click.Context, opts: Mapping[str, Any], args: list[str]
+    ) -> tuple[Any, list[str]]:
+        """Add a value that the user gave to those of the other fields."""
+        value, args = super().handle_parse_result(ctx, opts, args)
+        if self.name is not None and given(self.name, ctx):
+            ctx.params[self.into][self.field] = value
+        return value, args
+
+
+def _help(label: str, info: FieldInfo) -> str:
+    default = f"{label and label + ', '}default {_spelled(info.default)}"
+    return f"{info.help} [{default}]".strip()
+
+
+class FieldOptions(click.Option):
+    """The place of the options of some classes' fields, which `Command` makes when it is called.
+
+    Parameters
+    ----------
+    param_decls : sequence of str
+        The command's keyword argument that receives the values given by the user: a dict of field
+        name to value.
+    kinds : mapping of str to type
+        Dataclasses by their label in the help; "" for no label. A field that several dataclasses
+        have becomes one option, and its help has the text of each. A registry is read at each call.
+    base : type, optional
+        A dataclass whose fields get no options.
+    prefix : str
+        Prefix of the options' names, as in "camera-".
+    """
+
+    def __init__(
+        self,
+        param_decls: Sequence[str],
+        kinds: Mapping[str, type[Any]],
+        base: type[Any] | None = None,
+        prefix: str = "",
+    ) -> None:
+        (self.into,) = param_decls
+        super().__init__([f"--{self.into}-fields", self.into], hidden=True, expose_value=False)
+        self._kinds, self._base, self._prefix = kinds, base, prefix
+        self._made: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
+
+    def options(self) -> list[FieldOption]:
+        """Return the options of the classes that there are now."""
+        kinds = dict(self._kinds)
+        if kinds != self._made[0]:
+            inherited = fields_of(self._base) if self._base else {}
+            fields: dict[str, dict[str, FieldInfo]] = {}
+            for label, kind in kinds.items():
+                for name, info in fields_of(kind).items():
+                    if name not in inherited:
+                        fields.setdefault(name, {})[label] = info
+            made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
+            self._made = kinds, made
+        return self._made[1]
 
 
 class Command(click.Command):
-    """A command whose help groups the options of fields by the classes that have them."""
+    """A command with options of fields; its help groups them by the classes that have them."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the parameters, with the options of fields in the place of each `FieldOptions`."""
+        found: list[click.Parameter] = []
+        for one in super().get_params(ctx):
+            found += one.options() if isinstance(one, FieldOptions) else [one]
+        return found
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Begin with no values of fields."""
+        places = (one for one in self.params if isinstance(one, FieldOptions))
+        ctx.params.update({place.into: {} for place in places})
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the command's own options, then those of each group."""
@@ -232,100 +309,34 @@ class Command(click.Command):
                     formatter.write_dl(groups[labels])
 
 
-@dataclasses.dataclass
-class _Field:
-    """A field for which an option is made: its annotation, help texts and classes' labels."""
-
-    annotation: Any
-    helps: list[str]
-    option: str
-    labels: list[str]
-
-
-def _collect(
-    kinds: Mapping[str, type[_Dataclass]], base: type[_Dataclass] | None
-) -> dict[str, _Field]:
-    """Return the fields of several dataclasses by name, except those of their base."""
-    inherited = {field.name for field in dataclasses.fields(base)} if base else set()
-    found: dict[str, _Field] = {}
-    for label, kind in kinds.items():
-        annotations = typing.get_type_hints(kind)
-        texts = described_parameters(kind)
-        for declaration in dataclasses.fields(kind):
-            name = declaration.name
-            if name in inherited:
-                continue
-            annotation = annotations[name]
-            option = declaration.metadata.get("option", name)
-            field = found.setdefault(name, _Field(annotation, [], option, []))
-            # The option accepts none if one of the classes does.
-            wider = field.annotation | annotation
-            if wider not in (field.annotation, annotation):
-                raise TypeError(f"{name} is {field.annotation} as well as {annotation}")
-            field.annotation = wider
-            default = f"{label and label + ', '}default {_spelled(declaration.default)}"
-            field.helps.append(f"{texts.get(name, '')} [{default}]".strip())
-            field.labels += [label] if label else []
-    return found
-
-
-def _option_class(labels: tuple[str, ...] | None) -> type[click.Option]:
-    """Return the option class of fields with these labels; None: the options have no group."""
-    if labels is None:
-        return click.Option
-    return type("FieldOption", (FieldOption,), {"labels": labels})
-
-
 def options(
-    kinds: Mapping[str, type[_Dataclass]],
-    into: str,
-    *,
-    base: type[_Dataclass] | None = None,
-    prefix: str = "",
+    kinds: Mapping[str, type[Any]], into: str, *, base: type[Any] | None = None, prefix: str = ""
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds an option to a command for each field of the dataclasses.
+    """Return a decorator that adds `FieldOptions` to a `Command`."""
+    return click.option(into, cls=FieldOptions, kinds=kinds, base=base, prefix=prefix)
 
-    Parameters
-    ----------
-    kinds : mapping of str to type
-        Dataclasses by their label in the help; "" for no label. A field that several dataclasses
-        have becomes one option, and its help has the text of each.
-    into : str
-        The command's keyword argument that receives the options given by the user: a dict of
-        field name to value.
-    base : type, optional
-        A dataclass whose fields get no options.
-    prefix : str
-        Prefix of the options' names, as in "camera-".
 
-    Raises
-    ------
-    TypeError
-        A field's annotation has no option type, or fields of the same name differ in type.
-    """
-    fields = _collect(kinds, base)
-    parameters = {
-        name: f"{prefix}{field.option}".replace("-", "_") for name, field in fields.items()
-    }
+class NameOf(_ParamType):
+    """The type of an option whose value is a name of a registry, read at each call."""
 
-    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(command)
-        def run(**values: object) -> object:
-            every = {name: values.pop(parameter) for name, parameter in parameters.items()}
-            chosen = {name: every[name] for name in every if given(parameters[name])}
-            return command(**values, **{into: chosen})
+    name = "choice"
 
-        for name, field in reversed(fields.items()):
-            option = f"{prefix}{field.option}".replace("_", "-")
-            is_flag = field.annotation is bool
-            run = click.option(
-                f"--{option}/--no-{option}" if is_flag else f"--{option}",
-                parameters[name],
-                default=None,
-                type=None if is_flag else option_type(field.annotation),
-                help=" ".join(field.helps),
-                cls=_option_class(None if prefix else tuple(field.labels)),
-            )(run)
-        return run
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        self._names = names
 
-    return decorate
+    def _choice(self) -> click.Choice[str]:
+        return click.Choice(list(self._names))
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        """Return the placeholder of the value in the help."""
+        return self._choice().get_metavar(param, ctx)
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name."""
+        return self._choice().convert(value, param, ctx)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return the names that begin with some letters."""
+        return self._choice().shell_complete(ctx, param, incomplete)

@@ -13,13 +13,15 @@ from rich.console import Console
 import vkbloom
 from vkbloom.cli.axis_options import axis_bounds
 from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import NameOf
 from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
 from vkbloom.cli.program import as_wrong_use
-from vkbloom.cli.settings_options import METHODS, PRESET_OF_IMAGES
+from vkbloom.cli.settings_options import PRESET_OF_IMAGES
 from vkbloom.explorer.controls import as_code
 from vkbloom.fits.losses import LossName
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
+from vkbloom.registry import METHODS
 
 
 @click.command()
@@ -36,7 +38,7 @@ from vkbloom.io import safe_writing
     "--method",
     "kinds",
     multiple=True,
-    type=click.Choice(list(METHODS)),
+    type=NameOf(METHODS),
     help="A method whose defaults start a search; may be repeated.",
 )
 @click.option(

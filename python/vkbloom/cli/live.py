@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import vkbloom
-from vkbloom.settings import Settings, Shading, methods
+from vkbloom.registry import METHODS
+from vkbloom.settings import Settings, Shading
 
 __all__ = ["HELP", "Live"]
 
@@ -74,7 +75,7 @@ class Live:
             self.framebuffer = names[int(key) - 1]
         elif key == "m":
             shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
-            self.settings = _after(type(self.settings), methods())(**shown)
+            self.settings = _after(type(self.settings), METHODS)(**shown)
         elif key == "p":
             self.settings = _after(self.settings, vkbloom.presets)
         elif key == "space":

@@ -53,12 +53,13 @@ class CommandWithFile(Command):
                 if path is None:
                     raise click.UsageError(f"{FILE_OPTION} needs the name of a file", ctx)
                 # The file's options come first, because later options override earlier ones.
-                found = [*_words(_read(Path(path)), path, self._flags()), *found]
+                found = [*_words(_read(Path(path)), path, self._flags(ctx)), *found]
         return super().parse_args(ctx, found)
 
-    def _flags(self) -> dict[str, bool]:
+    def _flags(self, ctx: click.Context) -> dict[str, bool]:
         """Return the flags by name, and whether each has a ``--no-`` form."""
-        flags = (one for one in self.params if isinstance(one, click.Option) and one.is_flag)
+        options = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
+        flags = [one for one in options if one.is_flag]
         return {name: bool(flag.secondary_opts) for flag in flags for name in flag.opts}
 
 

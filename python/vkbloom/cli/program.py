@@ -99,9 +99,9 @@ def as_wrong_use() -> Iterator[None]:
         raise click.UsageError(str(error)) from error
 
 
-def given(name: str) -> bool:
-    """Return whether the user set a parameter of the running command."""
-    source = click.get_current_context().get_parameter_source(name)
+def given(name: str, context: click.Context | None = None) -> bool:
+    """Return whether the user set a parameter of the running command, or of another context's."""
+    source = (context or click.get_current_context()).get_parameter_source(name)
     return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
 
 

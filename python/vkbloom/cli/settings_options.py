@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, Final
@@ -12,10 +11,9 @@ import click
 import vkbloom
 from vkbloom.cli import fields
 from vkbloom.cli.program import as_wrong_use
-from vkbloom.settings import methods
+from vkbloom.fields import fields_of
+from vkbloom.registry import METHODS
 
-#: Settings class of each method, by the method's name.
-METHODS: Final = methods()
 #: The preset for images if there is no --preset and no --method.
 PRESET_OF_IMAGES: Final = "bevy_natural"
 _PRESET_OF_SCENES: Final = "tutorial"
@@ -34,12 +32,12 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     @click.option(
         "--method",
-        type=click.Choice(list(METHODS)),
+        type=fields.NameOf(METHODS),
         help="The method of the blur, with its defaults [default the preset's]",
     )
     @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
-    @fields.options(dict(METHODS), "own", base=vkbloom.Settings)
+    @fields.options(METHODS, "own", base=vkbloom.Settings)
     @functools.wraps(command)
     def run(
         preset: str | None,
@@ -105,13 +103,14 @@ def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settin
     """Return settings with the options' changes."""
     foreign = [name for name in changes if not hasattr(begun, name)]
     if foreign:
-        declared = {one.name: one for kind in METHODS.values() for one in dataclasses.fields(kind)}
-        options = (declared[name].metadata.get("option", name) for name in foreign)
-        names = ", ".join(f"--{option.replace('_', '-')}" for option in options)
+        declared = {
+            name: info for kind in METHODS.values() for name, info in fields_of(kind).items()
+        }
+        names = ", ".join(f"--{declared[name].option.replace('_', '-')}" for name in foreign)
         having = " or ".join(
             method
             for method, kind in METHODS.items()
-            if all(name in kind.__dataclass_fields__ for name in foreign)
+            if all(name in fields_of(kind) for name in foreign)
         )
         raise click.UsageError(
             f"the method {begun.method} has no {names}; "

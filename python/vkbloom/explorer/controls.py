@@ -3,63 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-import typing
-from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-from vkbloom import _core
-from vkbloom.explorer.functions import functions
-from vkbloom.explorer.stages import glare_controls
-from vkbloom.explorer.steps import slider_step
-from vkbloom.fields import field_range
+from vkbloom import psf
+from vkbloom.fields import FieldInfo, fields_of
 from vkbloom.glare.base import Glare
 from vkbloom.named_glares import glares
 from vkbloom.named_settings import presets
-from vkbloom.psf.base import PSF
-from vkbloom.settings import Settings, methods
-from vkbloom.views.descriptions import described_parameters
+from vkbloom.psf.base import PSF, functions
+from vkbloom.registry import METHODS, STAGES
+from vkbloom.settings import Settings
 
-__all__ = ["METHODS", "as_code", "controls", "settings_from"]
+__all__ = ["as_code", "controls", "settings_from"]
 
-#: Settings class of each method, by the method's name.
-METHODS: Final = methods()
-
-# Ends of the sliders of fields with a very wide range. The number beside the slider takes the
-# complete range. If a method narrows a range, its slider has this range.
-_SLIDERS: Final[Mapping[str, tuple[float, float]]] = {
-    "threshold": (0, 4),
-    "intensity": (0, 4),
-    "exposure": (-8, 8),
-    "bloom_scale": (0.05, 1),
-    "blur_scale": (0.1, 2),
-    "blur_strength": (0, 4),
-    "radius": (0, 4),
-    "offset": (0, 8),
-    "highlight": (10, 5000),
-    "clamp_max": (0, 100),
-    "smooth_width": (0.01, 1),
-    "threshold_scale": (0, 8),
-    "luminance_cap": (0, 48),
-    "strength": (0, 2),
-    "white": (1, 16),
-    "maximum": (0, 20),
-    "filter_radius": (0, 0.05),
-    "max_mip_dimension": (16, 1024),
-    "scale_x": (0, 8),
-    "scale_y": (0, 8),
-    "resolution": (16, 1024),
-    "levels": (1, 10),
-    "loops": (1, 8),
-    "dither_seed": (0, 100),
-}
 # Fields that come first, in addition to the numbers that only this method has.
 _FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
 
+# Examples of point-spread functions that have parameters without a default.
+_EXAMPLES: Final[tuple[PSF, ...]] = (psf.aperture(psf.iris()), psf.gaussian(8.0))
+
+_STEPS: Final = 200
+
+
 def controls() -> dict[str, Any]:
-    """Describe methods and presets.
+    """Describe methods, point-spread functions, stages and presets.
 
     Returns
     -------
@@ -68,90 +38,107 @@ def controls() -> dict[str, Any]:
         "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
         "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
         range from "low" to "high", and "integer"; choices have "choices", and may have a name for
-        "none" of them. "functions": the point-spread functions of a convolution, as from
-        `functions`. "glare": as from `glare_controls`. "presets": settings by name, as from
-        `Settings.to_dict`. "look": the fields that keep their values when another preset or method
-        is selected.
+        "none" of them. "functions": the same for the point-spread functions of a convolution; the
+        name of a field of the mask begins with "mask.". "glare": "stages", the same for the stages
+        of glare, and "presets", for each name of `glares` its stages. "presets": settings by name,
+        as from `Settings.to_dict`. "look": the fields that keep their values when another preset
+        or method is selected.
     """
     return {
         "methods": {
-            name: {"defaults": kind().to_dict(), "fields": _fields(kind)}
+            name: {"defaults": kind().to_dict(), "fields": _fields_of_method(kind)}
             for name, kind in METHODS.items()
         },
-        "functions": functions(),
-        "glare": glare_controls(),
+        "functions": {
+            type(one).__name__: {"defaults": one.to_dict(), "fields": _fields_of_function(one)}
+            for one in _functions()
+        },
+        "glare": {
+            "stages": {
+                name: {"defaults": kind().to_dict(), "fields": _controls(kind)}
+                for name, kind in STAGES.items()
+            },
+            "presets": {name: [one.to_dict() for one in some] for name, some in glares.items()},
+        },
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
         "look": _LOOK,
     }
 
 
-def _fields(kind: type[Settings]) -> list[dict[str, Any]]:
-    annotations = typing.get_type_hints(kind)
-    texts = described_parameters(Settings) | described_parameters(kind)
-    shared = {field.name for field in dataclasses.fields(Settings)}
-    found = []
-    for field in dataclasses.fields(kind):
-        control = _control(kind, field, annotations[field.name])
-        if control is not None:
-            own = field.name not in shared
-            # An integer with two values is more like a switch than a slider.
-            slides = (
-                control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-            )
-            control |= {
-                "name": field.name,
-                "help": texts.get(field.name, ""),
-                "first": field.name in _FIRST or (own and slides),
-            }
-            found.append((field.name != "bloom", not own, control))
+def _functions() -> list[PSF]:
+    """Return the functions that can be made without arguments, and the examples of others."""
+    made = [
+        kind()
+        for kind in functions().values()
+        if all(info.default is not dataclasses.MISSING for info in fields_of(kind).values())
+    ]
+    return [*made, *_EXAMPLES]
+
+
+def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
+    shared = fields_of(Settings)
+    found = _controls(kind)
+    for control in found:
+        # An integer with two values is more like a switch than a slider.
+        slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
+        is_own = control["name"] not in shared
+        control["first"] = control["name"] in _FIRST or (is_own and slides)
     # The fields of the method come first, after `bloom`: they are the reason to select it.
-    return [control for _, _, control in sorted(found, key=lambda entry: entry[:2])]
+    return sorted(found, key=lambda one: (one["name"] != "bloom", one["name"] in shared))
 
 
-def _control(
-    kind: type[Settings], field: dataclasses.Field[Any], annotation: Any
-) -> dict[str, Any] | None:
-    """Return the control of a field; None for tuples, sizes, and fields that a method rejects."""
-    if field.name == "glare":
-        return {"kind": "choice", "choices": list(glares), "optional": True, "none": "none"}
-    parts = typing.get_args(annotation)
-    optional = type(None) in parts
-    if optional:
-        (annotation,) = (part for part in parts if part is not type(None))
-    if annotation is bool:
-        return {"kind": "bool"}
-    if typing.get_origin(annotation) is Literal:
-        choices = [
-            choice for choice in typing.get_args(annotation) if _takes(kind, field.name, choice)
+def _fields_of_function(one: PSF) -> list[dict[str, Any]]:
+    found = _controls(type(one))
+    mask = getattr(one, "mask", None)
+    if dataclasses.is_dataclass(mask):
+        found += [
+            control | {"name": f"mask.{control['name']}"} for control in _controls(type(mask))
         ]
-        return {"kind": "choice", "choices": choices, "optional": optional}
-    if field.name not in _core.VALUES:
+    return found
+
+
+def _controls(kind: type[Any]) -> list[dict[str, Any]]:
+    found = ((info, _control(info)) for info in fields_of(kind).values())
+    return [
+        {"name": info.name, "help": info.help, "optional": info.optional} | control
+        for info, control in found
+        if control is not None
+    ]
+
+
+def _control(info: FieldInfo) -> dict[str, Any] | None:
+    """Return the control of a field; None for arrays, sizes, and fields with one value."""
+    if info.kind == "glare":
+        return {"kind": "choice", "choices": list(glares), "optional": True, "none": "none"}
+    if info.kind == "flag":
+        return {"kind": "bool"}
+    if info.kind == "choice":
+        return {"kind": "choice", "choices": list(info.choices)}
+    if info.ends is None or info.range is None:
         return None
-    low, high = field_range(field)
-    is_narrowed = field.metadata.get("range") is not None
-    start, end = (low, high) if is_narrowed else _SLIDERS.get(field.name, (low, high))
-    if not (_takes(kind, field.name, start) and _takes(kind, field.name, end)):
-        return None
-    integer = annotation is int
+    start, end = info.ends
+    low, high = info.range if info.is_bounded else info.ends
+    integer = info.kind == "integer"
     return {
         "kind": "number",
-        "optional": optional,
         "integer": integer,
         "low": low,
         "high": high,
         "from": start,
         "to": end,
-        "step": 1 if integer else slider_step(start, end),
+        "step": 1 if integer else _step(start, end),
     }
 
 
-def _takes(kind: type[Settings], name: str, value: Any) -> bool:
-    """Return whether a method accepts a value, with all other fields at their defaults."""
-    try:
-        kind(**{name: value})
-    except ValueError:
-        return False
-    return True
+def _step(start: float, end: float) -> float:
+    """Return the largest step of 1, 2 or 5 times a power of ten that gives at least 200 steps."""
+    step = (end - start) / _STEPS
+    for power in range(3, -9, -1):
+        for digit in (5, 2, 1):
+            # Parsed from text, since a product may not be the nearest float.
+            if (round_one := float(f"{digit}e{power}")) <= step * (1 + 1e-9):
+                return round_one
+    raise ValueError(f"step: {step!r} is too small")
 
 
 def settings_from(fields: object) -> Settings:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -12,9 +10,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import _core
 from vkbloom.checks import check_number
-from vkbloom.fields import field_range
+from vkbloom.fields import FieldInfo, fields_of
 from vkbloom.settings import Settings
 
 __all__ = ["Axis", "Bounds", "Point", "Space", "space_of"]
@@ -149,22 +146,22 @@ def space_of(
     TypeError
         A bound is not a pair of numbers.
     """
-    fields = {field.name: field for field in dataclasses.fields(settings)}
+    fields = fields_of(type(settings))
     axes = []
     for name in vary:
         if name not in fields:
-            known = ", ".join(one for one in fields if _kind(settings, one))
+            known = ", ".join(one for one in fields if _kind(fields[one]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}; it can vary {known}"
             )
-        kind = _kind(settings, name)
+        kind = _kind(fields[name])
         if kind is None:
             raise ValueError(
                 f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
                 "vkbloom.fit_pyramid"
             )
         if kind == "choice":
-            axes.append(_choice(settings, name, bounds))
+            axes.append(_choice(settings, fields[name], bounds))
         else:
             axes.append(_number(settings, fields[name], kind, bounds, (brightest, height)))
     space = Space(start=settings, axes=tuple(axes))
@@ -185,22 +182,22 @@ def _begun(settings: Settings, name: str) -> Any:
     return 0.0 if value is None and name == "threshold" else value
 
 
-def _kind(settings: Settings, name: str) -> Literal["number", "integer", "choice"] | None:
+def _kind(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
     """Return how a field varies; None if it cannot."""
-    if name in _core.CHOICES:
-        return "choice"
-    if name not in _core.VALUES:
-        return None
-    hint = typing.get_type_hints(type(settings))[name]
-    if hint is bool:
-        return "choice"
-    return "integer" if hint is int else "number"
+    match info.kind:
+        case "flag":
+            return "choice"
+        case "choice":
+            return None if info.optional else "choice"
+        case "number" | "integer":
+            return info.kind if info.is_bounded else None
+        case _:
+            return None
 
 
-def _choice(settings: Settings, name: str, bounds: Bounds) -> Axis:
-    declared: tuple[Any, ...] = _core.CHOICES.get(name, (False, True))
-    if name == "composite":
-        declared = settings.composites
+def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> Axis:
+    name = info.name
+    declared = info.choices or (False, True)
     choices = tuple(bounds.get(name, declared))
     if unknown := [choice for choice in choices if choice not in declared]:
         raise ValueError(
@@ -213,27 +210,28 @@ def _choice(settings: Settings, name: str, bounds: Bounds) -> Axis:
 
 def _number(
     settings: Settings,
-    field: dataclasses.Field[Any],
+    info: FieldInfo,
     kind: Literal["number", "integer"],
     bounds: Bounds,
     limits: tuple[float, int],
 ) -> Axis:
-    low, high = field_range(field)
-    if field.name in bounds:
-        given = bounds[field.name]
+    name = info.name
+    low, high = info.range or (0.0, 1.0)
+    if name in bounds:
+        given = bounds[name]
         if isinstance(given, str) or len(given) != 2:
-            raise TypeError(f"bounds: {field.name}: {given!r} is not a pair (low, high)")
-        low, high = (check_number(f"bounds: {field.name}", end, low, high) for end in given)
+            raise TypeError(f"bounds: {name}: {given!r} is not a pair (low, high)")
+        low, high = (check_number(f"bounds: {name}", end, low, high) for end in given)
         if not low < high:
-            raise ValueError(f"bounds: {field.name}: {low:g} is not less than {high:g}")
-    elif field.name == "threshold":
+            raise ValueError(f"bounds: {name}: {low:g} is not less than {high:g}")
+    elif name == "threshold":
         high = min(high, max(limits[0], 1e-3))
-    elif field.metadata.get("unit") == "pixel":
+    elif info.unit == "pixel":
         high = min(high, max(limits[1], low + 1))
-    value = _begun(settings, field.name)
+    value = _begun(settings, name)
     if value is None:
-        raise ValueError(f"vary: {field.name}: None is not a number; set a number to start from")
-    default = field.default if isinstance(field.default, int | float) else 0.0
+        raise ValueError(f"vary: {name}: None is not a number; set a number to start from")
+    default = info.default if isinstance(info.default, int | float) else 0.0
     usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual
-    return Axis(name=field.name, kind=kind, low=low, high=high, scale=usual if is_wide else None)
+    return Axis(name=name, kind=kind, low=low, high=high, scale=usual if is_wide else None)

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 from vkbloom import _core
-from vkbloom.checks import check_like
-from vkbloom.fields import Record, import_class, number_field
+from vkbloom.fields import Record, fields_of, number_field
+from vkbloom.registry import STAGES
 
-#: The class of each stage, imported on first use. The order is that of `stages`.
-STAGES: Final = {
-    "streaks": "vkbloom.glare.streaks:Streaks",
-    "ghosts": "vkbloom.glare.flares:Ghosts",
-    "halo": "vkbloom.glare.flares:Halo",
-    "dirt": "vkbloom.glare.dirt:Dirt",
-}
-
-
-def stage_field(name: str, default: float | None = None, unit: str = "1") -> Any:
-    """Declare a field that is a number in the core's table of glare."""
-    return number_field(name, default=default, unit=unit, table=_core.GLARE_VALUES)
+#: Declares a field that is a number in the core's table of glare.
+stage_field = functools.partial(number_field, table=_core.GLARE_VALUES)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,15 +53,11 @@ class Glare(Record):
     def __post_init__(self) -> None:
         if not hasattr(self, "stage"):
             raise TypeError(f"{type(self).__name__} is abstract; use a stage, such as Streaks")
-        for field in dataclasses.fields(self):
-            if field.name in _core.GLARE_VALUES:
-                _, low, high = _core.GLARE_VALUES[field.name]
-                value = check_like(field.default, field.name, getattr(self, field.name), low, high)
-                object.__setattr__(self, field.name, value)
+        super().__post_init__()
 
     @classmethod
     def _classes(cls) -> Mapping[str, type[Glare]]:
-        return stages()
+        return STAGES
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -107,14 +94,9 @@ class GlareLight(Glare):
     2
     """
 
-    intensity: float = stage_field("intensity")
-    threshold: float = stage_field("threshold")
+    intensity: float = stage_field("intensity", slider=(0, 4))
+    threshold: float = stage_field("threshold", slider=(0, 16))
     halvings: int = stage_field("halvings")
-
-
-def stages() -> dict[str, type[Glare]]:
-    """Return the class of each stage, by the stage's name."""
-    return {name: import_class(place) for name, place in STAGES.items()}
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:
@@ -146,12 +128,12 @@ def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
     parts = name.split(".")
     if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
         place = int(parts[1])
-        if place < len(glare) and parts[2] in glare[place].__dataclass_fields__:
+        if place < len(glare) and parts[2] in fields_of(type(glare[place])):
             return place, parts[2]
     known = [
-        f"glare.{place}.{field.name}"
+        f"glare.{place}.{field}"
         for place, stage in enumerate(glare)
-        for field in dataclasses.fields(stage)
+        for field in fields_of(type(stage))
     ]
     raise ValueError(
         f"glare: {name!r} is not a field of a stage: {', '.join(known) or 'no stages'}"

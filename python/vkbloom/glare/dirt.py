@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_number
 from vkbloom.core_kernel import CoreKernel, core_kernel
+from vkbloom.fields import value_field
 from vkbloom.glare.base import Glare, stage_field
 from vkbloom.kept_arrays import kept
 
 DirtMode = Literal["multiply", "lerp"]
+
+
+def _read_image(image: Any) -> Any:
+    # Imported here, since settings are used without point-spread functions, too.
+    from vkbloom.psf.sampled import check_values  # noqa: PLC0415
+
+    return check_values("image", image)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -60,22 +68,15 @@ class Dirt(Glare):
 
     stage: ClassVar[str] = "dirt"
 
-    image: Any = None
-    seed: int = stage_field("seed")
-    strength: float = stage_field("strength")
+    image: Any = value_field(None, optional=True, read=_read_image)
+    seed: int = stage_field("seed", slider=(0, 100))
+    strength: float = stage_field("strength", slider=(0, 1))
     mode: DirtMode = "multiply"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.mode not in get_args(DirtMode):
-            raise ValueError(f"mode: {self.mode!r} is not one of {', '.join(get_args(DirtMode))}")
         if self.mode == "lerp":
             check_number("strength", self.strength, 0, 1)
-        if self.image is not None:
-            # Imported here, since settings are used without point-spread functions, too.
-            from vkbloom.psf.sampled import check_values  # noqa: PLC0415
-
-            object.__setattr__(self, "image", check_values("image", self.image))
 
     @property
     def lerp(self) -> int:

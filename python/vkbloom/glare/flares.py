@@ -69,11 +69,11 @@ class Ghosts(GlareLight):
 
     scales: tuple[float, ...] = (-0.5, -1.0, -2.0, 3.0, 1.5)
     tints: tuple[tuple[float, float, float], ...] = ((1.0, 1.0, 1.0),)
-    maximum: float = stage_field("maximum")
-    falloff: float = stage_field("falloff", default=2.0)
-    radius: float = stage_field("radius", default=0.75)
+    maximum: float = stage_field("maximum", slider=(0, 100))
+    falloff: float = stage_field("falloff", default=2.0, slider=(0, 32))
+    radius: float = stage_field("radius", default=0.75, slider=(0.001, 1.5))
     vignette: float = stage_field("vignette")
-    aberration: float = stage_field("aberration")
+    aberration: float = stage_field("aberration", slider=(0, 0.05))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -151,7 +151,7 @@ class Halo(GlareLight):
 
     stage: ClassVar[str] = "halo"
 
-    radius: float = stage_field("radius", default=0.4)
-    width: float = stage_field("width")
-    maximum: float = stage_field("maximum")
-    aberration: float = stage_field("aberration")
+    radius: float = stage_field("radius", default=0.4, slider=(0.001, 1.5))
+    width: float = stage_field("width", slider=(0.001, 1))
+    maximum: float = stage_field("maximum", slider=(0, 100))
+    aberration: float = stage_field("aberration", slider=(0, 0.05))

@@ -66,8 +66,8 @@ class Streaks(GlareLight):
     stage: ClassVar[str] = "streaks"
 
     directions: int = stage_field("directions")
-    angle: float = stage_field("angle", unit="degree")
-    length: float = stage_field("length", unit="texel")
+    angle: float = stage_field("angle", unit="degree", slider=(-180, 180))
+    length: float = stage_field("length", unit="texel", slider=(0, 4))
     fade: float = stage_field("fade")
     base: int = stage_field("base")
     iterations: int = stage_field("iterations")

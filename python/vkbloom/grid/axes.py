@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -13,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_time
-from vkbloom.fields import plain_value
-from vkbloom.glare.base import stage_field_of
+from vkbloom.fields import fields_of, plain_value
 from vkbloom.named_settings import presets
-from vkbloom.settings import Settings, check_settings
-from vkbloom.views.descriptions import described_parameters
+from vkbloom.settings import Settings, check_settings, field_info
 
-__all__ = ["WHOLE", "Axis", "image_axis", "read_axes", "unit_and_description"]
+__all__ = ["WHOLE", "Axis", "image_axis", "read_axes"]
 
 Kind = Literal["settings", "time", "image", "preset"]
 
@@ -124,20 +121,6 @@ def _whole_axis(name: str, values: object) -> Axis:
     return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 
-def unit_and_description(settings: Settings, name: str) -> tuple[str, str]:
-    """Return the unit of a settings field and the first sentence of its documentation."""
-    owner: Any = settings
-    if "." in name:
-        place, name = stage_field_of(settings.glare, name)
-        owner = settings.glare[place]
-    (field,) = (field for field in dataclasses.fields(owner) if field.name == name)
-    texts: dict[str, str] = {}
-    for kind in reversed(type(owner).__mro__):
-        texts.update({key: text for key, text in described_parameters(kind).items() if text})
-    is_number = field.metadata or isinstance(getattr(owner, name), float)
-    return field.metadata.get("unit", "1") if is_number else "", texts.get(name, "")
-
-
 def _sequence(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise TypeError(f"axes: {name}: {values!r} is not a sequence of values")
@@ -194,7 +177,7 @@ def read_axes(
             found.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
             continue
         for base in bases:
-            fields = [field.name for field in dataclasses.fields(base)]
+            fields = fields_of(type(base))
             if name not in fields and not name.startswith("glare."):
                 raise ValueError(
                     f"axes: {name!r} is not a field of the method {base.method}"
@@ -206,7 +189,8 @@ def read_axes(
             tuple(base.replace(**{name: value}).value_of(name) for value in listed)
             for base in bases
         ]
-        found.append(Axis(name, own[0], "settings", *unit_and_description(bases[0], name)))
+        info = field_info(bases[0], name)
+        found.append(Axis(name, own[0], "settings", info.unit, info.help))
     return tuple(found)
 
 

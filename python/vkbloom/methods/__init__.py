@@ -6,5 +6,5 @@ apply the threshold where their source does. So ``glow`` is the input of the met
 of the threshold. Their buffers are half floats unless ``format`` is set, since the buffers of the
 sources are floats.
 
-`vkbloom.settings.METHODS` has the order of the methods.
+`vkbloom.registry.METHODS` has the order of the methods.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import number_field
+from vkbloom.fields import choice_field, number_field
 from vkbloom.settings import BloomFormat, Composite, Settings
 
 
@@ -67,14 +67,14 @@ class BevyBloom(Settings):
     """
 
     method: ClassVar[str] = "bevy"
-    composites: ClassVar[tuple[Composite, ...]] = ("mix", "add")
+    published: ClassVar[bool] = True
 
-    composite: Composite = "mix"
+    composite: Composite = choice_field("composite", ("mix", "add"))
     intensity: float = number_field("intensity", default=0.15, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     low_frequency_boost: float = number_field("low_frequency_boost")
     low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
     high_pass_frequency: float = number_field("high_pass_frequency")
-    max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel")
-    scale_x: float = number_field("scale_x")
-    scale_y: float = number_field("scale_y")
+    max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel", slider=(16, 1024))
+    scale_x: float = number_field("scale_x", slider=(0, 8))
+    scale_y: float = number_field("scale_y", slider=(0, 8))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import number_field
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.fields import choice_field, number_field
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -56,13 +56,14 @@ class BlenderGlare(Settings):
     """
 
     method: ClassVar[str] = "blender"
-    composites: ClassVar[tuple[Composite, ...]] = ("add",)
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
     threshold: float | None = 1.0
+    knee: float = no_knee("blender")
+    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     smoothness: float = number_field("smoothness")
     # On the command line, --size is the size of a frame.
     size: float = number_field("size", option="glare-size")
-    maximum: float | None = None
+    maximum: float | None = number_field("maximum", default=None, slider=(0, 20))

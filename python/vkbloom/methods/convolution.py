@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom.checks import check_size
 from vkbloom.core_kernel import CoreKernel, core_kernel
-from vkbloom.fields import choice_field
+from vkbloom.fields import choice_field, number_field
 from vkbloom.kept_arrays import kept
-from vkbloom.psf.base import PSF, check_above
+from vkbloom.psf.base import PSF
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.resampling import box_resample
 from vkbloom.psf.sampled import samples
@@ -24,6 +24,17 @@ __all__ = ["Boundary", "Convolution", "PSFLike"]
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: The types of a kernel: a function, the result of its `to_dict`, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike
+
+
+def _read_psf(psf: Any) -> PSF:
+    if isinstance(psf, PSF):
+        return psf
+    if isinstance(psf, Mapping):
+        return PSF.from_dict(psf)
+    try:
+        return samples(psf)
+    except (TypeError, ValueError) as error:
+        raise type(error)(str(error).replace("values:", "psf:", 1)) from None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -84,31 +95,13 @@ class Convolution(Settings):
 
     method: ClassVar[str] = "convolution"
 
-    psf: PSFLike = dataclasses.field(default=spencer(), kw_only=False)
+    psf: PSFLike = dataclasses.field(
+        default=spencer(), kw_only=False, metadata={"kind": "psf", "read": _read_psf}
+    )
     normalize: bool = True
     boundary: Boundary = choice_field("boundary")
-    pixels_per_degree: float | None = None
+    pixels_per_degree: float | None = number_field(default=None, range=(0, math.inf))
     kernel_size: tuple[int, int] | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        psf: Any = self.psf
-        if isinstance(psf, Mapping):
-            psf = PSF.from_dict(psf)
-        elif not isinstance(psf, PSF):
-            try:
-                psf = samples(psf)
-            except (TypeError, ValueError) as error:
-                raise type(error)(str(error).replace("values:", "psf:", 1)) from None
-        object.__setattr__(self, "psf", psf)
-        if self.normalize not in (True, False):
-            raise ValueError(f"normalize: {self.normalize!r} is not True or False")
-        object.__setattr__(self, "normalize", bool(self.normalize))
-        if self.pixels_per_degree is not None:
-            scale = check_above("pixels_per_degree", self.pixels_per_degree)
-            object.__setattr__(self, "pixels_per_degree", scale)
-        if self.kernel_size is not None:
-            object.__setattr__(self, "kernel_size", check_size("kernel_size", self.kernel_size))
 
     @property
     def prefilter(self) -> tuple[float, float, float]:

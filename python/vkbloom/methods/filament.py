@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import number_field
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.fields import choice_field, number_field
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -58,12 +58,13 @@ class FilamentBloom(Settings):
     """
 
     method: ClassVar[str] = "filament"
-    composites: ClassVar[tuple[Composite, ...]] = ("add",)
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
     threshold: float | None = 1.0
+    knee: float = no_knee("filament")
+    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.1, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     levels: int = number_field("levels", range=(1, 12))
-    resolution: int = number_field("resolution", unit="pixel")
-    highlight: float = number_field("highlight")
+    resolution: int = number_field("resolution", unit="pixel", slider=(16, 1024))
+    highlight: float = number_field("highlight", slider=(10, 5000))

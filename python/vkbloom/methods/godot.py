@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar
 
 from vkbloom.checks import FLT_MAX, check_number
-from vkbloom.fields import flag_field, number_field
+from vkbloom.fields import choice_field, flag_field, number_field, value_field
 from vkbloom.methods.mip_chain import check_level_weights
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 #: Number of levels that have a weight in Godot.
 GODOT_LEVELS = 7
+
+
+def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
+    weights = check_level_weights(values, GODOT_LEVELS)
+    for weight in weights:
+        check_number("level_weights", weight, 0, FLT_MAX)
+    return weights
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -76,24 +84,21 @@ class GodotBloom(Settings):
     """
 
     method: ClassVar[str] = "godot"
-    composites: ClassVar[tuple[Composite, ...]] = ("screen", "soft_light", "add", "replace", "mix")
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
     threshold: float | None = 1.0
-    composite: Composite = "screen"
+    knee: float = no_knee("godot")
+    composite: Composite = choice_field(
+        "composite", ("screen", "soft_light", "add", "replace", "mix")
+    )
     intensity: float = number_field("intensity", default=0.3)
     format: BloomFormat | None = "rgba16float"
-    threshold_scale: float = number_field("threshold_scale")
-    luminance_cap: float = number_field("luminance_cap")
+    threshold_scale: float = number_field("threshold_scale", slider=(0, 8))
+    luminance_cap: float = number_field("luminance_cap", slider=(0, 48))
     glow_bloom: float = number_field("glow_bloom")
-    strength: float = number_field("strength")
-    level_weights: tuple[float, ...] = (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0)
+    strength: float = number_field("strength", slider=(0, 2))
+    level_weights: tuple[float, ...] = value_field(
+        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), read=_check_weights
+    )
     bicubic: bool = flag_field("bicubic")
-    white: float = number_field("white")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        weights = check_level_weights(self.level_weights, GODOT_LEVELS)
-        for weight in weights:
-            check_number("level_weights", weight, 0, FLT_MAX)
-        object.__setattr__(self, "level_weights", weights)
+    white: float = number_field("white", slider=(1, 16))

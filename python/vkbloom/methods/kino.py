@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import flag_field, number_field
+from vkbloom.fields import choice_field, flag_field, number_field
 from vkbloom.settings import BloomFormat, Composite, Settings
 
 
@@ -52,9 +52,10 @@ class KinoBloom(Settings):
     """
 
     method: ClassVar[str] = "kino"
-    composites: ClassVar[tuple[Composite, ...]] = ("add",)
+    published: ClassVar[bool] = True
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
+    composite: Composite = choice_field("composite", ("add",))
     knee: float = number_field("knee", default=0.5)
     intensity: float = number_field("intensity", default=0.8)
     format: BloomFormat | None = "rgba16float"

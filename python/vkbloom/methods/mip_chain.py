@@ -73,12 +73,12 @@ class Pyramid(Settings):
 
     method: ClassVar[str] = "pyramid"
 
-    levels: int = number_field("levels")
-    radius: float = number_field("radius", unit="texel")
+    levels: int = number_field("levels", slider=(1, 10))
+    radius: float = number_field("radius", unit="texel", slider=(0, 4))
     firefly_filter: bool = flag_field("firefly_filter")
     level_weights: tuple[float, ...] | None = None
-    scale_x: float = number_field("scale_x")
-    scale_y: float = number_field("scale_y")
+    scale_x: float = number_field("scale_x", slider=(0, 8))
+    scale_y: float = number_field("scale_y", slider=(0, 8))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -127,8 +127,8 @@ class DualKawase(Settings):
 
     method: ClassVar[str] = "dual_kawase"
 
-    levels: int = number_field("levels", default=4)
-    offset: float = number_field("offset")
+    levels: int = number_field("levels", default=4, slider=(1, 10))
+    offset: float = number_field("offset", slider=(0, 8))
 
 
 def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import flag_field, number_field
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.fields import choice_field, flag_field, number_field, value_field
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -49,17 +49,13 @@ class PygfxBloom(Settings):
     """
 
     method: ClassVar[str] = "pygfx"
-    composites: ClassVar[tuple[Composite, ...]] = ("mix",)
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
-    composite: Composite = "mix"
+    threshold: float | None = value_field(None, fixed="pygfx has no threshold")
+    knee: float = no_knee("pygfx")
+    composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=0.04, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
-    levels: int = number_field("levels")
-    filter_radius: float = number_field("filter_radius")
+    levels: int = number_field("levels", slider=(1, 10))
+    filter_radius: float = number_field("filter_radius", slider=(0, 0.05))
     karis_average: bool = flag_field("karis_average")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.threshold is not None:
-            raise ValueError(f"threshold: {self.threshold!r} is not None; pygfx has no threshold")

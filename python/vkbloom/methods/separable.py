@@ -10,13 +10,39 @@ from typing import ClassVar, Literal
 
 from vkbloom import _core
 from vkbloom.checks import as_float, check_floats
-from vkbloom.fields import choice_field, flag_field, number_field
+from vkbloom.fields import choice_field, flag_field, number_field, value_field
 from vkbloom.settings import Settings
 
 Texel = Literal["own", "x"]
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
+
+
+def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
+    weights = check_floats("weights", values)
+    if not 1 <= len(weights) <= _core.MAX_WEIGHTS:
+        raise ValueError(
+            f"weights: {len(weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
+        )
+    return weights
+
+
+def _check_layers(values: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
+    try:
+        pairs = tuple(tuple(layer) for layer in values)
+    except TypeError:
+        raise TypeError(
+            f"layers: {values!r} is not a sequence of pairs (scale, strength)"
+        ) from None
+    layers = tuple(check_floats("layers", layer) for layer in pairs)
+    if not 1 <= len(layers) <= _core.MAX_LAYERS:
+        raise ValueError(f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}")
+    if any(len(layer) != 2 for layer in layers):
+        raise ValueError(f"layers: {values!r} is not a sequence of pairs (scale, strength)")
+    if any(not 0 <= number <= 16 for layer in layers for number in layer):
+        raise ValueError(f"layers: {values!r} has a number out of range, 0 to 16")
+    return layers
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -74,47 +100,14 @@ class Separable(Settings):
 
     method: ClassVar[str] = "separable"
 
-    blur_scale: float = number_field("blur_scale", unit="texel")
-    blur_strength: float = number_field("blur_strength")
-    weights: tuple[float, ...] = TUTORIAL
-    loops: int = number_field("loops")
-    layers: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
+    blur_scale: float = number_field("blur_scale", unit="texel", slider=(0.1, 2))
+    blur_strength: float = number_field("blur_strength", slider=(0, 4))
+    weights: tuple[float, ...] = value_field(TUTORIAL, read=_check_weights)
+    loops: int = number_field("loops", slider=(1, 8))
+    layers: tuple[tuple[float, float], ...] = value_field(((1.0, 1.0),), read=_check_layers)
     first_tap: int = number_field("first_tap")
     texel: Texel = choice_field("texel")
     direct: bool = flag_field("direct")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.weights is not Separable.weights:
-            object.__setattr__(self, "weights", _check_weights(self.weights))
-        if self.layers is not Separable.layers:
-            object.__setattr__(self, "layers", _check_layers(self.layers))
-
-
-def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
-    weights = check_floats("weights", values)
-    if not 1 <= len(weights) <= _core.MAX_WEIGHTS:
-        raise ValueError(
-            f"weights: {len(weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
-        )
-    return weights
-
-
-def _check_layers(values: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
-    try:
-        pairs = tuple(tuple(layer) for layer in values)
-    except TypeError:
-        raise TypeError(
-            f"layers: {values!r} is not a sequence of pairs (scale, strength)"
-        ) from None
-    layers = tuple(check_floats("layers", layer) for layer in pairs)
-    if not 1 <= len(layers) <= _core.MAX_LAYERS:
-        raise ValueError(f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}")
-    if any(len(layer) != 2 for layer in layers):
-        raise ValueError(f"layers: {values!r} is not a sequence of pairs (scale, strength)")
-    if any(not 0 <= number <= 16 for layer in layers for number in layer):
-        raise ValueError(f"layers: {values!r} has a number out of range, 0 to 16")
-    return layers
 
 
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import flag_field, number_field
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.fields import choice_field, flag_field, number_field, value_field
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -58,14 +58,15 @@ class UrpBloom(Settings):
     """
 
     method: ClassVar[str] = "urp"
-    composites: ClassVar[tuple[Composite, ...]] = ("add",)
+    published: ClassVar[bool] = True
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
+    composite: Composite = choice_field("composite", ("add",))
     knee: float = number_field("knee", default=0.5)
     format: BloomFormat | None = "rgba16float"
     scatter: float = number_field("scatter")
     iterations: int = number_field("iterations")
-    clamp_max: float = number_field("clamp_max")
+    clamp_max: float = number_field("clamp_max", slider=(0, 100))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -120,20 +121,15 @@ class HdrpBloom(Settings):
     """
 
     method: ClassVar[str] = "hdrp"
-    composites: ClassVar[tuple[Composite, ...]] = ("mix",)
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
-    composite: Composite = "mix"
+    threshold: float | None = value_field(
+        None, fixed="the composite that HDRP uses with a threshold is not supported"
+    )
+    knee: float = no_knee("hdrp")
+    composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=2**0.2 - 1, range=(0, 1))
     format: BloomFormat | None = "rgba16float"
     scatter: float = number_field("scatter")
     high_quality_filtering: bool = flag_field("high_quality_filtering")
     anamorphism: float = number_field("anamorphism")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.threshold is not None:
-            raise ValueError(
-                f"threshold: {self.threshold!r} is not None; the composite that HDRP uses with a "
-                "threshold is not supported"
-            )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom.fields import flag_field, number_field
-from vkbloom.settings import BloomFormat, Composite, Settings
+from vkbloom.fields import choice_field, flag_field, number_field
+from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,12 +62,13 @@ class UnrealBloom(Settings):
     """
 
     method: ClassVar[str] = "unreal"
-    composites: ClassVar[tuple[Composite, ...]] = ("add",)
-    has_knee: ClassVar[bool] = False
+    published: ClassVar[bool] = True
 
     threshold: float | None = 0.0
+    knee: float = no_knee("unreal")
+    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=3.0)
     format: BloomFormat | None = "rgba16float"
     radius: float = number_field("radius", default=0.0, range=(0, 1))
-    smooth_width: float = number_field("smooth_width")
+    smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     node: bool = flag_field("node")

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom.checks import check_floats, check_index, check_number, check_size
+from vkbloom.checks import check_floats, check_number, check_size
+from vkbloom.fields import check_fields, number_field, value_field
 from vkbloom.kept_arrays import kept
-from vkbloom.psf.base import Array, centred, check_above
+from vkbloom.psf.base import Array, centred
 from vkbloom.psf.sampled import SampledPSF
 from vkbloom.psf.values import ArrayValue
 
@@ -71,25 +72,16 @@ class iris:
     ((64, 64), 2.6)
     """
 
-    blades: int = 6
-    rotation: float = 0.0
-    roundness: float = 0.0
-    dust: int = 0
-    scratches: int = 0
-    seed: int = 0
-    size: int = 512
+    blades: int = number_field(default=6, range=(3, 64), slider=(3, 16))
+    rotation: float = number_field(default=0.0, range=(-360, 360), unit="degree", slider=(0, 180))
+    roundness: float = number_field(default=0.0, range=(0, 1))
+    dust: int = number_field(default=0, range=(0, 10000), slider=(0, 100))
+    scratches: int = number_field(default=0, range=(0, 10000), slider=(0, 100))
+    seed: int = number_field(default=0, range=(0, 2**32 - 1), slider=(0, 100))
+    size: int = number_field(default=512, range=(8, 4096), slider=())
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("blades", 3, 64),
-            ("dust", 0, 10000),
-            ("scratches", 0, 10000),
-            ("seed", 0, 2**32 - 1),
-            ("size", 8, 4096),
-        ):
-            object.__setattr__(self, name, check_index(name, getattr(self, name), low, high))
-        for name, low, high in (("rotation", -360, 360), ("roundness", 0, 1)):
-            object.__setattr__(self, name, check_number(name, getattr(self, name), low, high))
+        check_fields(self)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -151,6 +143,32 @@ def _near(centre: float, radius: float, count: int) -> slice:
     return slice(max(0, math.floor(first)), min(count, math.ceil(last)))
 
 
+def _check_mask(mask: Any) -> iris | ArrayValue:
+    if isinstance(mask, iris):
+        return mask
+    if isinstance(mask, dict) and "blades" in mask:
+        return iris(**mask)
+    held = ArrayValue(mask)
+    array = held.array
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
+        raise ValueError(f"mask: shape {array.shape} is not (n, n)")
+    if not ((array >= 0) & (array <= 1)).all() or not array.any():
+        raise ValueError("mask: its values are not between 0 and 1, or all of them are 0")
+    return held
+
+
+def _check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
+    lengths = check_floats("wavelengths", wavelengths)
+    for length in lengths:
+        check_number("wavelengths", length, 380, 780)
+    if not lengths or not (_colours(lengths).sum(axis=0) > 0).all():
+        raise ValueError(
+            f"wavelengths: the sum of {wavelengths!r} is not above 0 in each channel of sRGB; give "
+            "one wavelength, or add others"
+        )
+    return lengths
+
+
 @dataclasses.dataclass(frozen=True)
 class aperture(SampledPSF):
     """Diffraction of an aperture of any shape, in white light or single wavelengths, in pixels.
@@ -190,25 +208,10 @@ class aperture(SampledPSF):
     array([1., 1., 1.])
     """
 
-    mask: Any
-    f_number: float = 8.0
-    pixel_pitch: float = 4.0
-    wavelengths: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mask", _check_mask(self.mask))
-        for name in ("f_number", "pixel_pitch"):
-            object.__setattr__(self, name, check_above(name, getattr(self, name)))
-        if self.wavelengths is not None:
-            lengths = check_floats("wavelengths", self.wavelengths)
-            for length in lengths:
-                check_number("wavelengths", length, 380, 780)
-            if not lengths or not (_colours(lengths).sum(axis=0) > 0).all():
-                raise ValueError(
-                    f"wavelengths: the sum of {self.wavelengths!r} is not above 0 in each channel "
-                    "of sRGB; give one wavelength, or add others"
-                )
-            object.__setattr__(self, "wavelengths", lengths)
+    mask: Any = value_field(read=_check_mask)
+    f_number: float = number_field(default=8.0, range=(0, math.inf), slider=(2, 64))
+    pixel_pitch: float = number_field(default=4.0, range=(0, math.inf), unit="um", slider=(1, 20))
+    wavelengths: tuple[float, ...] | None = value_field(None, unit="nm", read=_check_wavelengths)
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         return _pattern(self, _reach(self), _reach(self))
@@ -220,20 +223,6 @@ class aperture(SampledPSF):
         width, height = check_size("size", size)
         reach = _reach(self)
         return centred(_pattern(self, min(reach, height // 2), min(reach, width // 2)), size)
-
-
-def _check_mask(mask: Any) -> iris | ArrayValue:
-    if isinstance(mask, iris):
-        return mask
-    if isinstance(mask, dict) and "blades" in mask:
-        return iris(**mask)
-    held = ArrayValue(mask)
-    array = held.array
-    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
-        raise ValueError(f"mask: shape {array.shape} is not (n, n)")
-    if not ((array >= 0) & (array <= 1)).all() or not array.any():
-        raise ValueError("mask: its values are not between 0 and 1, or all of them are 0")
-    return held
 
 
 def _lengths(psf: aperture) -> tuple[float, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import math
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -12,13 +11,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom.checks import as_float, check_size
+from vkbloom.checks import check_size
 from vkbloom.fields import Record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["FRAME_DEGREES", "PSF", "Array", "centred", "check_above", "check_radii"]
+__all__ = ["FRAME_DEGREES", "PSF", "Array", "centred", "check_radii", "functions"]
 
 Array = NDArray[np.float64]
 
@@ -235,7 +234,7 @@ class PSF(Record, abc.ABC):
 
     @classmethod
     def _classes(cls) -> Mapping[str, type[PSF]]:
-        return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
+        return functions()
 
     def _repr_png_(self) -> bytes:
         """Return a picture of 256 x 256, logarithmic, with six decades below the peak."""
@@ -244,14 +243,6 @@ class PSF(Record, abc.ABC):
         values = self.array((256, 256))
         scaled = 1 + np.log10(np.maximum(values / values.max(), 1e-6)) / 6
         return pictures.png(np.round(255 * scaled).astype(np.uint8))
-
-
-def check_above(name: str, value: float, low: float = 0.0) -> float:
-    """Return a finite number above `low`, or raise TypeError or ValueError."""
-    number = as_float(name, value)
-    if not low < number < math.inf:
-        raise ValueError(f"{name}: {value!r} is out of range, above {low:g}")
-    return number
 
 
 def check_radii(name: str, values: ArrayLike) -> Array:
@@ -275,6 +266,11 @@ def centred(array: Array, size: tuple[int, int]) -> Array:
     (rows, to_rows), (columns, to_columns) = places
     result[to_rows, to_columns] = array[rows, columns]
     return result
+
+
+def functions() -> dict[str, type[PSF]]:
+    """Return the point-spread functions that there are now, by name."""
+    return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
 
 
 def _leaves(kind: type[Any]) -> list[type[Any]]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom.checks import check_floats, check_number
+from vkbloom.fields import number_field, value_field
 from vkbloom.psf.base import Array
 from vkbloom.psf.radial import RadialPSF
 
@@ -22,6 +23,15 @@ _SHARES: dict[str, tuple[float, float, float, float]] = {
     "mesopic": (0.368, 0.478, 0.138, 0.016),
     "scotopic": (0.282, 0.478, 0.207, 0.033),
 }
+
+
+def _check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
+    lengths = check_floats("wavelengths", wavelengths)
+    if len(lengths) != 3:
+        raise ValueError(f"wavelengths: {wavelengths!r} is not (red, green, blue)")
+    for length in lengths:
+        check_number("wavelengths", length, 380, 780)
+    return lengths
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,17 +71,9 @@ class spencer(RadialPSF):
     """
 
     state: State = "photopic"
-    wavelengths: tuple[float, float, float] = (611.0, 549.0, 467.0)
-
-    def __post_init__(self) -> None:
-        if self.state not in get_args(State):
-            raise ValueError(f"state: {self.state!r} is not one of {', '.join(get_args(State))}")
-        lengths = check_floats("wavelengths", self.wavelengths)
-        if len(lengths) != 3:
-            raise ValueError(f"wavelengths: {self.wavelengths!r} is not (red, green, blue)")
-        for length in lengths:
-            check_number("wavelengths", length, 380, 780)
-        object.__setattr__(self, "wavelengths", lengths)
+    wavelengths: tuple[float, float, float] = value_field(
+        (611.0, 549.0, 467.0), unit="nm", read=_check_wavelengths
+    )
 
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.asarray(theta, np.float64)[..., np.newaxis]
@@ -86,19 +88,8 @@ class spencer(RadialPSF):
         return np.asarray(total + shares[3] * halo)
 
 
-class _AgeingEye(RadialPSF):
-    """A function of the CIE, with the checks of age and pigment."""
-
-    age: float
-    pigment: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "age", check_number("age", self.age, 0, 120))
-        object.__setattr__(self, "pigment", check_number("pigment", self.pigment, 0, 1.2))
-
-
 @dataclasses.dataclass(frozen=True)
-class cie_general(_AgeingEye):
+class cie_general(RadialPSF):
     """The CIE's general disability glare, for 0.1 to 100 degrees.
 
     Parameters
@@ -129,8 +120,8 @@ class cie_general(_AgeingEye):
     array([15.548,  0.072])
     """
 
-    age: float = 35.0
-    pigment: float = 0.5
+    age: float = number_field(default=35.0, range=(0, 120), unit="year")
+    pigment: float = number_field(default=0.5, range=(0, 1.2))
 
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.maximum(np.asarray(theta, np.float64), 0.1)
@@ -140,7 +131,7 @@ class cie_general(_AgeingEye):
 
 
 @dataclasses.dataclass(frozen=True)
-class cie_total(_AgeingEye):
+class cie_total(RadialPSF):
     """The CIE's total glare, the complete point-spread function of the eye.
 
     Parameters
@@ -172,8 +163,8 @@ class cie_total(_AgeingEye):
     True
     """
 
-    age: float = 35.0
-    pigment: float = 0.5
+    age: float = number_field(default=35.0, range=(0, 120), unit="year")
+    pigment: float = number_field(default=0.5, range=(0, 1.2))
 
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.asarray(theta, np.float64)

@@ -8,8 +8,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom.checks import check_index, check_number, check_size
-from vkbloom.psf.base import PSF, Array, check_above, check_radii
+from vkbloom.checks import check_size
+from vkbloom.fields import number_field
+from vkbloom.psf.base import PSF, Array, check_radii
 from vkbloom.psf.bessel import bessel
 from vkbloom.psf.radial import RadialPSF, integrate_pixels
 
@@ -42,10 +43,7 @@ class gaussian(PSF):
 
     unit = "pixel"
 
-    sigma: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "sigma", check_above("sigma", self.sigma))
+    sigma: float = number_field(range=(0, math.inf), unit="pixel", slider=(0.1, 64))
 
     def array(  # noqa: D102  as of PSF
         self, size: tuple[int, int], pixels_per_degree: float | None = None
@@ -107,14 +105,11 @@ class airy(PSF):
 
     unit = "pixel"
 
-    f_number: float = 8.0
-    wavelength: float = 550.0
-    pixel_pitch: float = 4.0
-
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value = check_above(field.name, getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
+    f_number: float = number_field(default=8.0, range=(0, math.inf), slider=(1, 64))
+    wavelength: float = number_field(
+        default=550.0, range=(0, math.inf), unit="nm", slider=(380, 780)
+    )
+    pixel_pitch: float = number_field(default=4.0, range=(0, math.inf), unit="um", slider=(1, 20))
 
     @property
     def _scale(self) -> float:
@@ -179,16 +174,12 @@ class harvey_shack(RadialPSF):
     array([0.025, 0.025, 0.025])
     """
 
-    s: float = -1.86
-    b: float = 0.36
-    l: float = 0.00204  # noqa: E741  as its source has it
-    surfaces: int = 14
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "s", check_number("s", self.s, -10, 0))
-        object.__setattr__(self, "b", check_above("b", self.b))
-        object.__setattr__(self, "l", check_above("l", self.l))
-        object.__setattr__(self, "surfaces", check_index("surfaces", self.surfaces, 1, 1000))
+    s: float = number_field(default=-1.86, range=(-10, 0), slider=(-4, 0))
+    b: float = number_field(default=0.36, range=(0, math.inf), slider=(0.01, 2))
+    l: float = number_field(  # noqa: E741  as its source has it
+        default=0.00204, range=(0, math.inf), unit="radian", slider=(0.0005, 0.02)
+    )
+    surfaces: int = number_field(default=14, range=(1, 1000), slider=(1, 50))
 
     def density(self, theta: ArrayLike) -> Array:  # noqa: D102  as of RadialPSF
         angle = np.radians(np.asarray(theta, np.float64))

@@ -8,13 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from vkbloom.checks import check_size
+from vkbloom.fields import value_field
 from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import Array
 from vkbloom.psf.sampled import SampledPSF
 from vkbloom.settings import Settings
 
 __all__ = ["measured"]
+
+
+def _read_settings(settings: Any) -> Settings:
+    if isinstance(settings, Mapping):
+        settings = Settings.from_dict(settings)
+    if not isinstance(settings, Settings):
+        raise TypeError(f"settings: {settings!r} is not a Settings")
+    if settings.threshold is not None:
+        raise ValueError(
+            f"threshold: {settings.threshold!r} is not None; a bloom with a threshold is not "
+            "linear and has no point spread"
+        )
+    return settings
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,22 +60,8 @@ class measured(SampledPSF):
     array([1., 1., 1.])
     """
 
-    settings: Settings
+    settings: Settings = value_field(read=_read_settings)
     size: tuple[int, int] = (256, 256)
-
-    def __post_init__(self) -> None:
-        settings: Any = self.settings
-        if isinstance(settings, Mapping):
-            settings = Settings.from_dict(settings)
-        if not isinstance(settings, Settings):
-            raise TypeError(f"settings: {settings!r} is not a Settings")
-        if settings.threshold is not None:
-            raise ValueError(
-                f"threshold: {settings.threshold!r} is not None; a bloom with a threshold is not "
-                "linear and has no point spread"
-            )
-        object.__setattr__(self, "settings", settings)
-        object.__setattr__(self, "size", check_size("size", self.size))
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         return _spread(self)

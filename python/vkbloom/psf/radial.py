@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom.checks import check_size
-from vkbloom.psf.base import FRAME_DEGREES, PSF, Array, check_above, check_radii
+from vkbloom.checks import check_above, check_size
+from vkbloom.psf.base import FRAME_DEGREES, PSF, Array, check_radii
 from vkbloom.psf.bessel import bessel
 
 __all__ = ["RadialPSF", "integrate_pixels"]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vkbloom.checks import check_floats, check_index, check_number
+from vkbloom.checks import check_floats
+from vkbloom.fields import number_field, value_field
 from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import PSF, Array, centred
 from vkbloom.psf.resampling import box_resample
@@ -49,10 +50,7 @@ class fog_glow(SampledPSF):
     array([1., 1., 1.])
     """
 
-    size: int = 256
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "size", check_index("size", self.size, 2, 4096))
+    size: int = number_field(default=256, range=(2, 4096), unit="pixel", slider=(2, 1024))
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         u = 2 * np.arange(self.size) / self.size - 1
@@ -62,6 +60,33 @@ class fog_glow(SampledPSF):
         window = (1 + np.cos(np.pi * u)) / 2
         values = np.exp(-9 * radius**0.125) * window * window[:, np.newaxis]
         return np.repeat(values[..., np.newaxis], 3, axis=2)
+
+
+def _check_image(image: Any) -> SampledPSF | ArrayValue:
+    if isinstance(image, Mapping) and "psf" in image:
+        image = PSF.from_dict(image)
+    if isinstance(image, PSF):
+        if not isinstance(image, SampledPSF):
+            raise ValueError(f"image: {image!r} is not defined in pixels; use its array(size)")
+        return image
+    held = check_values("image", image)
+    if (held.array < 0).any() or not held.array.any():
+        raise ValueError("image: some values are below 0, or all of them are 0")
+    return held
+
+
+def _check_center(center: Any) -> tuple[float, ...]:
+    shares = check_floats("center", center)
+    if len(shares) != 2 or not all(0 <= share <= 1 for share in shares):
+        raise ValueError(f"center: {shares!r} is not a pair of numbers of 0 to 1")
+    return shares
+
+
+def _check_prefilter(prefilter: Any) -> tuple[float, ...]:
+    numbers = check_floats("prefilter", prefilter)
+    if len(numbers) != 3 or min(numbers) < 0:
+        raise ValueError(f"prefilter: {prefilter!r} is not (min, max, mult) of at least 0")
+    return numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,25 +132,11 @@ class unreal(SampledPSF):
     array([1., 1., 1.])
     """
 
-    image: Any
-    center: tuple[float, float] | None = None
-    size: float = 1.0
-    prefilter: tuple[float, float, float] = (7.0, 15000.0, 15.0)
-    scatter: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "image", _check_image(self.image))
-        if self.center is not None:
-            center = check_floats("center", self.center)
-            if len(center) != 2 or not all(0 <= share <= 1 for share in center):
-                raise ValueError(f"center: {self.center!r} is not a pair of numbers of 0 to 1")
-            object.__setattr__(self, "center", center)
-        object.__setattr__(self, "size", check_number("size", self.size, 0.001, 4))
-        prefilter = check_floats("prefilter", self.prefilter)
-        if len(prefilter) != 3 or min(prefilter) < 0:
-            raise ValueError(f"prefilter: {self.prefilter!r} is not (min, max, mult) of at least 0")
-        object.__setattr__(self, "prefilter", prefilter)
-        object.__setattr__(self, "scatter", check_number("scatter", self.scatter, 0, 1000))
+    image: Any = value_field(read=_check_image)
+    center: tuple[float, float] | None = value_field(None, read=_check_center)
+    size: float = number_field(default=1.0, range=(0.001, 4))
+    prefilter: tuple[float, float, float] = value_field((7.0, 15000.0, 15.0), read=_check_prefilter)
+    scatter: float = number_field(default=1.0, range=(0, 1000))
 
     def own_array(self) -> Array:  # noqa: D102  as of SampledPSF
         height, width = _image_of(self).shape[:2]
@@ -173,19 +184,6 @@ def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = N
     kernel[kernel.shape[0] // 2, kernel.shape[1] // 2] += tint * (1 - share)
     kernel.flags.writeable = False
     return kernel
-
-
-def _check_image(image: Any) -> SampledPSF | ArrayValue:
-    if isinstance(image, Mapping) and "psf" in image:
-        image = PSF.from_dict(image)
-    if isinstance(image, PSF):
-        if not isinstance(image, SampledPSF):
-            raise ValueError(f"image: {image!r} is not defined in pixels; use its array(size)")
-        return image
-    held = check_values("image", image)
-    if (held.array < 0).any() or not held.array.any():
-        raise ValueError("image: some values are below 0, or all of them are 0")
-    return held
 
 
 def _image_of(psf: unreal) -> Array:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from vkbloom.fields import value_field
 from vkbloom.psf.base import PSF, Array, centred, check_radii
 from vkbloom.psf.values import ArrayValue
 
@@ -84,6 +86,22 @@ class SampledPSF(PSF):
         return np.asarray(np.abs(waves @ lines) / lines.sum(axis=0))
 
 
+def check_values(name: str, values: Any) -> ArrayValue:
+    """Return an array (h, w) or (h, w, 3) of finite numbers, or raise TypeError or ValueError."""
+    try:
+        held = ArrayValue(values)
+    except TypeError as error:
+        raise TypeError(f"{name}: an array is needed, not {type(values).__name__}") from error
+    array = held.array
+    if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,)) or 0 in array.shape:
+        raise ValueError(
+            f"{name}: shape {array.shape} is not (h, w) or (h, w, 3) with sides of at least 1"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: some numbers are not finite as float32")
+    return held
+
+
 @dataclasses.dataclass(frozen=True)
 class samples(SampledPSF):
     """An array as a point-spread function.
@@ -104,10 +122,7 @@ class samples(SampledPSF):
     array([8., 8., 8.])
     """
 
-    values: Any
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", check_values("values", self.values))
+    values: Any = value_field(read=functools.partial(check_values, "values"))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.values.array, dtype=dtype, copy=copy)
@@ -122,22 +137,6 @@ class samples(SampledPSF):
         pixels_per_degree: float | None = None,
     ) -> Array:
         return self.own_array() if size is None else centred(self.own_array(), size)
-
-
-def check_values(name: str, values: Any) -> ArrayValue:
-    """Return an array (h, w) or (h, w, 3) of finite numbers, or raise TypeError or ValueError."""
-    try:
-        held = ArrayValue(values)
-    except TypeError as error:
-        raise TypeError(f"{name}: an array is needed, not {type(values).__name__}") from error
-    array = held.array
-    if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,)) or 0 in array.shape:
-        raise ValueError(
-            f"{name}: shape {array.shape} is not (h, w) or (h, w, 3) with sides of at least 1"
-        )
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name}: some numbers are not finite as float32")
-    return held
 
 
 def rgb(values: ArrayValue) -> Array:

@@ -49,7 +49,7 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     return combine(downs, source, own=own, coarse=coarse, upsample=up, last=up)
 
 
-def gain(settings: BevyBloom) -> float:
+def gain(settings: BevyBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1.
 
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.

@@ -53,7 +53,7 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
-def gain(settings: BlenderGlare) -> float:
+def gain(settings: BlenderGlare, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: the threshold may change it, the levels do not."""
     return float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
 

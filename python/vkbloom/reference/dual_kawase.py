@@ -33,7 +33,7 @@ def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
     return framebuffers
 
 
-def gain(settings: DualKawase) -> float:
+def gain(settings: DualKawase, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: 1, since the weights of both filters sum to 1."""
     return 1.0
 

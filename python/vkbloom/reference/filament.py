@@ -58,7 +58,7 @@ def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
     return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
 
 
-def gain(settings: FilamentBloom) -> float:
+def gain(settings: FilamentBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: what passes the threshold."""
     if settings.threshold is None:
         return 1.0

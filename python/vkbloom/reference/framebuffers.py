@@ -3,28 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from . import (
-    bevy,
-    blender,
-    convolution,
-    dual_kawase,
-    filament,
-    glare,
-    godot,
-    hdrp,
-    kino,
-    pygfx,
-    pyramid,
-    separable,
-    unreal,
-    urp,
-)
+from vkbloom.registry import METHODS, Reference
+
+from . import glare
 from .compositing import CompositeSettings, check_settings, composite_checked
 from .image import BlurInput, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
@@ -37,6 +23,7 @@ class Settings(CompositeSettings, Protocol):
     """The settings that the reference reads for all methods; each method also has its own."""
 
     method: ClassVar[str]
+    published: ClassVar[bool]
 
     @property
     def threshold(self) -> float | None: ...
@@ -50,40 +37,6 @@ class Settings(CompositeSettings, Protocol):
     def format(self) -> str | None: ...
     @property
     def glare(self) -> tuple[Any, ...]: ...
-
-
-class _Method(NamedTuple):
-    """The functions of a method's module.
-
-    - `passes`: ``passes(source, settings)`` returns the framebuffers after the glow, in the order
-      of the data flow; the last one is "bloom". `source` is a `BlurInput`.
-    - `gain`: ``gain(settings)``, or ``gain(settings, size)`` if `sized`, returns the bloom of a
-      flat image of 1.
-    - `published`: Whether `passes` reduces the frame and applies the threshold itself.
-    - `sized`: Whether the gain depends on the size of the frame.
-    """
-
-    passes: Callable[[BlurInput, Any], dict[str, Array]]
-    gain: Callable[..., Any]
-    published: bool = False
-    sized: bool = False
-
-
-_METHODS = {
-    "separable": _Method(separable.passes, separable.gain),
-    "pyramid": _Method(pyramid.passes, pyramid.gain, sized=True),
-    "dual_kawase": _Method(dual_kawase.passes, dual_kawase.gain),
-    "bevy": _Method(bevy.passes, bevy.gain, published=True),
-    "filament": _Method(filament.passes, filament.gain, published=True),
-    "urp": _Method(urp.passes, urp.gain, published=True, sized=True),
-    "hdrp": _Method(hdrp.passes, hdrp.gain, published=True),
-    "unreal": _Method(unreal.passes, unreal.gain, published=True),
-    "kino": _Method(kino.passes, kino.gain, published=True, sized=True),
-    "godot": _Method(godot.passes, godot.gain, published=True),
-    "blender": _Method(blender.passes, blender.gain, published=True),
-    "convolution": _Method(convolution.passes, convolution.gain, sized=True),
-    "pygfx": _Method(pygfx.passes, pygfx.gain, published=True, sized=True),
-}
 
 
 def apply(
@@ -206,7 +159,7 @@ def framebuffers(
     store = storage(format)
     channels = 4 if settings.alpha == "blur" else 3
     reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
-    if method.published:
+    if settings.published:
         glow = store.end(reduced)
     else:
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
@@ -224,7 +177,7 @@ def framebuffers(
 
 def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
     """Return the input of the stages of glare; published methods do not threshold the glow."""
-    if not _METHODS[settings.method].published:
+    if not settings.published:
         return glow
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
@@ -290,10 +243,12 @@ def passes(
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
-    colours = store.end(colours) if method.published else store(colours)
+    colours = store.end(colours) if settings.published else store(colours)
     size = size or (width, height)
-    weights = as_mask(mask, size) if mask is not None and method.published else None
-    framebuffers = method.passes(BlurInput(colours, size, store, weights), settings)
+    weights = as_mask(mask, size) if mask is not None and settings.published else None
+    framebuffers: dict[str, Array] = method.passes(
+        BlurInput(colours, size, store, weights), settings
+    )
     if not has_alpha:
         return framebuffers
     return _with_alphas(framebuffers)
@@ -365,18 +320,19 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     1.922
     """
     method = _method(settings)
-    threshold = None if method.published else settings.threshold
+    threshold = None if settings.published else settings.threshold
     glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
-    return glow * (method.gain(settings, size) if method.sized else method.gain(settings))
+    return glow * method.gain(settings, size)
 
 
-def _method(settings: Settings) -> _Method:
+def _method(settings: Settings) -> Reference:
     check_settings(settings)
     try:
-        return _METHODS[settings.method]
+        return METHODS.reference(settings.method)
     except KeyError:
-        known = ", ".join(map(repr, _METHODS))
-        raise ValueError(f"method must be one of {known}, not {settings.method!r}") from None
+        raise ValueError(
+            f"method: {settings.method!r} has no reference in NumPy; register one with it"
+        ) from None
 
 
 def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:

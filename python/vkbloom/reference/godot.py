@@ -56,7 +56,7 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
     return framebuffers
 
 
-def gain(settings: GodotBloom) -> float:
+def gain(settings: GodotBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1."""
     value, total = np.ones((1, 1, 1)), 0.0
     for level, weight in enumerate(_weights(settings)):

@@ -71,7 +71,7 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
     )
 
 
-def gain(settings: HdrpBloom) -> float:
+def gain(settings: HdrpBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: 1, since no filter and no mix changes it."""
     return 1.0
 

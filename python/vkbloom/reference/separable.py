@@ -54,7 +54,7 @@ def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
     return {**framebuffers, "bloom": source.store(bloom)}
 
 
-def gain(settings: Separable) -> float:
+def gain(settings: Separable, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: the sum over the layers of s * g^(2 loops).
 
     g is the sum of the effective kernel: 1.3865 with the default weights, so that the result is

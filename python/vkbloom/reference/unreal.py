@@ -56,7 +56,7 @@ def passes(source: BlurInput, settings: UnrealBloom) -> dict[str, Array]:
     return framebuffers
 
 
-def gain(settings: UnrealBloom) -> float:
+def gain(settings: UnrealBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: about 3, because each kernel sums to nearly 1."""
     value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
     for k, factor in enumerate(_factors(settings.radius)):

@@ -1,0 +1,137 @@
+"""The registries of methods and of stages of glare: their classes by name.
+
+All parts of the package read a registry at the time of use, so that a class that is registered
+later has options, controls, axes, fits and JSON like the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any, Final, Protocol
+
+__all__ = ["METHODS", "STAGES", "Methods", "Reference", "Registry"]
+
+
+class Reference(Protocol):
+    """A method in NumPy, such as the modules of `vkbloom.reference`.
+
+    ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the data
+    flow; the last one is "bloom". `source` is a `vkbloom.reference.image.BlurInput`.
+    ``gain(settings, size)`` returns the bloom of a flat image of 1; `size` is the width and height
+    of the frame.
+    """
+
+    passes: Any
+    gain: Any
+
+
+class Registry(Mapping[str, type[Any]]):
+    """Classes by name. Those of the package are imported on first use, since some import much.
+
+    Parameters
+    ----------
+    package : str
+        The package of the classes' modules.
+    places : dict
+        "module:Class" in this package, by name.
+    """
+
+    def __init__(self, package: str, places: Mapping[str, str]) -> None:
+        self._sources: dict[str, str | type[Any]] = {
+            name: f"{package}.{place}" for name, place in places.items()
+        }
+
+    def __getitem__(self, name: str) -> type[Any]:
+        source = self._sources[name]
+        if isinstance(source, type):
+            return source
+        module, _, kind = source.partition(":")
+        return getattr(import_module(module), kind)  # type: ignore[no-any-return]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sources)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._sources
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    def class_named(self, name: str) -> type[Any] | None:
+        """Return the class with this name in Python; None if there is none."""
+        for key, source in self._sources.items():
+            own = source.partition(":")[2] if isinstance(source, str) else source.__name__
+            if own == name:
+                return self[key]
+        return None
+
+
+class Methods(Registry):
+    """The settings classes of the methods, and the methods in NumPy."""
+
+    _references: Final[dict[str, Reference]]
+
+    def __init__(self, package: str, places: Mapping[str, str]) -> None:
+        super().__init__(package, places)
+        self._references = {}
+
+    def register(self, kind: type[Any], reference: Reference | None = None) -> None:
+        """Add a class under its `method`, or replace one that was added.
+
+        Raises
+        ------
+        ValueError
+            The name is that of a method of the package.
+        """
+        name = kind.method
+        if isinstance(self._sources.get(name), str):
+            raise ValueError(f"method: {name!r} is a method of vkbloom; give another name")
+        self.unregister(name)
+        self._sources[name] = kind
+        if reference is not None:
+            self._references[name] = reference
+
+    def unregister(self, name: str) -> None:
+        """Remove a class that was added, if it is there."""
+        if isinstance(self._sources.get(name), type):
+            del self._sources[name]
+            self._references.pop(name, None)
+
+    def reference(self, name: str) -> Reference:
+        """Return a method in NumPy; raise KeyError if there is none."""
+        if isinstance(self._sources.get(name), str):
+            module: Any = import_module(f"vkbloom.reference.{name}")
+            return module  # type: ignore[no-any-return]
+        return self._references[name]
+
+
+#: The methods. Their order is that of ``VKB_METHODS`` in the core.
+METHODS: Final = Methods(
+    "vkbloom.methods",
+    {
+        "separable": "separable:Separable",
+        "pyramid": "mip_chain:Pyramid",
+        "dual_kawase": "mip_chain:DualKawase",
+        "convolution": "convolution:Convolution",
+        "bevy": "bevy:BevyBloom",
+        "kino": "kino:KinoBloom",
+        "filament": "filament:FilamentBloom",
+        "urp": "unity:UrpBloom",
+        "hdrp": "unity:HdrpBloom",
+        "unreal": "unreal:UnrealBloom",
+        "godot": "godot:GodotBloom",
+        "blender": "blender:BlenderGlare",
+        "pygfx": "pygfx:PygfxBloom",
+    },
+)
+#: The stages of glare.
+STAGES: Final = Registry(
+    "vkbloom.glare",
+    {
+        "streaks": "streaks:Streaks",
+        "ghosts": "flares:Ghosts",
+        "halo": "flares:Halo",
+        "dirt": "dirt:Dirt",
+    },
+)
