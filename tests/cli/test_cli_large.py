@@ -282,3 +282,20 @@ def test_a_damaged_file(tmp_path: Path, by_rows: list[int]) -> None:
     assert result.exit_code == 1
     assert "a.png: damaged" in result.stderr
     assert not (tmp_path / "b.png").exists()
+
+
+def test_apply_file_is_the_render_of_the_array(tmp_path: Path, by_rows: list[int]) -> None:
+    image = stored(tmp_path / "a.exr", light(50, 41, 3, "float16"))
+    done: list[tuple[int, int]] = []
+    with vkbloom.Renderer("software") as renderer:
+        vkbloom.apply_file(
+            image,
+            tmp_path / "b.exr",
+            vkbloom.presets["kino"],
+            renderer=renderer,
+            progress=lambda rows, total: done.append((rows, total)),
+        )
+        expected = renderer.apply(vkbloom.read(image), vkbloom.presets["kino"])
+    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
+    assert len(by_rows) > 1
+    assert done[-1] == (100, 100)
