@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from vkbloom.grid.sheet import contact_sheet
     from vkbloom.grid.zarr_grid import grid_to_zarr
     from vkbloom.io.array_files import read, write
+    from vkbloom.large_files import apply_file
     from vkbloom.methods.bevy import BevyBloom
     from vkbloom.methods.blender import BlenderGlare
     from vkbloom.methods.convolution import Convolution
@@ -91,6 +92,7 @@ _LATE = {
     "Plan": "vkbloom.plans",
     "Scene": "vkbloom.scene",
     "Surface": "vkbloom.surface",
+    "apply_file": "vkbloom.large_files",
     "check_grid": "vkbloom.grid.checking",
     "contact_sheet": "vkbloom.grid.sheet",
     "explore": "vkbloom.explorer",
@@ -146,6 +148,7 @@ __all__ = [
     "UrpBloom",
     "ValidationError",
     "adapters",
+    "apply_file",
     "check_grid",
     "contact_sheet",
     "explore",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, cast
 
 from vkbloom import _core
 from vkbloom.checks import check_size, import_extra
+from vkbloom.core_access import core_of
 from vkbloom.settings import check_settings
 from vkbloom.sources import image_source, is_image, scene_source
 
@@ -34,7 +35,9 @@ def _window_surface(renderer: Renderer, window: object) -> int:
             "the bundled driver has no windows; use the system's with VKBLOOM_DRIVER=system"
         )
     handle = ctypes.c_uint64()
-    result = glfw.create_window_surface(renderer._core.instance, window, None, ctypes.byref(handle))
+    result = glfw.create_window_surface(
+        core_of(renderer).instance, window, None, ctypes.byref(handle)
+    )
     if result != 0:
         raise _core.Error(
             f"{renderer.info.name} cannot create a surface for this window (VkResult {result}); "
@@ -124,7 +127,7 @@ class Surface:
         self._size = check_size("size", size)
         handle = 0 if window is None else _window_surface(renderer, window)
         self._renderer, self._window = renderer, window
-        self._screen = renderer._core.open_screen(handle, mailbox)
+        self._screen = core_of(renderer).open_screen(handle, mailbox)
         self._pending: deque[_core.Submission] = deque()
 
     @property
@@ -202,7 +205,7 @@ class Surface:
             given = image_source(source)
         else:
             given = scene_source(cast("Scene", source), size or (width, height), shading, time)
-        core = self._renderer._core
+        core = core_of(self._renderer)
         plan = core.plan(given, settings, (_copied(source, settings, attachment),))
         ((_, shape, dtype),) = plan.outputs
         if len(shape) != 3:
@@ -234,7 +237,7 @@ class Surface:
         ...     surface.close()
         """
         self._pending.clear()
-        self._renderer._core.close_screen(self._screen)
+        core_of(self._renderer).close_screen(self._screen)
         self._screen = 0
 
     def __enter__(self) -> Self:

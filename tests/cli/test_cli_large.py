@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
+from vkbloom import large_files
 from vkbloom.banded import BloomByBands, ImageByBands
-from vkbloom.cli import large
 from vkbloom.cli.program import program
 from vkbloom.io import rows
 
@@ -48,16 +48,16 @@ def light(height: int, width: int, channels: int, dtype: str) -> Any:
 @pytest.fixture
 def by_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Read every picture in bands of a few rows; return the number of rows of each band."""
-    monkeypatch.setattr(large, "LARGE", 1)
+    monkeypatch.setattr(large_files, "LARGE", 1)
     monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 41 * 7)
     counts: list[int] = []
-    result = large._Reading.result
+    result = large_files._Reading.result
 
     def counted(self: Any, final: Any, settings: Any) -> Any:
         counts.append(len(final))
         return result(self, final, settings)
 
-    monkeypatch.setattr(large._Reading, "result", counted)
+    monkeypatch.setattr(large_files._Reading, "result", counted)
     return counts
 
 
@@ -87,7 +87,7 @@ def test_the_same_as_a_whole(
     assert run(*words, "-o", target).exit_code == 0
     assert sum(by_rows) == 50
     assert set(by_rows[:-1]) == ({16} if tile else {7})
-    monkeypatch.setattr(large, "LARGE", 1 << 40)
+    monkeypatch.setattr(large_files, "LARGE", 1 << 40)
     assert run(*words, "-o", f"whole_{target}").exit_code == 0
     assert np.array_equal(vkbloom.read(target), vkbloom.read(f"whole_{target}"))
 
@@ -120,7 +120,7 @@ def same_as_a_whole(
     """Run twice, compare, and return the result."""
     assert run(*words, "-o", target).exit_code == 0
     assert len(by_rows) > 1
-    monkeypatch.setattr(large, "LARGE", 1 << 40)
+    monkeypatch.setattr(large_files, "LARGE", 1 << 40)
     by_rows.clear()
     whole = target.with_name(f"whole_{target.name}")
     assert run(*words, "-o", whole).exit_code == 0
@@ -213,10 +213,10 @@ def test_layers_and_parts(
     assert writer.close()
     target = tmp_path / "b.exr"
     second = same_as_a_whole(monkeypatch, by_rows, target, path, "--subimage", 1)
-    monkeypatch.setattr(large, "LARGE", 1)
+    monkeypatch.setattr(large_files, "LARGE", 1)
     layer = same_as_a_whole(monkeypatch, by_rows, target, path, "--layer", "glow")
     assert np.array_equal(second, layer)
-    monkeypatch.setattr(large, "LARGE", 1)
+    monkeypatch.setattr(large_files, "LARGE", 1)
     first = run(path, "-o", target)
     assert "read the first of its parts 0 first, 1 second" in first.stderr
     assert not np.array_equal(vkbloom.read(target), layer)
@@ -282,3 +282,20 @@ def test_a_damaged_file(tmp_path: Path, by_rows: list[int]) -> None:
     assert result.exit_code == 1
     assert "a.png: damaged" in result.stderr
     assert not (tmp_path / "b.png").exists()
+
+
+def test_apply_file_is_the_render_of_the_array(tmp_path: Path, by_rows: list[int]) -> None:
+    image = stored(tmp_path / "a.exr", light(50, 41, 3, "float16"))
+    done: list[tuple[int, int]] = []
+    with vkbloom.Renderer("software") as renderer:
+        vkbloom.apply_file(
+            image,
+            tmp_path / "b.exr",
+            vkbloom.presets["kino"],
+            renderer=renderer,
+            progress=lambda rows, total: done.append((rows, total)),
+        )
+        expected = renderer.apply(vkbloom.read(image), vkbloom.presets["kino"])["final"]
+    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
+    assert len(by_rows) > 1
+    assert done[-1] == (100, 100)

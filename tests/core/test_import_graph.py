@@ -14,6 +14,8 @@ import vkbloom
 PACKAGE = Path(vkbloom.__file__).parent
 # The core is a module of its own, whose name says only that the package wraps it.
 PUBLIC = {"_core"}
+# The modules that read a renderer's core.
+SEAM = {"vkbloom.renderer", "vkbloom.core_access"}
 
 
 def module_files(package: Path) -> dict[str, Path]:
@@ -86,6 +88,18 @@ def test_no_module_uses_private_names_of_another() -> None:
     files = module_files(PACKAGE)
     assert len(files) > 100
     assert [use for name, file in files.items() for use in private_uses(name, file)] == []
+
+
+def test_core_of_a_renderer_is_read_in_the_seam_only() -> None:
+    reading = {
+        name
+        for name, file in module_files(PACKAGE).items()
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute)
+        and node.attr == "_core"
+        and ast.unparse(node.value) not in ("self", "vkbloom")
+    }
+    assert reading <= SEAM
 
 
 @pytest.mark.parametrize(

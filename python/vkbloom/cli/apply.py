@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -20,16 +20,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom.cli import no_bloom
+from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
-from vkbloom.cli.glow_options import (
-    accompanying,
-    glow_options,
-    has_straight,
-    premultiplied,
-    uploaded,
-)
+from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
 from vkbloom.cli.image_files import (
     COLOURS,
     check_input_colour,
@@ -40,17 +34,17 @@ from vkbloom.cli.image_files import (
     silenced,
     subimage_option,
 )
-from vkbloom.cli.in_a_row import read_ahead, rendered, written_behind
-from vkbloom.cli.large import Large, apply_by_rows, is_large
+from vkbloom.cli.overlapped import read_ahead, rendered, written_behind
 from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.program import given as was_given
 from vkbloom.cli.sequences import PIPE, check_targets, pairs
 from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
-from vkbloom.io.array_files import divided
+from vkbloom.io.array_files import premultiplied
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, SavedColour
-from vkbloom.settings import Encoding
+from vkbloom.large_files import finished, is_large
 
 
 @click.command(cls=Command)
@@ -112,26 +106,8 @@ from vkbloom.settings import Encoding
 @glow_options
 @device_options
 @settings_options
-def command(  # noqa: PLR0915  one step after the other
-    *,
-    sources: tuple[str, ...],
-    out: str | None,
-    quality: int | None,
-    pipe_format: str,
-    attachments: str,
-    input_colour: Colour | None,
-    output_colour: SavedColour | None,
-    raw: bool,
-    half: bool | None,
-    overwrite: bool,
-    expand: float | None,
-    subimage: int,
-    layer: str | None,
-    mask: str | None,
-    emission: str | None,
-    adapter: str,
-    validation: bool,
-    settings: vkbloom.Settings,
+def command(
+    *, sources: tuple[str, ...], out: str | None, adapter: str, validation: bool, **given: Any
 ) -> None:
     """Add bloom to the image IN and write the result to OUT.
 
@@ -170,117 +146,208 @@ def command(  # noqa: PLR0915  one step after the other
 
     OUT is replaced when the new file is complete. A call that fails leaves no partial file.
     """
-    _check_colours(settings, input_colour, output_colour, raw=raw)
-    check_input_colour(input_colour)
-    given, out = _arguments(sources, out)
-    if out == PIPE and attachments != "final":
+    options = _Options(**given)
+    inputs, target = _arguments(sources, out)
+    work = _planned(options, inputs, target)
+    with tempfile.TemporaryDirectory() as folder, silenced(), ExitStack() as stack:
+
+        @functools.cache
+        def renderer() -> vkbloom.Renderer:
+            opened = stack.enter_context(opened_renderer(adapter, validation))
+            _say(f"Rendering on {opened.info.summary}", target)
+            return opened
+
+        run = _Run(options, target, Path(folder), renderer, several=len(work) > 1)
+        for is_alone, group in itertools.groupby(work, key=lambda pair: run.is_by_rows(pair[0])):
+            if is_alone:
+                for pair in group:
+                    run.large_file(*pair)
+            else:
+                run.sequence([*group])
+    if len(work) > 1:
+        click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Options:
+    """The options of the command by their names."""
+
+    quality: int | None
+    pipe_format: str
+    attachments: str
+    input_colour: Colour | None
+    output_colour: SavedColour | None
+    raw: bool
+    half: bool | None
+    overwrite: bool
+    expand: float | None
+    subimage: int
+    layer: str | None
+    mask: str | None
+    emission: str | None
+    settings: vkbloom.Settings
+
+    @property
+    def names(self) -> str | list[str]:
+        """The framebuffers to write."""
+        return "all" if self.attachments == "all" else ["final", *self.attachments.split(",")]
+
+    @property
+    def is_blended(self) -> bool:
+        """Whether colours are multiplied by alpha."""
+        return self.settings.alpha != "keep"
+
+
+def _planned(options: _Options, sources: list[str], out: str) -> list[tuple[str, str]]:
+    """Check the options, and return the files to read, each with the file to write."""
+    _check_colours(options.settings, options.input_colour, options.output_colour, raw=options.raw)
+    check_input_colour(options.input_colour)
+    if out == PIPE and options.attachments != "final":
         raise click.UsageError("standard output takes only final; leave out --attachments")
-    work = pairs(given, out)
-    check_targets(work, out, overwrite=overwrite)
+    work = pairs(sources, out)
+    check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
-            checked = f"image.{pipe_format}" if out == PIPE else target
+            checked = f"image.{options.pipe_format}" if out == PIPE else target
             _check_writable(checked)
-            image_writing.check_quality(checked, quality)
-    names = attachments if attachments == "all" else ["final", *attachments.split(",")]
-    wanted = no_bloom.with_bloom(names, settings)
-    several = len(work) > 1
-    is_blended = settings.alpha != "keep"
-    with tempfile.TemporaryDirectory() as folder, silenced():
+            image_writing.check_quality(checked, options.quality)
+    return work
 
-        def taken(source: str) -> Picture:
-            file = _piped_in(folder) if source == PIPE else source
-            try:
-                picture = read_picture(
-                    file, subimage, input_colour, layer=layer, raw=raw, expand=expand
-                )
-            except ValueError as error:
-                # The user does not know the temporary folder of standard input.
-                raise ValueError(str(error).replace(f"{folder}{os.sep}", "")) from error
-            return premultiplied(picture) if is_blended else picture
 
-        def write(picture: Picture, frames: vkbloom.Frames, target: str) -> None:
-            if target != out:
-                Path(target).parent.mkdir(exist_ok=True)
-            file = Path(folder, f"output.{pipe_format}") if out == PIPE else Path(target)
-            written = _written(picture, frames, file, output_colour, quality)
-            if out == PIPE:
-                sys.stdout.buffer.write(file.read_bytes())
-            elif not several:
-                for path in written:
-                    click.echo(f"wrote {path}")
+class _Run:
+    """The files of one call."""
 
-        how = Large(mask, emission, layer, subimage, input_colour, raw, half, expand)
-
-        def by_rows(name: str) -> bool:
-            is_piped = PIPE in (name, out)
-            return attachments == "final" and not is_piped and is_large(name, subimage, layer)
-
-        def write_large(renderer: vkbloom.Renderer, name: str, target: str) -> None:
-            if target != out:
-                Path(target).parent.mkdir(exist_ok=True)
-            apply_by_rows(
-                renderer,
-                name,
-                Path(target),
-                settings,
-                how,
-                colour=output_colour,
-                quality=quality,
-                disable=disable,
-            )
-            if not several:
-                click.echo(f"wrote {target}")
-
-        # Read once, before the first picture that is not read in bands.
-        given_with = functools.cache(
-            functools.partial(
-                accompanying, mask, emission, input_colour, raw=raw, is_blended=is_blended
-            )
-        )
+    def __init__(
+        self,
+        options: _Options,
+        out: str,
+        folder: Path,
+        renderer: Callable[[], vkbloom.Renderer],
+        *,
+        several: bool,
+    ) -> None:
+        self._options = options
+        self._out = out
+        self._folder = folder
+        self._renderer = renderer
+        self._several = several
         # None: shown where standard error is a terminal.
-        disable = None if sys.stderr is not None else True
-        with ExitStack() as stack:
-            renderer: vkbloom.Renderer | None = None
-            for is_alone, group in itertools.groupby(work, key=lambda pair: by_rows(pair[0])):
-                files = list(group)
-                # Read before the device is opened, so that a wrong file fails at once.
-                first = None if is_alone else taken(files[0][0])
-                if renderer is None:
-                    renderer = stack.enter_context(opened_renderer(adapter, validation))
-                    _say(f"Rendering on {renderer.info.summary}", out)
-                if first is None:
-                    for name, target in files:
-                        write_large(renderer, name, target)
-                    continue
-                prepared = functools.partial(_prepared, renderer, given_with())
-                with as_wrong_use():
-                    renderer.plan(prepared(first), settings, attachments=wanted)
-                ahead = read_ahead(taken, [name for name, _ in files[1:]])
-                pictures = itertools.chain([first], ahead)
-                results = rendered(renderer, pictures, settings, wanted, prepared)
-                del first
-                bar = tqdm(
-                    results,
-                    total=len(files),
-                    unit="image",
-                    leave=False,
-                    disable=disable if several else True,
+        self._hidden = None if sys.stderr is not None else True
+
+    def is_by_rows(self, name: str) -> bool:
+        """Whether a file is read and written in bands of rows."""
+        options = self._options
+        is_piped = PIPE in (name, self._out)
+        is_alone = options.attachments == "final" and not is_piped
+        return is_alone and is_large(name, options.subimage, options.layer)
+
+    def large_file(self, name: str, target: str) -> None:
+        """Add bloom to one file in bands of rows."""
+        options = self._options
+        if target != self._out:
+            Path(target).parent.mkdir(exist_ok=True)
+        with tqdm(unit="row", leave=False, disable=self._hidden) as bar:
+
+            def show(done: int, total: int) -> None:
+                bar.total = total
+                bar.update(done - bar.n)
+
+            with _wrong_use_of("mask", "emission", "raw"):
+                notes = vkbloom.apply_file(
+                    name,
+                    target,
+                    options.settings,
+                    renderer=self._renderer(),
+                    mask=options.mask,
+                    emission=options.emission,
+                    layer=options.layer,
+                    subimage=options.subimage if was_given("subimage") else None,
+                    input_colour=options.input_colour,
+                    output_colour=options.output_colour,
+                    raw=options.raw,
+                    half=options.half,
+                    expand=options.expand,
+                    quality=options.quality,
+                    progress=show,
                 )
-                with written_behind() as write_next, contextlib.closing(results):
-                    for (picture, frames), (name, target) in zip(bar, files, strict=True):
-                        said = [*no_bloom.empty_stages(frames, settings)]
-                        if no_bloom.is_without(frames):
-                            brightest = no_bloom.brightest_of(picture.pixels)
-                            said.insert(0, no_bloom.reason(settings, brightest))
-                        elif text := no_bloom.darkening(picture.pixels, frames):
-                            said.insert(0, text)
-                        for text in said:
-                            note(f"{name}: {text}" if several else text)
-                        kept = no_bloom.only(frames, names)
-                        write_next(functools.partial(write, picture, kept, target))
-    if several:
-        click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+        for text in notes:
+            note(text)
+        if not self._several:
+            click.echo(f"wrote {target}")
+
+    def sequence(self, files: list[tuple[str, str]]) -> None:
+        """Add bloom to files one after the other; read and write others meanwhile."""
+        options, settings = self._options, self._options.settings
+        # Read before the device is opened, so that a wrong file fails at once.
+        first = self._read(files[0][0])
+        prepared = functools.partial(_prepared, self._renderer(), self._glow_of)
+        wanted = no_bloom.with_bloom(options.names, settings)
+        with as_wrong_use():
+            self._renderer().plan(prepared(first), settings, attachments=wanted)
+        ahead = read_ahead(self._read, [name for name, _ in files[1:]])
+        pictures = itertools.chain([first], ahead)
+        results = rendered(self._renderer(), pictures, settings, wanted, prepared)
+        del first
+        hidden = self._hidden if self._several else True
+        bar = tqdm(results, total=len(files), unit="image", leave=False, disable=hidden)
+        with written_behind() as write_next, contextlib.closing(results):
+            for (picture, frames), (name, target) in zip(bar, files, strict=True):
+                for text in no_bloom.notes(frames, picture.pixels):
+                    note(f"{name}: {text}" if self._several else text)
+                kept = no_bloom.only(frames, options.names)
+                write_next(functools.partial(self._write, picture, kept, target))
+
+    def _read(self, source: str) -> Picture:
+        options = self._options
+        file = _piped_in(self._folder) if source == PIPE else source
+        try:
+            picture = read_picture(
+                file,
+                options.subimage,
+                options.input_colour,
+                layer=options.layer,
+                raw=options.raw,
+                expand=options.expand,
+            )
+        except ValueError as error:
+            # The user does not know the temporary folder of standard input.
+            raise ValueError(str(error).replace(f"{self._folder}{os.sep}", "")) from error
+        return premultiplied(picture) if options.is_blended else picture
+
+    @functools.cached_property
+    def _glow_of(self) -> Callable[[NDArray[Any]], Any]:
+        """Mask and emission for an image. Their files are read once."""
+        options = self._options
+        return accompanying(
+            options.mask,
+            options.emission,
+            options.input_colour,
+            raw=options.raw,
+            is_blended=options.is_blended,
+        )
+
+    def _write(self, picture: Picture, frames: vkbloom.Frames, target: str) -> None:
+        if target != self._out:
+            Path(target).parent.mkdir(exist_ok=True)
+        is_piped = self._out == PIPE
+        file = self._folder / f"output.{self._options.pipe_format}" if is_piped else Path(target)
+        written = _written(picture, frames, file, self._options)
+        if is_piped:
+            sys.stdout.buffer.write(file.read_bytes())
+        elif not self._several:
+            for path in written:
+                click.echo(f"wrote {path}")
+
+
+@contextlib.contextmanager
+def _wrong_use_of(*names: str) -> Iterator[None]:
+    """Convert a ValueError that names one of these arguments to click.UsageError."""
+    try:
+        yield
+    except ValueError as error:
+        if str(error).startswith(tuple(f"{name}:" for name in names)):
+            raise click.UsageError(str(error)) from error
+        raise
 
 
 def _check_writable(target: str) -> None:
@@ -336,31 +403,27 @@ def _say(text: str, out: str) -> None:
     click.echo(text, err=out == PIPE)
 
 
-def _piped_in(folder: str) -> str:
+def _piped_in(folder: Path) -> str:
     """Return a file with the content of standard input, which also tells its format."""
-    path = Path(folder, "standard input")
+    path = folder / "standard input"
     path.write_bytes(sys.stdin.buffer.read())
     return str(path)
 
 
 def _written(
-    picture: Picture,
-    frames: vkbloom.Frames,
-    target: Path,
-    colour: SavedColour | None,
-    quality: int | None,
+    picture: Picture, frames: vkbloom.Frames, target: Path, options: _Options
 ) -> list[Path]:
     """Write `final` and the other framebuffers, and return the files."""
     written = _save_others(frames, target)
     notes = image_writing.save(
-        _result(picture, _straight(picture, frames), frames.settings.encoding),
+        finished(picture, frames["final"], frames.settings),
         target,
-        colour,
+        options.output_colour,
         {
             "Software": f"vkbloom {vkbloom.__version__}",
             "vkbloom:settings": json.dumps(frames.settings.to_dict()),
         },
-        quality,
+        options.quality,
     )
     for text in notes:
         note(text)
@@ -377,19 +440,3 @@ def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
             )
             written += alone.save(target.with_name(f"{target.stem}_{name}{target.suffix}"))
     return written
-
-
-def _result(
-    picture: Picture,
-    final: NDArray[Any],
-    encoding: Encoding,
-) -> Picture:
-    """Return the picture with its bloom, and with the encoding of the new pixels."""
-    done = picture.encoding if encoding == "none" else encoding
-    return dataclasses.replace(picture, pixels=final, encoding=done)
-
-
-def _straight(picture: Picture, frames: vkbloom.Frames) -> NDArray[Any]:
-    """Return `final`, divided by alpha if the colours of the file were not multiplied by it."""
-    final = frames["final"]
-    return divided(final) if frames.settings.alpha != "keep" and has_straight(picture) else final

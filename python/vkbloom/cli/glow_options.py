@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -12,15 +11,13 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.image_files import read_picture
-from vkbloom.io.array_files import multiplied
+from vkbloom.io.array_files import premultiplied
 from vkbloom.io.glows import alike, grey_mask
-from vkbloom.io.images import Colour, Picture
+from vkbloom.io.images import Colour
 
 __all__ = [
     "accompanying",
     "glow_options",
-    "has_straight",
-    "premultiplied",
     "refuse_glow_of_scene",
     "uploaded",
 ]
@@ -81,18 +78,6 @@ def accompanying(
         return given if glow is None else {**given, "emission": alike(glow, image)}
 
     return arguments
-
-
-def has_straight(picture: Picture) -> bool:
-    """Whether a picture's file has alpha, and colours that are not multiplied by it."""
-    return picture.pixels.shape[2] == 4 and not picture.stored.associated
-
-
-def premultiplied(picture: Picture) -> Picture:
-    """Return a picture whose colours are multiplied by alpha, if there is one."""
-    if not has_straight(picture):
-        return picture
-    return dataclasses.replace(picture, pixels=multiplied(picture.pixels))
 
 
 def uploaded(

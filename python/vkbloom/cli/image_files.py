@@ -67,14 +67,8 @@ def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
 def check_part_is_given(path: str, stored: StoredImage) -> None:
     """Raise click.UsageError if a file has several parts and --subimage is not given."""
     if len(stored.parts) > 1 and not given("subimage"):
-        raise click.UsageError(
-            f"{path}: has several parts; choose one with --subimage: {_listed(stored)}"
-        )
-
-
-def _listed(stored: StoredImage) -> str:
-    names = ", ".join(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
-    return f"parts {names}" if names else f"{len(stored.parts)} parts"
+        parts = image_reading.listed_parts(stored)
+        raise click.UsageError(f"{path}: has several parts; choose one with --subimage: {parts}")
 
 
 def note(text: str) -> None:
@@ -106,27 +100,14 @@ def read_picture(
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
         raise not_of_bytes(source, stored.numbers[0])
-    picture = decoded(stored, source, colour, raw=raw, expand=expand)
+    picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     note_parts(source, stored, layer)
-    note_specials(source, int(np.isnan(picture.values).sum()), int(np.isinf(picture.values).sum()))
+    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    if (text := image_reading.specials_note(*counts)) is not None:
+        note(f"{source} {text}")
     for text in picture.notes:
         note(f"{source}: {text}")
     return picture
-
-
-def decoded(
-    stored: StoredImage,
-    source: str,
-    colour: Colour | None,
-    *,
-    raw: bool = False,
-    expand: float | None = None,
-) -> Picture:
-    """Decode an image as `image_reading.decode` does; a ValueError names the file."""
-    try:
-        return image_reading.decode(stored, colour, raw=raw, expand=expand)
-    except ValueError as error:
-        raise ValueError(f"{source}: {error}") from error
 
 
 def has_integers(source: str) -> bool:
@@ -157,16 +138,8 @@ def not_of_bytes(source: str, numbers: str) -> click.UsageError:
 def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
     """Print a note if the first of several parts was read without --subimage."""
     if len(stored.parts) > 1 and layer is None and not given("subimage"):
-        note(f"{source}: read the first of its {_listed(stored)}; --subimage reads another")
-
-
-def note_specials(source: str, nan: int, infinite: int) -> None:
-    """Print a note with the number of values that are not finite, if there are any."""
-    if nan or infinite:
-        note(
-            f"{source} has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, "
-            "and stay in the picture"
-        )
+        parts = image_reading.listed_parts(stored)
+        note(f"{source}: read the first of its {parts}; --subimage reads another")
 
 
 _quiet = threading.Lock()

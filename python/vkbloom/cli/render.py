@@ -14,7 +14,7 @@ from rich.table import Table
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom.cli import no_bloom
+from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.image_files import note

@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
+from vkbloom.core_access import core_of
 from vkbloom.explorer.controls import as_code, controls, settings_from
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.io.glows import alike, grey_mask
@@ -355,7 +356,7 @@ class Viewer:
 
     def _passes(self, source: _core.Source, settings: Settings, name: str) -> list[Pass]:
         """Return the passes of a framebuffer; of an image with its mask and emission."""
-        plan = self.renderer._core.plan(source, settings, (name,))
+        plan = core_of(self.renderer).plan(source, settings, (name,))
         return [Pass(*row[:-1]) for row in plan.passes]
 
     def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:

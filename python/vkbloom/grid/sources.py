@@ -21,6 +21,7 @@ from vkbloom.checks import (
     check_size,
     check_time,
 )
+from vkbloom.core_access import HasCore, core_of
 from vkbloom.frames import Frames
 from vkbloom.grid.order import Index
 from vkbloom.image import Image
@@ -50,7 +51,7 @@ class Point:
     place: float
 
 
-class FrameRenderer(Protocol):
+class FrameRenderer(HasCore, Protocol):
     """The part of a `Renderer` that grids use.
 
     A protocol, because the renderer's module imports the grids.
@@ -59,8 +60,6 @@ class FrameRenderer(Protocol):
     @property
     def info(self) -> AdapterInfo:
         """The adapter."""
-
-    _core: _core.Renderer
 
     def _run_work(
         self, sequence: Iterable[Work], names: tuple[str, ...] | None
@@ -141,8 +140,8 @@ class ImageSource:
         if isinstance(image, Image):
             return self.for_core(place)
         core, held = self._uploaded
-        if core is not renderer._core:
-            core, held = self._uploaded = renderer._core, {}
+        if core is not core_of(renderer):
+            core, held = self._uploaded = core_of(renderer), {}
         if int(place) not in held:
             spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
             held[int(place)] = core.upload(self.for_core(place), spare, True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal, overload
@@ -17,7 +18,7 @@ from vkbloom.io.expansion import check_expansion
 from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
 from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, check_name, is_exr
 
-__all__ = ["divided", "multiplied", "read", "write"]
+__all__ = ["divided", "has_straight", "multiplied", "premultiplied", "read", "write"]
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22"]
 
@@ -317,6 +318,18 @@ def _numbers(
             "np.repeat(array[..., :1], 3, axis=2)"
         )
     raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
+
+
+def has_straight(picture: Picture) -> bool:
+    """Whether a picture's file has alpha, and colours that are not multiplied by it."""
+    return picture.pixels.shape[2] == 4 and not picture.stored.associated
+
+
+def premultiplied(picture: Picture) -> Picture:
+    """Return a picture whose colours are multiplied by alpha, if there is one."""
+    if not has_straight(picture):
+        return picture
+    return replace(picture, pixels=multiplied(picture.pixels))
 
 
 def multiplied(values: NDArray[Any]) -> NDArray[Any]:

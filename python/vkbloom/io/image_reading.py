@@ -34,12 +34,15 @@ __all__ = [
     "check_plausible",
     "chosen_part",
     "decode",
+    "decode_file",
     "describe",
+    "listed_parts",
     "load",
     "of_layer",
     "opened",
     "readable_extensions",
     "size_of",
+    "specials_note",
 ]
 
 _LARGEST_SIDE: Final = 65536
@@ -260,6 +263,22 @@ def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
         yield reader.spec().get_string_attribute("oiio:subimagename")
 
 
+def listed_parts(stored: StoredImage) -> str:
+    """Return the parts of a file in words."""
+    names = ", ".join(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
+    return f"parts {names}" if names else f"{len(stored.parts)} parts"
+
+
+def specials_note(nan: int, infinite: int) -> str | None:
+    """Return a note about values that are not finite; None: there are none."""
+    if not nan and not infinite:
+        return None
+    return (
+        f"has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, and stay in "
+        "the picture"
+    )
+
+
 def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
     if orientation in (5, 6, 7, 8):
@@ -319,6 +338,21 @@ def decode(
         notes=tuple(notes),
         colour=taken_as,
     )
+
+
+def decode_file(
+    stored: StoredImage,
+    file: str,
+    colour: Colour | None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
+) -> Picture:
+    """Decode an image as `decode` does; a ValueError names the file."""
+    try:
+        return decode(stored, colour, raw=raw, expand=expand)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
 
 
 def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:

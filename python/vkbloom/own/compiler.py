@@ -179,8 +179,8 @@ def explained(file: OwnFile, one: OwnPass, status: int, text: str) -> str:
     found = MESSAGE.search(text)
     # A name of a block that GLSL does not accept, in the lines before the body.
     lines = {block.name: block.line for block in (*file.params, *file.given.values())}
-    for name in re.findall(r"'(\w+)'", found[3] if found else ""):
-        if name in lines:
-            return source.where(lines[name], f"{name!r} is not possible as a name: {found[3]}")
     cause = found[3].strip() if found else text.strip().split("\n")[-1]
+    for name in re.findall(r"'(\w+)'", cause if found else ""):
+        if name in lines:
+            return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")
     return source.where(one.body_line, f"the pass is not complete GLSL: {cause}")

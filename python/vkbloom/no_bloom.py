@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import vkbloom
+from vkbloom.frames import Frames
 from vkbloom.glare.base import GlareLight
+from vkbloom.settings import Settings
 
 # Highlights that keep this share are as bright as before: a level of 8 bits near white is 0.9 %.
 _DARKER = 0.985
@@ -19,13 +20,14 @@ __all__ = [
     "darkening",
     "empty_stages",
     "is_without",
+    "notes",
     "only",
     "reason",
     "with_bloom",
 ]
 
 
-def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | list[str]:
+def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
     """Return the framebuffers to request: also bloom and glare, unless the bloom is off."""
     if isinstance(names, str):
         return names
@@ -35,11 +37,11 @@ def with_bloom(names: str | Sequence[str], settings: vkbloom.Settings) -> str | 
     return [*names, *(name for name in noted if name not in names)]
 
 
-def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
+def only(frames: Frames, names: str | Sequence[str]) -> Frames:
     """Return frames with only these framebuffers; "all": with all."""
     if isinstance(names, str) or set(frames) == set(names):
         return frames
-    return vkbloom.Frames(
+    return Frames(
         {name: array for name, array in frames.items() if name in names},
         timings=frames.timings,
         settings=frames.settings,
@@ -47,7 +49,7 @@ def only(frames: vkbloom.Frames, names: str | Sequence[str]) -> vkbloom.Frames:
     )
 
 
-def is_without(frames: vkbloom.Frames) -> bool:
+def is_without(frames: Frames) -> bool:
     """Whether the frames have a bloom that is zero everywhere."""
     return "bloom" in frames and not frames["bloom"][:, :, :3].any()
 
@@ -59,7 +61,7 @@ def brightest_of(pixels: NDArray[Any]) -> float:
     return float(np.max(colours, initial=0, where=np.isfinite(colours)) / scale)
 
 
-def darkening(pixels: NDArray[Any], frames: vkbloom.Frames) -> str:
+def darkening(pixels: NDArray[Any], frames: Frames) -> str:
     """Return a text if the bloom darkens the highlights that a display shows; "" if not.
 
     Highlights are the pixels of at least 0.9 of the brightest value, or of white. Curves are left
@@ -84,7 +86,7 @@ def darkening(pixels: NDArray[Any], frames: vkbloom.Frames) -> str:
     )
 
 
-def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
+def reason(settings: Settings, brightest: float | None = None) -> str:
     """Return a text that the bloom is zero, with the reason if it is known."""
     text = "the bloom is zero everywhere"
     if settings.threshold is not None:
@@ -92,7 +94,16 @@ def reason(settings: vkbloom.Settings, brightest: float | None = None) -> str:
     return text if brightest is None else f"{text}; the brightest value is {brightest:.3g}"
 
 
-def empty_stages(frames: vkbloom.Frames, settings: vkbloom.Settings) -> Iterator[str]:
+def notes(frames: Frames, image: NDArray[Any]) -> Iterator[str]:
+    """Yield what is zero everywhere, bloom or stages of glare, and a bloom that darkens."""
+    if is_without(frames):
+        yield reason(frames.settings, brightest_of(image))
+    elif text := darkening(image, frames):
+        yield text
+    yield from empty_stages(frames, frames.settings)
+
+
+def empty_stages(frames: Frames, settings: Settings) -> Iterator[str]:
     """Yield a text for each stage of glare whose threshold leaves nothing."""
     for name, stage in _stages(settings):
         if name in frames and not frames[name][:, :, :3].any():
@@ -104,7 +115,7 @@ def empty_stages(frames: vkbloom.Frames, settings: vkbloom.Settings) -> Iterator
             )
 
 
-def _stages(settings: vkbloom.Settings) -> Iterator[tuple[str, GlareLight]]:
+def _stages(settings: Settings) -> Iterator[tuple[str, GlareLight]]:
     """Yield the stages that have a threshold, with the names of their framebuffers."""
     kinds = [stage.stage for stage in settings.glare]
     for index, stage in enumerate(settings.glare):
