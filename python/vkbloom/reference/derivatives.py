@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vkbloom.fields import fields_of
 
 from .framebuffers import checked, framebuffers
 from .sampling import Array
@@ -122,11 +123,9 @@ def vjp(
 def differentiable(settings: Any) -> dict[str, Any]:
     """Return the values of the real fields with a derivative, by name."""
     found = {
-        field.name: getattr(settings, field.name)
-        for field in dataclasses.fields(settings)
-        if field.name not in DISCRETE
-        and _is_real(getattr(settings, field.name))
-        and (field.name != "knee" or settings.has_knee)
+        name: getattr(settings, name)
+        for name, info in fields_of(type(settings)).items()
+        if name not in DISCRETE and _is_real(getattr(settings, name)) and not info.fixed
     }
     for place, stage in enumerate(getattr(settings, "glare", ())):
         found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
