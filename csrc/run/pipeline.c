@@ -32,12 +32,11 @@ struct pipeline_key {
     uint32_t target_count;
     uint32_t image_count;  // of the descriptors
     uint32_t layout;       // of a pass with resources
-    uint32_t unused;       // the size is a multiple of the handle's
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (8 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                          + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
