@@ -177,10 +177,10 @@ def explained(file: OwnFile, one: OwnPass, status: int, text: str) -> str:
         kind = "void hook()" if one.compute else "vec4 hook()"
         return source.where(one.body_line, f"the pass defines no function '{kind}'")
     found = MESSAGE.search(text)
+    cause = found[3].strip() if found else text.strip().split("\n")[-1]
     # A name of a block that GLSL does not accept, in the lines before the body.
     lines = {block.name: block.line for block in (*file.params, *file.given.values())}
-    cause = found[3].strip() if found else text.strip().split("\n")[-1]
-    for name in re.findall(r"'(\w+)'", cause if found else ""):
+    for name in re.findall(r"'(\w+)'", cause):
         if name in lines:
             return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")
     return source.where(one.body_line, f"the pass is not complete GLSL: {cause}")
