@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import vkbloom
 
 #: Selects the variants of passes for renderers that are made while it is set.
-VARIANTS_VARIABLE = "VKBLOOM_FORM"
+VARIANTS_VARIABLE = "VKBLOOM_VARIANT"
 
 
 def usable_cores() -> int:
@@ -75,7 +75,7 @@ class Plan:
         return max(1, width // factor), max(1, height // factor)
 
     def renderer(self, variant: str = "auto") -> vkbloom.Renderer:
-        """Make a renderer with VKBLOOM_FORM set to `variant`."""
+        """Make a renderer with VKBLOOM_VARIANT set to `variant`."""
         with _environment(VARIANTS_VARIABLE, variant):
             return vkbloom.Renderer(self.adapter)
 

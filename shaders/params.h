@@ -203,12 +203,13 @@
     COMPOSITE_ROWS(B, READS, INPUT) \
     READS(B, white)
 
-// A stage of a Fourier transform along one axis (fft.comp): `count` butterflies in each of `across`
-// lines of `padded` elements; the elements of a butterfly are `step` apart, and those before `kept`
-// are stored. Where it pads: `extent` texels are there, and from the place `turn` on the line goes
-// on before the first of them. With a product with colours: the radices of rows, of so many
-// elements, the last of them, and those of columns without the last one, by which it finds the
-// frequency of the other sign.
+// A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
+// elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
+// Elements from `kept` on are not stored. The first stage pads the line: its first `extent` elements
+// are texels, and elements from `turn` on are positions before the first texel. The product with a
+// kernel with colours reads the frequency of the opposite sign. To find it, it needs the radices of
+// the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used), the rows' number
+// of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -232,8 +233,9 @@
     INPUT(B, float, prefilter_max) \
     INPUT(B, float, prefilter_factor)
 
-// The kernel at its places in the padded lines (fft_kernel.comp): for each axis the kernel's
-// extent, the offsets that count, and the period; `grey` if all channels are equal.
+// Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
+// texels, how many of them before and after its centre count, and the period of the line. `grey`: all
+// channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -417,6 +419,9 @@
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
+// The distance of Filament's taps in texels.
+#define FILAMENT_OFFSET 1.761629
+
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
 #define MAX_LEVELS      16
@@ -425,7 +430,8 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
-// is known to have no NaN and no infinity. With FROM_IMAGE, a downsampling to half the size reads
+// is known to have no NaN and no infinity. With NEXT_PIXEL the outer taps of halve_grid.comp are between
+// the texels of the next pixel. With FROM_IMAGE, a downsampling to half the size reads
 // the image itself and applies the threshold. STORED is the format of the target (STORED_*). FIRST
 // marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
 // a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
@@ -470,7 +476,8 @@
     CONSTANT(34, GROUP_WIDTH, group_width) \
     CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, ROLLED, rolled) \
-    CONSTANT(37, FINITE, finite)
+    CONSTANT(37, FINITE, finite) \
+    CONSTANT(38, NEXT_PIXEL, next_pixel)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

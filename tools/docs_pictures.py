@@ -183,10 +183,10 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
 
 def write_flowchart(page: Path) -> None:
     """Put the forward system's flowchart in the place of the one in a page."""
-    os.environ["VKBLOOM_FORM"] = "fragment"
+    os.environ["VKBLOOM_VARIANT"] = "fragment"
     with vkbloom.Renderer("software") as renderer:
         plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Separable(), SIZE)
-    del os.environ["VKBLOOM_FORM"]
+    del os.environ["VKBLOOM_VARIANT"]
     before, _, rest = page.read_text().partition("```mermaid\n")
     page.write_text(f"{before}```mermaid\n{plan.to_mermaid()}\n```{rest.partition('```')[2]}")
 

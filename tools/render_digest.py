@@ -84,7 +84,7 @@ def main() -> None:
     parser.add_argument("--variants", nargs="*", default=VARIANTS)
     arguments = parser.parse_args()
     for variants in arguments.variants:
-        os.environ["VKBLOOM_FORM"] = os.environ["VKBLOOM_VARIANT"] = variants
+        os.environ["VKBLOOM_VARIANT"] = variants
         with vkbloom.Renderer(arguments.adapter) as renderer:
             for name, frames in renders(renderer):
                 print(variants, name, digest(frames), flush=True)

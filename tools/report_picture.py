@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 import vkbloom
 from vkbloom.testing.records import Record
 from vkbloom.testing.regression import FrameRegression, Mode
-from vkbloom.testing.report import write_report
+from vkbloom.testing.report_page import write_report
 
 SIZE = (1280, 1180)
 

@@ -1,6 +1,7 @@
 #include "run/frame.h"
 
 #include "run/record.h"
+#include "run/sources.h"
 
 #include <string.h>
 
@@ -88,33 +89,6 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         && vkb_readback_reserve(run->device, &submission->readback, error);
 }
 
-static void set_cached(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached)
-{
-    run->images[image] = cached;
-    run->contents[image] = cached ? &cached->content : NULL;
-}
-
-// Finds or creates the cached image of the graph's image. A cached image of another size is
-// replaced only after all pending commands, which may use it. The requests of one submission have
-// the same images.
-static bool resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
-{
-    const struct vkb_image_row *row = &run->graph->images[image];
-    struct vkb_image_cache *cache = &run->frame->cache;
-    struct vkb_cached_image *cached;
-
-    if (run->inputs[row->input]) {
-        set_cached(run, image, run->inputs[row->input]);
-        return true;
-    }
-    if ((vkb_image_cache_replaces(cache, row)
-         && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
-        || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
-        return false;
-    set_cached(run, image, cached);
-    return true;
-}
-
 static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
                        struct vkb_error *error)
 {
@@ -131,123 +105,6 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
         return false;
     vkb_scene_end(device, data, scene);
     return true;
-}
-
-// Stages an image if the device does not have it yet.
-static bool stage_input(struct vkb_run *run, enum vkb_input_kind kind,
-                        const struct vkb_input *input, struct vkb_error *error)
-{
-    struct vkb_cached_image *image = run->inputs[kind];
-    struct vkb_upload *upload = &run->frame->uploads[kind];
-    bool changed;
-
-    run->uploads[kind] = upload;
-
-    // If the last write did not reach the image, there is no content to compare with.
-    if (image->image.mapped && !image->content.valid)
-        vkb_upload_forget(upload);
-    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, run->submission->number,
-                          input, &image->image, &changed, error))
-        return false;
-    run->send_input[kind] = changed || !image->content.valid;
-    return !run->send_input[kind]
-        || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
-}
-
-// Whether the output of that image lies in the memory of the input's rows.
-static bool overlaps(const struct vkb_output *output, const struct vkb_image_row *row,
-                     const struct vkb_input *input)
-{
-    const uintptr_t start = (uintptr_t)output->memory, other = (uintptr_t)input->memory;
-    const size_t pixel_size = output->channels * vkb_formats[row->format].channel_size;
-    const size_t size = (size_t)row->width * output->row_count * pixel_size;
-
-    return output->memory && start < other + (size_t)input->row_stride * input->height
-        && other < start + size;
-}
-
-// Whether all passes of the request that may read the image read words, and nothing copies it to an
-// output or writes to the memory of its pixels.
-static bool allows_in_place(const struct vkb_request *request, uint32_t image,
-                            const struct vkb_input *input)
-{
-    const struct vkb_graph *graph = &request->plan->graph;
-
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        if (vkb_pass_reads(pass, image)
-            && (pass->reading != VKB_READING_WORDS
-                || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
-            return false;
-    }
-    for (uint32_t i = 0; i < request->plan->output_count; ++i)
-        if (request->plan->outputs[i] == image
-            || overlaps(&request->outputs[i], &graph->images[request->plan->outputs[i]], input))
-            return false;
-    return true;
-}
-
-// Makes the caller's own pixels the image, if the passes can read them there.
-static bool stage_in_place(struct vkb_run *run, uint32_t image, const struct vkb_input *input,
-                           const struct vkb_request *requests, uint32_t request_count)
-{
-    const enum vkb_input_kind kind = run->graph->images[image].input;
-    struct vkb_in_place *place = &run->frame->in_place[kind];
-
-    for (uint32_t i = 0; i < request_count; ++i)
-        if (!allows_in_place(&requests[i], image, input))
-            return false;
-    if (!vkb_in_place_stage(run->device, place, input, &run->frame->cache.clock))
-        return false;
-    run->inputs[kind] = &place->cached;
-    run->submission->inputs[kind] = place->cached.image;
-    return true;
-}
-
-static bool stage_inputs(struct vkb_run *run, const struct vkb_frame_source *source,
-                         const struct vkb_request *requests, uint32_t request_count,
-                         struct vkb_error *error)
-{
-    struct vkb_specials *specials = &run->frame->specials;
-
-    *specials = (struct vkb_specials){0};
-    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
-        const enum vkb_input_kind kind = run->graph->images[i].input;
-        if (kind == VKB_INPUT_NONE)
-            continue;
-        if (source->resident) {
-            run->inputs[kind] = &source->resident->inputs[kind].cached;
-            run->uploads[kind] = &source->resident->inputs[kind].upload;
-            run->send_input[kind] = source->resident->staged;
-        }
-        const struct vkb_input *input = source->inputs[kind];
-        if (source->in_place && input && stage_in_place(run, i, input, requests, request_count)) {
-            vkb_add_specials(specials, run->frame->in_place[kind].specials);
-            continue;
-        }
-        if (!resolve(run, i, error))
-            return false;
-        run->inputs[kind] = run->images[i];
-        if (!source->resident && !stage_input(run, kind, input, error))
-            return false;
-        vkb_add_specials(specials, run->uploads[kind]->specials);
-    }
-    if (source->resident)
-        *specials = source->resident->specials;
-    return true;
-}
-
-static void record_inputs(struct vkb_run *run)
-{
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
-        struct vkb_cached_image *image = run->inputs[kind];
-        if (!run->send_input[kind])
-            continue;
-        if (!image->image.mapped)
-            vkb_upload_record(run->device, run->submission->commands.buffer, run->uploads[kind],
-                              &image->image);
-        image->content.valid = true;
-    }
 }
 
 // Whether the image holds the pixels of the row.
@@ -273,7 +130,7 @@ static bool find_constants(struct vkb_run *run, const void **pixels, size_t *siz
         const struct vkb_image_row *row = &run->graph->images[i];
         if (!row->serial)
             continue;
-        if (!resolve(run, i, error))
+        if (!vkb_run_resolve(run, i, error))
             return false;
         if (holds_constant(run->images[i], row))
             continue;
@@ -330,17 +187,6 @@ static void record_constants(struct vkb_run *run)
     }
 }
 
-// The version of the scene, or of the input that was written last.
-static uint64_t source_version(const struct vkb_run *run)
-{
-    uint64_t version = 0;
-
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (run->inputs[kind] && run->inputs[kind]->content.version > version)
-            version = run->inputs[kind]->content.version;
-    return version ? version : run->frame->scene.serial;
-}
-
 // `next` is the following request; NULL: `request` is the last one.
 static bool record_request(struct vkb_run *run, struct vkb_request *request,
                            const struct vkb_request *next, struct vkb_error *error)
@@ -352,7 +198,7 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         .plan = request->plan,
         .next = next ? &next->plan->graph : NULL,
         .contents = run->contents,
-        .source = source_version(run),
+        .source = vkb_sources_version(run),
         .scene = frame->scene.serial,
     };
 
@@ -361,14 +207,14 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     request->timing_count = 0;
     request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        set_cached(run, i,
-                   graph->images[i].input != VKB_INPUT_NONE
-                       ? run->inputs[graph->images[i].input]
-                       : vkb_image_cache_find(&frame->cache, &graph->images[i]));
+        vkb_run_set_image(run, i,
+                          graph->images[i].input != VKB_INPUT_NONE
+                              ? run->inputs[graph->images[i].input].image
+                              : vkb_image_cache_find(&frame->cache, &graph->images[i]));
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (frame->planner.wanted[i] && !resolve(run, i, error))
+        if (frame->planner.wanted[i] && !vkb_run_resolve(run, i, error))
             return false;
     if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
         return false;
@@ -377,7 +223,8 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
                             &cached->image, &request->outputs[i]);
         // A pass that stored to the caller's memory did not write the image.
-        cached->content.valid = cached->content.valid && !request->outputs[i].stored;
+        cached->content.valid =
+            cached->content.valid && request->outputs[i].sink != VKB_SINK_STORED;
     }
     if (run->show)
         vkb_screen_record(run->device, submission->commands.buffer, run->show->screen,
@@ -404,7 +251,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    record_inputs(run);
+    vkb_sources_record(run);
     record_constants(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
@@ -420,8 +267,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
 {
     run->graph = &requests[0].plan->graph;
     return (!source->scene || load_scene(run, source->scene, error))
-        && stage_inputs(run, source, requests, request_count, error) && stage_constants(run, error)
-        && reserve(run, requests, request_count, error)
+        && vkb_sources_stage(run, source, requests, request_count, error)
+        && stage_constants(run, error) && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 
@@ -479,11 +326,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     struct vkb_run run = {.device = device, .frame = frame, .show = show};
     // All requests have the same images.
     const uint32_t image_count = requests[0].plan->graph.image_count;
-    enum vkb_access accesses[VKB_INPUT_COUNT];
     bool done;
-
-    for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
-        accesses[kind] = source->resident->inputs[kind].cached.image.access;
 
     if (!renew(device, frame, error)
         || !vkb_submissions_take(device, &frame->submissions, &run.submission, error))
@@ -498,14 +341,11 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         run.submission->requests = requests;
         run.submission->request_count = request_count;
         *submission = run.submission;
-        if (source->resident)
-            source->resident->staged = false;
+        vkb_sources_end(&run, source, true);
         return !show || vkb_screen_present(device, show->screen, error);
     }
     if (!done) {
-        // The recorded commands do not run, so the images keep their last access.
-        for (int kind = 0; source->resident && kind < VKB_INPUT_COUNT; ++kind)
-            source->resident->inputs[kind].cached.image.access = accesses[kind];
+        vkb_sources_end(&run, source, false);
         fail_frame(device, frame, run.submission, error);
     }
     vkb_submissions_give_back(device, &frame->submissions, run.submission);

@@ -32,10 +32,11 @@ struct pipeline_key {
     uint32_t target_count;
     uint32_t image_count;  // of the descriptors
     struct vkb_constants constants;
+    uint32_t unused;  // fills the 8 bytes
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (6 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                          + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {

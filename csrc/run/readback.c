@@ -69,7 +69,7 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->format = format;
     output->width = width;
     output->imported = VK_NULL_HANDLE;
-    output->stored = false;
+    output->sink = VKB_SINK_NONE;
     if (!output->memory)
         return true;
     const size_t size = row_size(output) * output->row_count;
@@ -78,9 +78,13 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
         if (!vkb_grow(error, &readback->imports, &readback->import_capacity,
                       readback->import_count + 1, sizeof *readback->imports))
             return false;
-        if (import(device, readback, output_size, output) && vkb_readback_is_complete(output))
+        // The device copies all channels of an image, so only complete outputs are copied there.
+        if (import(device, readback, output_size, output) && vkb_readback_is_complete(output)) {
+            output->sink = VKB_SINK_PAGES;
             return true;
+        }
     }
+    output->sink = VKB_SINK_STAGING;
     output->offset = readback->used;
     // Offsets of image copies must be multiples of the pixel size, which is at most 16.
     readback->used += (size + 15) & ~(size_t)15;
@@ -107,24 +111,35 @@ bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *
                               readback->used, &readback->staging, error);
 }
 
-void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
-                         const struct vkb_readback *readback, struct vkb_image *image,
-                         const struct vkb_output *output)
+static void record_copy(const struct vkb_device *device, VkCommandBuffer commands,
+                        struct vkb_image *image, const struct vkb_output *output, VkBuffer to,
+                        VkDeviceSize offset)
 {
-    const bool direct = output->imported && vkb_readback_is_complete(output);
-    const VkBuffer to = direct ? output->imported : readback->staging.handle;
     VkBufferImageCopy copy = {
-        .bufferOffset = direct ? output->imported_offset : output->offset,
+        .bufferOffset = offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
         .imageOffset = {0, (int32_t)output->first_row, 0},
         .imageExtent = {image->width, output->row_count, 1},
     };
 
-    if (output->stored || !output->memory)
-        return;
     vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_SOURCE);
     device->vk.vkCmdCopyImageToBuffer(
         commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
+}
+
+static void record_staging(const struct vkb_device *device, VkCommandBuffer commands,
+                           const struct vkb_readback *readback, struct vkb_image *image,
+                           const struct vkb_output *output)
+{
+    record_copy(device, commands, image, output, readback->staging.handle, output->offset);
+}
+
+static void record_pages(const struct vkb_device *device, VkCommandBuffer commands,
+                         const struct vkb_readback *readback, struct vkb_image *image,
+                         const struct vkb_output *output)
+{
+    (void)readback;
+    record_copy(device, commands, image, output, output->imported, output->imported_offset);
 }
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
@@ -144,13 +159,11 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
     memcpy(to, from, 3 * size);
 }
 
-void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
+static void fetch_staging(const struct vkb_readback *readback, const struct vkb_output *output)
 {
     const size_t pixels = (size_t)output->width * output->row_count;
-
-    if (output->stored || !output->memory || (output->imported && vkb_readback_is_complete(output)))
-        return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
+
     if (vkb_readback_is_complete(output)) {
         memcpy(output->memory, from, row_size(output) * output->row_count);
         return;
@@ -166,6 +179,33 @@ void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_ou
         drop_alpha(output->memory, from, pixels, 4);
         break;
     }
+}
+
+// A new sink is a row here; NULL: there is nothing to do.
+static const struct sink {
+    void (*record)(const struct vkb_device *device, VkCommandBuffer commands,
+                   const struct vkb_readback *readback, struct vkb_image *image,
+                   const struct vkb_output *output);
+    void (*fetch)(const struct vkb_readback *readback, const struct vkb_output *output);
+} sinks[] = {
+    [VKB_SINK_NONE] = {NULL, NULL},
+    [VKB_SINK_STAGING] = {record_staging, fetch_staging},
+    [VKB_SINK_PAGES] = {record_pages, NULL},
+    [VKB_SINK_STORED] = {NULL, NULL},
+};
+
+void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
+                         const struct vkb_readback *readback, struct vkb_image *image,
+                         const struct vkb_output *output)
+{
+    if (sinks[output->sink].record)
+        sinks[output->sink].record(device, commands, readback, image, output);
+}
+
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
+{
+    if (sinks[output->sink].fetch)
+        sinks[output->sink].fetch(readback, output);
 }
 
 void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback)

@@ -11,6 +11,14 @@
 // costs more on a GPU than on a CPU.
 enum { VKB_IMPORTED_BYTES = 1 << 20 };
 
+// How the pixels of an output leave the device.
+enum vkb_sink {
+    VKB_SINK_NONE,     // they do not
+    VKB_SINK_STAGING,  // the device copies to staging memory, and the host from there
+    VKB_SINK_PAGES,    // the device copies to the caller's memory, which it has imported
+    VKB_SINK_STORED,   // the last pass stores to this memory; set while the passes are recorded
+};
+
 // One requested image in host memory: tightly packed rows, top row first, with the first `channels`
 // channels of each pixel.
 struct vkb_output {
@@ -21,12 +29,10 @@ struct vkb_output {
     // Set by vkb_readback_plan.
     enum vkb_format format;
     uint32_t width;
-    VkBuffer imported;  // the caller's memory as a buffer; VK_NULL_HANDLE: uses staging memory
+    enum vkb_sink sink;
+    VkBuffer imported;  // the caller's memory as a buffer; VK_NULL_HANDLE: it is none
     VkDeviceSize imported_offset;
-    VkDeviceSize offset;  // in the staging memory; unused if the device copies to imported memory
-    // Set while the passes are recorded: the last pass stores to the imported memory, so there is
-    // no copy. In all other cases, the device writes all channels of the image.
-    bool stored;
+    VkDeviceSize offset;  // in the staging memory
 };
 
 struct vkb_readback {
@@ -52,7 +58,7 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
 bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
                           struct vkb_error *error);
 
-// Records the copy of the output's image, unless a pass stored it.
+// Records what the output's sink needs.
 void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
                          const struct vkb_readback *readback, struct vkb_image *image,
                          const struct vkb_output *output);
@@ -61,7 +67,7 @@ void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer comman
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
                       struct vkb_error *error);
 
-// Copies the pixels from staging memory to the caller's memory. The image is no longer needed.
+// Gives the caller the pixels that are not in its memory yet. The image is no longer needed.
 void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output);
 
 // Destroys the imported buffers and discards the plan. The device must have finished.

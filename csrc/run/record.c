@@ -280,7 +280,7 @@ static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
     const uint32_t rows = band_rows(run->device, pass, band.row_pitch);
 
     if (output)
-        output->stored = true;
+        output->sink = VKB_SINK_STORED;
     for (; band.first < image->height; band.first += rows) {
         const uint32_t left = image->height - band.first;
         band.rows = rows < left ? rows : left;

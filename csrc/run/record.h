@@ -4,6 +4,15 @@
 
 #include "run/frame.h"
 
+// An input of the source, and how its pixels come to the device (sources.c).
+struct vkb_staged_input {
+    const struct vkb_source_way *way;
+    struct vkb_cached_image *image;  // NULL: there is no such input
+    struct vkb_upload *upload;
+    bool send;               // the device does not have the pixels yet
+    enum vkb_access access;  // of a resident image before the submission
+};
+
 // The state of one submission, and of the request that is being recorded.
 struct vkb_run {
     struct vkb_device *device;
@@ -11,12 +20,10 @@ struct vkb_run {
     struct vkb_submission *submission;
     struct vkb_show *show;  // NULL: nothing is presented
     struct vkb_request *request;
-    const struct vkb_graph *graph;                     // the request's
-    struct vkb_cached_image **images;                  // by the graph's image index
-    struct vkb_content **contents;                     // of the cache
-    struct vkb_cached_image *inputs[VKB_INPUT_COUNT];  // by kind; NULL: none
-    struct vkb_upload *uploads[VKB_INPUT_COUNT];       // the sources of their pixels
-    bool send_input[VKB_INPUT_COUNT];                  // the device does not have these pixels yet
+    const struct vkb_graph *graph;                    // the request's
+    struct vkb_cached_image **images;                 // by the graph's image index
+    struct vkb_content **contents;                    // of the cache
+    struct vkb_staged_input inputs[VKB_INPUT_COUNT];  // by kind
     // Images to be filled by this submission, and where their pixels start in the staging memory: a
     // kernel and a picture of dirt at most.
     struct vkb_cached_image *constants[2];

@@ -270,7 +270,7 @@ static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
     if (pass->shader == &vkb_shader_filament_down_frag) {
         memset(&row->params, 0, sizeof row->params);
         // The distance of the taps is half of the offset.
-        params->offset = 2.0f * 1.761629f;
+        params->offset = 2.0f * (float)FILAMENT_OFFSET;
         params->limit = pass->params.pyramid.limit;
         params->row_offset = pass->params.pyramid.row_offset;
     } else if (pass->shader != &vkb_shader_kawase_down_frag) {
@@ -281,7 +281,7 @@ static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
     row->constants.groups =
         pass->shader == &vkb_shader_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
     row->constants.sampling = 0;
-    row->constants.radius = next;
+    row->constants.next_pixel = next;
     return params->row_offset == 0 && (next || distance <= 0.5f);
 }
 

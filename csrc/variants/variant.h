@@ -1,5 +1,5 @@
-// Shared by the files of this folder: variants.c has the table of variants, blur_variants.c and
-// level_variants.c the functions in it for blurs and for levels, fft_variants.c for transforms.
+// Shared by the files of this folder: variants.c has the table of variants, the others the
+// functions in it.
 #ifndef VKB_VARIANT_H
 #define VKB_VARIANT_H
 
@@ -42,8 +42,10 @@ vkb_variant_add vkb_add_upsampled_strips, vkb_add_upsampled_final;
 vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
-// Transforms of complete lines in shared memory.
-vkb_variant_add vkb_add_lines;
+// Transforms: of complete lines in shared memory; stages of images as words.
+vkb_variant_add vkb_add_lines, vkb_add_transform;
+// Passes that load the pixel at their own position; any other pass as a compute shader.
+vkb_variant_add vkb_add_pixels;
 
 // The same for images as words.
 #define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)

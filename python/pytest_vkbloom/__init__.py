@@ -241,7 +241,7 @@ class _Run:
         """Write the report; if that fails, the summary says so and the run goes on."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
-        from vkbloom.testing.report import write_report  # noqa: PLC0415  costs start-up time
+        from vkbloom.testing.report_page import write_report  # noqa: PLC0415  costs start-up time
 
         try:
             self._page = write_report(self._report, self.parts, self._records)

@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import re
+import warnings
 from collections import abc
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast
 
@@ -36,6 +37,17 @@ _SCENE_SIZE = (1280, 720)
 # the number.
 _ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
 _NUMBER = re.compile(r"\d+")
+
+
+def _variants() -> str:
+    """Return which variants of the passes to run."""
+    if old := os.environ.get("VKBLOOM_FORM"):
+        warnings.warn(
+            "VKBLOOM_FORM: is not read in later versions; set VKBLOOM_VARIANT instead",
+            FutureWarning,
+            stacklevel=3,
+        )
+    return os.environ.get("VKBLOOM_VARIANT") or old or "auto"
 
 
 def _frame_seconds() -> float:
@@ -141,8 +153,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        `adapter` is empty, VKBLOOM_FORM or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_FORM names
-        variants that the adapter cannot run.
+        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT
+        names variants that the adapter cannot run.
 
     See Also
     --------
@@ -188,8 +200,8 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        variants = os.environ.get("VKBLOOM_FORM") or "auto"
         check_for_driver()
+        variants = _variants()
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(

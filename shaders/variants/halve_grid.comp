@@ -3,7 +3,7 @@
 #extension GL_EXT_control_flow_attributes : require
 // Downsampling to exactly half the size with bilinear taps in three rows and columns: dual Kawase's,
 // and Filament's. The middle ones are between the two texels of the pixel, the outer ones between
-// those of the next pixel (RADIUS 1) or between the same two (RADIUS 0). An invocation writes a strip
+// those of the next pixel (NEXT_PIXEL) or between the same two. An invocation writes a strip
 // from top to bottom and has the taps of each pair of rows once.
 #include "lib/block.glsl"
 #include "lib/filament.glsl"
@@ -46,7 +46,7 @@ void load_taps(int x, int y, out vec4 taps[COLUMNS][AXIS])
         texels[i] = thresholded(value_of(raw[i]));
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         [[unroll]] for (int tap = 0; tap < AXIS; ++tap) {
-            int at = 2 * (i + 1 + RADIUS * (tap - 1));
+            int at = 2 * (i + 1 + NEXT_PIXEL * (tap - 1));
             taps[i][tap] = blended(texels[at], texels[at + 1], parts[tap]);
         }
 }
@@ -77,13 +77,13 @@ void main()
 
     if (any(greaterThanEqual(first, size)))
         return;
-    parts[0] = (0.5 - distance) + 2.0 * float(RADIUS);
+    parts[0] = (0.5 - distance) + 2.0 * float(NEXT_PIXEL);
     parts[1] = 0.5;
-    parts[2] = (0.5 + distance) - 2.0 * float(RADIUS);
+    parts[2] = (0.5 + distance) - 2.0 * float(NEXT_PIXEL);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         [[unroll]] for (int x = 0; x < AXIS; ++x)
             upper[0][i][x] = upper[1][i][x] = middle[i][x] = vec4(0.0);
-    for (int y = first.y - RADIUS; y < end + RADIUS; ++y) {
+    for (int y = first.y - NEXT_PIXEL; y < end + NEXT_PIXEL; ++y) {
         vec4 even[COLUMNS][AXIS], odd[COLUMNS][AXIS];
         load_taps(2 * first.x, 2 * y, even);
         load_taps(2 * first.x, 2 * y + 1, odd);
@@ -92,8 +92,8 @@ void main()
             [[unroll]] for (int x = 0; x < AXIS; ++x) {
                 vec4 highest = blended(even[i][x], odd[i][x], parts[0]);
                 vec4 central = blended(even[i][x], odd[i][x], parts[1]);
-                taps[0][x] = RADIUS == 0 ? highest : upper[0][i][x];
-                taps[1][x] = RADIUS == 0 ? central : middle[i][x];
+                taps[0][x] = NEXT_PIXEL == 0 ? highest : upper[0][i][x];
+                taps[1][x] = NEXT_PIXEL == 0 ? central : middle[i][x];
                 taps[2][x] = blended(even[i][x], odd[i][x], parts[2]);
                 upper[0][i][x] = upper[1][i][x];
                 upper[1][i][x] = highest;
@@ -101,7 +101,7 @@ void main()
             }
             pixels[i] = buffer_of(combined(taps));
         }
-        if (y >= first.y + RADIUS)
-            store(first.x, y - RADIUS, pixels);
+        if (y >= first.y + NEXT_PIXEL)
+            store(first.x, y - NEXT_PIXEL, pixels);
     }
 }

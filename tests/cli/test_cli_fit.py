@@ -35,9 +35,24 @@ def test_best_first(files: tuple[str, str], tmp_path: Path) -> None:
     lines = done.output.splitlines()
     assert lines[0].startswith("separable: relative loss 0.")
     assert lines[1].startswith("  vkbloom.Separable(threshold=")
-    assert lines[2].startswith("dual_kawase: ")
+    assert lines[2].strip().partition(":")[0] in ("good", "fair")
+    assert lines[3].startswith("dual_kawase: ")
     assert lines[-1] == f"wrote {report}"
     assert report.read_text().count("radial profile") == 4
+
+
+def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
+    words = ["--preset", "tutorial", "--vary", "intensity", "--max-calls", "4"]
+    wrong = [files[1], files[0]]
+    done = CliRunner().invoke(program, ["fit", *wrong, *words])
+    assert done.exit_code == 0
+    verdict = done.stdout.splitlines()[2]
+    assert verdict.startswith("  poor: the method separable does not reach it with intensity; vary")
+    done = CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "0.001"])
+    assert done.exit_code == 1
+    assert "vkbloom: note: the smallest loss, " in done.stderr
+    assert done.stderr.endswith(", is over --max-loss 0.001\n")
+    assert CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "99"]).exit_code == 0
 
 
 def test_json(files: tuple[str, str]) -> None:

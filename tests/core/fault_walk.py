@@ -347,7 +347,7 @@ def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str
 
 
 def walk_one(name: str, stride: int) -> None:
-    os.environ["VKBLOOM_FORM"] = name.rsplit(" ", 1)[1] if name.startswith("apply ") else "auto"
+    os.environ["VKBLOOM_VARIANT"] = name.rsplit(" ", 1)[1] if name.startswith("apply ") else "auto"
     one = Walk(name, WORK.get(name))
     # Each workload starts at another point, so that the strides do not skip the same calls.
     start = 1 + zlib.crc32(name.encode()) % stride

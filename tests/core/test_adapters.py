@@ -119,8 +119,8 @@ def test_a_message_is_cut_between_or_in_characters(
     name = start + "\xe9" * 2000
     with pytest.raises(AdapterNotFoundError, match=r"no Vulkan adapter for .*\xe9\xe9"):
         Renderer(name)
-    monkeypatch.setenv("VKBLOOM_FORM", name)
-    with pytest.raises(ValueError, match=r"VKBLOOM_FORM: .*\xe9\xe9") as caught:
+    monkeypatch.setenv("VKBLOOM_VARIANT", name)
+    with pytest.raises(ValueError, match=r"VKBLOOM_VARIANT: .*\xe9\xe9") as caught:
         Renderer(ADAPTER)
     assert type(caught.value) is ValueError
 

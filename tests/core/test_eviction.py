@@ -74,7 +74,7 @@ def test_pipelines_that_are_old_go(
 ) -> None:
     # In this variant each setting of the final pass has one pipeline, which drivers compile
     # quickly.
-    monkeypatch.setenv("VKBLOOM_FORM", "fragment")
+    monkeypatch.setenv("VKBLOOM_VARIANT", "fragment")
     renderer = new_renderer()
     composites = fields_of(Separable)["composite"].choices
     names = (composites, *(_core.CHOICES[name] for name in ("tonemap", "encoding")))

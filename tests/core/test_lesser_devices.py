@@ -185,16 +185,18 @@ def test_a_convolution_of_too_much_memory(layer: Path, name: str) -> None:
 
 
 def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
-    done = run(layer, name, "storage", VKBLOOM_FORM="tiles")
-    assert "ValueError: VKBLOOM_FORM: tiles is not one of auto" in done.stderr
+    done = run(layer, name, "storage", VKBLOOM_VARIANT="tiles")
+    assert "ValueError: VKBLOOM_VARIANT: tiles is not one of auto" in done.stderr
 
 
 @pytest.mark.parametrize("variant", ["cpu", "gpu"])
 def test_a_variant_that_the_device_cannot_run_is_refused(
     layer: Path, name: str, variant: str
 ) -> None:
-    done = run(layer, name, "storage", VKBLOOM_FORM=variant)
-    words = f"ValueError: VKBLOOM_FORM: the compute shaders of .* cannot write .* {variant} needs"
+    done = run(layer, name, "storage", VKBLOOM_VARIANT=variant)
+    words = (
+        f"ValueError: VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
+    )
     assert re.search(words, done.stderr), done.stderr
 
 

@@ -144,7 +144,7 @@ def test_is_found_and_named(
     # Without other plugins, which take most of such a short run's time.
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     # The variant whose shaders the mutations change.
-    monkeypatch.setenv("VKBLOOM_FORM", "fragment")
+    monkeypatch.setenv("VKBLOOM_VARIANT", "fragment")
     options = ("-p", "no:cacheprovider", "-p", "vkbloom", "--bloom-adapter=software")
     pytester.runpytest_subprocess(*options, "--bloom-update").assert_outcomes(passed=1)
 

@@ -94,7 +94,7 @@ def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
 def test_a_plan_of_an_image_is_what_runs(
     monkeypatch: pytest.MonkeyPatch, turn: int, variant: str
 ) -> None:
-    monkeypatch.setenv("VKBLOOM_FORM", variant)
+    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
     with Renderer() as renderer:
         for number, (name, method) in enumerate(METHODS.items()):
             # All framebuffers or `final` alone, by turns of methods and variants.

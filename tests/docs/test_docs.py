@@ -119,7 +119,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_the_flowchart_is_the_plan_s(monkeypatch: pytest.MonkeyPatch) -> None:
     """tools/docs_pictures.py writes it."""
-    monkeypatch.setenv("VKBLOOM_FORM", "fragment")
+    monkeypatch.setenv("VKBLOOM_VARIANT", "fragment")
     with Renderer() as renderer:
         plan = renderer.plan(Scene.ufo(), Separable(), (640, 360))
     assert blocks(ROOT / "docs" / "plans.md", "mermaid") == [plan.to_mermaid() + "\n"]

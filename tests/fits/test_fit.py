@@ -97,6 +97,7 @@ class TestFound:
             ["threshold"],
             renderer=renderer,
             max_calls=30,
+            framebuffer="bloom",
         )
         assert [one.settings.method for one in found] == ["dual_kawase", "separable"]
         assert found[0].loss < 0.01 < found[1].loss
@@ -115,6 +116,7 @@ class TestFound:
             loss=loss,
             renderer=renderer,
             max_calls=60,
+            framebuffer="bloom",
         )
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.7, rel=0.01)
         assert found.loss < 1e-3 < found.start_loss
@@ -141,6 +143,7 @@ class TestFound:
             Separable(threshold=0.5, knee=0.5),
             ["blur_scale", "threshold"],
             renderer=cast("Renderer", Watched()),
+            framebuffer="bloom",
         )
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(2.4, rel=0.01)
         assert found.settings.threshold == pytest.approx(1.2, rel=0.01)
@@ -152,7 +155,15 @@ class TestFound:
     def test_same_result_again(self, renderer: Renderer) -> None:
         target = target_of(Pyramid(threshold=1.2, levels=4))
         first, second = (
-            vkbloom.fit(IMAGE, target, Pyramid(), ["threshold"], renderer=renderer, max_calls=20)
+            vkbloom.fit(
+                IMAGE,
+                target,
+                Pyramid(),
+                ["threshold"],
+                renderer=renderer,
+                max_calls=20,
+                framebuffer="bloom",
+            )
             for _ in range(2)
         )
         assert first.settings == second.settings
@@ -179,7 +190,9 @@ class TestFound:
 def found(renderer: Renderer) -> FitResult:
     target = target_of(Pyramid(levels=3, radius=1.4))
     image = renderer.upload(IMAGE)
-    return vkbloom.fit(image, target, Pyramid(levels=3), ["radius"], renderer=renderer)
+    return vkbloom.fit(
+        image, target, Pyramid(levels=3), ["radius"], renderer=renderer, framebuffer="bloom"
+    )
 
 
 class TestResult:
@@ -205,6 +218,61 @@ class TestResult:
         assert "nan" not in page.partition("<code")[0].replace("nance", "")
 
 
+class TestVerdict:
+    """A result says whether it is good, and why not."""
+
+    @pytest.fixture
+    def truth(self) -> Image:
+        return target_of(Pyramid(levels=3, threshold=1.2, knee=0.5, intensity=0.4), "final")
+
+    def fitted(self, renderer: Renderer, target: Image, start: Settings | None = None) -> FitResult:
+        return vkbloom.fit(
+            IMAGE,
+            target,
+            start or Pyramid(levels=3, threshold=1.0, knee=0.5),
+            ["threshold", "intensity"],
+            renderer=renderer,
+            max_calls=60,
+        )
+
+    def test_good(self, renderer: Renderer, truth: Image) -> None:
+        found = self.fitted(renderer, truth)
+        assert (found.framebuffer, found.verdict, found.cause) == ("final", "good", "")
+        assert repr(found).endswith("; good>")
+
+    def test_a_clipped_target(self, renderer: Renderer, truth: Image) -> None:
+        found = self.fitted(renderer, np.minimum(truth, 1))
+        assert found.verdict == "poor"
+        assert found.cause.startswith("the target is clipped at 1 (")
+        assert found.cause in found._repr_html_()
+
+    def test_an_encoded_target(self, renderer: Renderer, truth: Image) -> None:
+        found = self.fitted(renderer, np.maximum(truth, 0) ** (1 / 2.2))
+        assert found.verdict == "poor"
+        assert "has another encoding: about the power of 0.4" in found.cause
+
+    def test_another_order_of_channels(self, renderer: Renderer) -> None:
+        image = IMAGE * np.array([1, 0.4, 0.1], np.float32)
+        truth = target_of(Pyramid(levels=3, intensity=0.4), "final", image)
+        found = vkbloom.fit(
+            image,
+            truth[..., ::-1],
+            Pyramid(levels=3, intensity=0.4),
+            ["radius"],
+            renderer=renderer,
+            max_calls=8,
+        )
+        assert (found.verdict, found.cause) == (
+            "poor",
+            "the target is in the order b, g, r",
+        )
+
+    def test_another_method(self, renderer: Renderer) -> None:
+        found = self.fitted(renderer, np.roll(IMAGE, 20, axis=1)[::-1] + 0.3)
+        assert found.verdict == "poor"
+        assert found.cause.startswith("the method pyramid does not reach it")
+
+
 class TestRefused:
     @pytest.mark.parametrize(
         ("start", "vary", "options", "message"),
@@ -214,7 +282,12 @@ class TestRefused:
             (Pyramid(), ["level_weights"], {}, "vary: 'level_weights' is not a number"),
             (Pyramid(), [], {}, "vary: there are no fields"),
             (Pyramid(), ["knee", "knee"], {}, "vary: knee, knee has a field twice"),
-            (Pyramid(), ["intensity"], {}, "vary: intensity has no effect on bloom; give frame"),
+            (
+                Pyramid(),
+                ["intensity"],
+                {"framebuffer": "bloom"},
+                "vary: intensity has no effect on bloom; give frame",
+            ),
             (HdrpBloom(), ["threshold"], {}, "vary: threshold: 0.0 is not None"),
             (vkbloom.BlenderGlare(), ["maximum"], {}, "vary: maximum: None is not a number"),
             ([], ["levels"], {}, "settings: there are none"),
@@ -314,6 +387,13 @@ def test_blas_computes_in_one_thread(renderer: Renderer) -> None:
     with threadpoolctl.threadpool_limits(2, user_api="blas"):
         target = target_of(Separable(blur_scale=2.0))
         vkbloom.fit(
-            IMAGE, target, Separable(), ["blur_scale"], loss=loss, renderer=renderer, max_calls=3
+            IMAGE,
+            target,
+            Separable(),
+            ["blur_scale"],
+            loss=loss,
+            renderer=renderer,
+            max_calls=3,
+            framebuffer="bloom",
         )
     assert found == {1}

@@ -111,7 +111,7 @@ def test_long_lines(renderer: Renderer) -> None:
 def gpu() -> Iterator[Renderer]:
     """A renderer with the variants of GPUs, which transform complete lines."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_FORM", "gpu")
+        patch.setenv("VKBLOOM_VARIANT", "gpu")
         opened = Renderer(validation=True)
     with opened:
         yield opened

@@ -190,7 +190,7 @@ def test_variants(monkeypatch: pytest.MonkeyPatch, settings: Settings) -> None:
     image = np.abs(hdr_picture(96, 61, 4, "float16"))
     found = {}
     for form in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_FORM", form)
+        monkeypatch.setenv("VKBLOOM_VARIANT", form)
         with Renderer("software", validation=True) as own:
             alone = own.apply(image, settings, attachments="final")["final"]
             own.apply(image[::-1], settings, attachments="final")

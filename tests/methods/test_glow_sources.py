@@ -106,7 +106,7 @@ def given_of(case: Case) -> dict[str, Any]:
 def varied(request: pytest.FixtureRequest) -> Iterator[Renderer]:
     """A renderer that uses one column of the table of variants."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_FORM", str(request.param))
+        patch.setenv("VKBLOOM_VARIANT", str(request.param))
         opened = Renderer(validation=True)
     with opened:
         yield opened

@@ -282,7 +282,7 @@ def test_all_variants_give_the_same(
     image = lights((75, 46), dtype)
     results = []
     for variant in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_FORM", variant)
+        monkeypatch.setenv("VKBLOOM_VARIANT", variant)
         with Renderer(validation=True) as renderer:
             results.append(renderer.apply(image, settings))
     for name, values in results[0].items():

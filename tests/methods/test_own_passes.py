@@ -183,7 +183,7 @@ def test_gpu_runs_the_compute_shader_of_a_pass_in_its_place(
     one = ("bloom", shader, (32, 20), None, ("MAIN",), True, floats(1, 1, 1, 1), None)
     image = picture()
     for variants, expected in (("gpu", image + 1), ("cpu", image), ("fragment", image)):
-        monkeypatch.setenv("VKBLOOM_FORM", variants)
+        monkeypatch.setenv("VKBLOOM_VARIANT", variants)
         with Renderer("software", validation=True) as renderer:
             frames, _ = run(renderer, image, Own(one))
         np.testing.assert_allclose(frames["bloom"], expected, rtol=1e-6)

@@ -87,7 +87,7 @@ def variant(request: pytest.FixtureRequest) -> str:
 def varied(variant: str) -> Iterator[Renderer]:
     """A renderer that uses one column of the table of variants."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_FORM", variant)
+        patch.setenv("VKBLOOM_VARIANT", variant)
         opened = Renderer(validation=True)
     with opened:
         yield opened
@@ -133,7 +133,7 @@ def test_final_alone_is_the_final_of_all(
 def unfused() -> Iterator[Renderer]:
     """A renderer that runs every pass as its method defines it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_FORM", "fragment")
+        patch.setenv("VKBLOOM_VARIANT", "fragment")
         with Renderer(validation=True) as renderer:
             yield renderer
 
@@ -246,7 +246,7 @@ def test_the_largest_halves_stay_finite(varied: Renderer, threshold: float | Non
 
 def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Renderer) -> None:
     # On a CPU, lines are unrolled only for more than 2^18 pixels.
-    monkeypatch.setenv("VKBLOOM_FORM", "cpu")
+    monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
     image = hdr_picture(257, 1028, 4, "uint8")
     with Renderer(validation=True) as renderer:
         frames = renderer.apply(image, Separable(), attachments=("blur_vertical", "bloom"))
@@ -257,7 +257,7 @@ def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Render
 
 def test_large_images_in_the_variant_of_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
     # GPUs use strips only for large images.
-    monkeypatch.setenv("VKBLOOM_FORM", "gpu")
+    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
     image = hdr_picture(1028, 772, 4, "uint8")
     settings = Pyramid(levels=2)
     with Renderer(validation=True) as renderer:
@@ -352,7 +352,7 @@ def test_a_pass_has_one_time_in_every_variant(varied: Renderer, scene: Scene) ->
 def drawn() -> Iterator[dict[str, NDArray[np.uint8]]]:
     """The forward system's framebuffers with all passes drawn."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_FORM", "fragment")
+        patch.setenv("VKBLOOM_VARIANT", "fragment")
         with Renderer(validation=True) as renderer:
             yield dict(renderer.render(Scene.ufo(), None, (640, 360), time=0.2))
 
@@ -392,7 +392,17 @@ def test_blurs_into_other_sizes(varied: Renderer, settings: Settings) -> None:
     assert np.abs(real(alone) - expected).max() <= limit
 
 
-def test_unknown_forms_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_name_of_the_variable_works_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VKBLOOM_VARIANT", raising=False)
     monkeypatch.setenv("VKBLOOM_FORM", "quick")
-    with pytest.raises(ValueError, match="VKBLOOM_FORM: quick is not one of auto, fragment"):
+    with (
+        pytest.warns(FutureWarning, match="set VKBLOOM_VARIANT instead"),
+        pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto"),
+    ):
+        Renderer()
+
+
+def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", "quick")
+    with pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto, fragment"):
         Renderer()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vkbloom.testing.records import Record
 from vkbloom.testing.regression import FrameRegression, Mode
-from vkbloom.testing.report import write_report
+from vkbloom.testing.report_page import write_report
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -14,7 +14,7 @@ import vkbloom
 from vkbloom.cli.axis_options import axis_bounds
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import NameOf
-from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
+from vkbloom.cli.image_files import input_colour_option, layer_option, note, read_picture
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.settings_options import PRESET_OF_IMAGES
 from vkbloom.explorer.controls import as_code
@@ -79,6 +79,12 @@ from vkbloom.registry import METHODS
     help="Limit of the renders of each search.",
 )
 @click.option(
+    "--max-loss",
+    metavar="X",
+    type=click.FloatRange(min=0),
+    help="Exit status 1 if the smallest loss is larger [default: any loss is status 0]",
+)
+@click.option(
     "-o",
     "--out",
     metavar="REPORT",
@@ -100,18 +106,20 @@ def command(
     framebuffer: str,
     loss: LossName,
     max_calls: int,
+    max_loss: float | None,
     out: str | None,
     as_json: bool,
     input_colour: Any,
     layer: str | None,
     adapter: str,
     validation: bool,
-) -> None:
+) -> int:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
     Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
     There is one search for each preset and method, which starts from its settings. --vary names the
-    settings that may change. The results are printed as Python code, sorted by loss.
+    settings that may change. The results are printed as Python code, sorted by loss,
+    with a verdict (good, fair or poor) and the likely cause, such as a clipped target.
     """
     names = [name.strip().replace("-", "_") for name in vary.split(",") if name.strip()]
     begun = [*(vkbloom.presets[name] for name in presets), *(METHODS[kind]() for kind in kinds)]
@@ -141,9 +149,14 @@ def command(
                 f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s"
             )
             click.echo(f"  {as_code(one.settings)}")
+            click.echo(f"  {one.words}")
     if out is not None:
         _write(found, Path(out))
         click.echo(f"wrote {out}", err=as_json)
+    if max_loss is not None and found[0].loss > max_loss:
+        note(f"the smallest loss, {found[0].loss:.4g}, is over --max-loss {max_loss:g}")
+        return 1
+    return 0
 
 
 def _object(found: vkbloom.FitResult) -> dict[str, Any]:
@@ -154,6 +167,8 @@ def _object(found: vkbloom.FitResult) -> dict[str, Any]:
         "loss": found.loss,
         "start_loss": found.start_loss,
         "loss_name": found.loss_name,
+        "verdict": found.verdict,
+        "cause": found.cause,
         "calls": found.calls,
         "seconds": found.seconds,
     }

@@ -64,7 +64,7 @@ def fit(
     settings: Settings | Sequence[Settings],
     vary: Sequence[str],
     *,
-    framebuffer: str = "bloom",
+    framebuffer: str = "final",
     loss: Loss = "relative",
     bounds: Bounds | None = None,
     renderer: Renderer | None = None,
@@ -86,8 +86,8 @@ def fit(
     vary : sequence of str
         The fields to find: numbers, integers, flags and choices.
     framebuffer : str
-        The framebuffer to compare. ``bloom`` is the bloom before `intensity`; for a picture with
-        its bloom take ``final``.
+        The framebuffer to compare. ``final`` is the picture with its bloom, ``bloom`` the bloom
+        alone before `intensity`.
     loss : {"relative", "l2", "log", "flip"} or callable
         "relative": norm(a - b) / norm(b). "l2": the root mean square of a - b. "log": the same of
         log10 of values from 1e-4 of the target's largest on, which weighs the faint parts of a
@@ -150,6 +150,7 @@ def fit(
     ...         target,
     ...         vkbloom.Pyramid(threshold=0.5),
     ...         ["threshold", "levels"],
+    ...         framebuffer="bloom",
     ...         renderer=renderer,
     ...     )
     >>> round(found.settings.threshold, 2), found.settings.levels

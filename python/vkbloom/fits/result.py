@@ -7,7 +7,8 @@ import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,11 @@ from vkbloom.settings import Settings
 from vkbloom.views import pictures
 
 __all__ = ["FitResult"]
+
+# The largest loss that is good, and that is fair, by its name.
+_LIMITS: Final = {"relative": (0.02, 0.15), "log": (0.05, 0.2), "flip": (0.02, 0.1)}
+# A target is clipped if at least this share of its pixels has its largest value.
+_CLIPPED: Final = 1e-3
 
 _WIDTH, _HEIGHT = 300, 180  # pixels of a diagram
 _COLOURS = ("#5b8def", "#d9822b")
@@ -50,6 +56,12 @@ class FitResult:
     target : ndarray of float64, shape (H, W, 3)
     residual : ndarray of float64, shape (H, W, 3)
         The framebuffer less the target, in real units.
+    verdict : {"good", "fair", "poor"}
+        Good: a relative loss of at most 0.02, a "log" of at most 0.05 decades, or a mean FLIP of at
+        most 0.02. Fair: 0.15, 0.2 and 0.1. The relative loss decides for the other losses.
+    cause : str
+        What the likely cause is if the verdict is not good: a target that is clipped, encoded or
+        turned, or another method.
 
     See Also
     --------
@@ -61,9 +73,13 @@ class FitResult:
     >>> image = np.zeros((16, 16, 3), np.float32)
     >>> image[8, 8] = 9
     >>> target = vkbloom.reference.apply(image, vkbloom.Separable(blur_scale=1.5))["bloom"]
-    >>> found = vkbloom.fit(image, target, vkbloom.Separable(), ["blur_scale"])
+    >>> found = vkbloom.fit(
+    ...     image, target, vkbloom.Separable(), ["blur_scale"], framebuffer="bloom"
+    ... )
     >>> round(found.settings.blur_scale, 2), len(found.history) == found.calls
     (1.5, True)
+    >>> found.verdict
+    'good'
     """
 
     settings: Settings
@@ -83,8 +99,29 @@ class FitResult:
         values = ", ".join(f"{name}={_shown(getattr(self.settings, name))}" for name in self.vary)
         return (
             f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.3g} after "
-            f"{self.calls} calls>"
+            f"{self.calls} calls; {self.verdict}>"
         )
+
+    @property
+    def verdict(self) -> Literal["good", "fair", "poor"]:
+        """Whether the search found the picture."""
+        good, fair = _LIMITS.get(self.loss_name, _LIMITS["relative"])
+        loss = self.loss
+        if self.loss_name not in _LIMITS:
+            loss = float(np.linalg.norm(self.residual)) / (
+                float(np.linalg.norm(self.target)) or 1e-300
+            )
+        return "good" if loss <= good else "fair" if loss <= fair else "poor"
+
+    @cached_property
+    def cause(self) -> str:
+        """The likely cause of a verdict that is not good; empty if it is good."""
+        return "" if self.verdict == "good" else likely_cause(self)
+
+    @property
+    def words(self) -> str:
+        """The verdict with its cause."""
+        return f"{self.verdict}: {self.cause}" if self.cause else self.verdict
 
     def _repr_html_(self) -> str:
         """Return a report: pictures, radial profile, and the loss over the calls."""
@@ -100,6 +137,7 @@ class FitResult:
             '<div style="color:inherit;font-size:13px;max-width:68em">',
             f"<div><b>{html.escape(repr(self)[1:-1])}</b>, from a loss ({self.loss_name}) of "
             f"{self.start_loss:.3g}, in {self.seconds:.1f} s</div>",
+            f"<div>{html.escape(self.words)}</div>",
             '<div style="display:flex;flex-wrap:wrap;gap:12px">',
         ]
         for name, values, note in shown:
@@ -123,6 +161,39 @@ class FitResult:
             f"{html.escape(repr(self.settings))}</code></div>",
         ]
         return "".join(parts)
+
+
+def likely_cause(found: FitResult) -> str:
+    """Return why a fit is not good."""
+    target, result = found.target, found.target + found.residual
+    for text, turned in (
+        ("upside down", result[::-1]),
+        ("mirrored", result[:, ::-1]),
+        ("in the order b, g, r", result[..., ::-1]),
+    ):
+        if np.linalg.norm(turned - target) < np.linalg.norm(found.residual) / 2:
+            return f"the target is {text}"
+    peak = float(target.max())
+    share = float((target >= peak).any(axis=2).mean())
+    if share >= _CLIPPED and result.max() > 1.05 * peak:
+        return (
+            f"the target is clipped at {peak:.4g} ({100 * share:.2g} % of its pixels); fit a "
+            "target of floats, or an image that is clipped alike"
+        )
+    lit = (target > 0.01 * peak) & (result > 0.01 * result.max()) & (target < peak)
+    if np.count_nonzero(lit) > 100:
+        x, y = np.log(result[lit]), np.log(target[lit])
+        exponent = float(np.cov(x, y)[0, 1] / max(np.var(x), 1e-12))
+        straight = float(np.corrcoef(x, y)[0, 1])
+        if straight > 0.9 and not 0.75 < exponent < 1.3:
+            return (
+                f"the target has another encoding: about the power of {exponent:.2g}; decode it to "
+                "linear light (vkbloom.read, --input-colour)"
+            )
+    return (
+        f"the method {found.settings.method} does not reach it with {', '.join(found.vary)}; vary "
+        "more fields, start from another preset, or raise max_calls"
+    )
 
 
 def radial_profiles(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import image_reading, safe_writing
+from vkbloom.io.expansion import check_expansion
 from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
 from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, check_name, is_exr
 
@@ -39,6 +40,7 @@ def read(
     layer: str | None = ...,
     subimage: int = ...,
     premultiplied: bool = ...,
+    expand: float | None = ...,
     metadata: Literal[False] = ...,
 ) -> NDArray[Any]: ...
 @overload
@@ -48,6 +50,7 @@ def read(
     layer: str | None = ...,
     subimage: int = ...,
     premultiplied: bool = ...,
+    expand: float | None = ...,
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
 def read(
@@ -56,6 +59,7 @@ def read(
     layer: str | None = None,
     subimage: int = 0,
     premultiplied: bool = False,
+    expand: float | None = None,
     metadata: bool = False,
 ) -> NDArray[Any] | tuple[NDArray[Any], dict[str, Any]]:
     """Read an image file as linear light, ready for `Renderer.apply`.
@@ -74,6 +78,11 @@ def read(
         Whether to return colours multiplied by alpha. Some files have them multiplied, others not.
         By default multiplied ones are divided, except where alpha is 0. Flames and glows in OpenEXR
         files have colours with an alpha of 0: read them with ``premultiplied=True``.
+    expand : float, optional
+        What highlights of files of integers are expanded up to, 1 to 1024. A photograph has no
+        values above 1: everything bright is clipped there. Expanded, its lights are brighter than
+        its white walls, and can glow. None and 1: they stay as they are; so do files of floats.
+        ``presets["photo"]`` is made for 4.
     metadata : bool, default False
         Whether to also return the file's metadata.
 
@@ -112,18 +121,23 @@ def read(
     part of OpenImageIO. Only profiles with a matrix and curves are used. With others (CMYK, grey,
     tables) the colours are decoded as sRGB, and "notes" says so.
 
+    `expand` maps m = max(r, g, b) above the knee a = 0.8 to a + (m - a) / (1 - k (m - a)), with
+    k = 1 / (1 - a) - 1 / (expand - a), and multiplies the colour by the ratio. Up to 0.8 (the level
+    231 of 255 in sRGB) nothing changes, and 1 becomes `expand`.
+
     Examples
     --------
-    >>> photo = vkbloom.read("photo.jpg")                                   # doctest: +SKIP
+    >>> photo = vkbloom.read("photo.jpg", expand=4)                         # doctest: +SKIP
     >>> with vkbloom.Renderer() as renderer:                                # doctest: +SKIP
-    ...     final = renderer.apply(photo, vkbloom.presets["bevy_natural"])["final"]
+    ...     final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
     >>> vkbloom.write("bloom.jpg", final, quality=95)                       # doctest: +SKIP
     """
     check_name(path)
     subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
+    check_expansion(expand)
     stored = image_reading.load(path, subimage, layer)
     try:
-        picture = image_reading.decode(stored)
+        picture = image_reading.decode(stored, expand=expand)
     except ValueError as error:
         raise ValueError(f"{os.fspath(path)}: {error}") from error
     pixels = picture.pixels

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io.colour import linear
+from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
     DTYPES,
     SPACES,
@@ -270,12 +271,19 @@ def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     return pixels
 
 
-def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = False) -> Picture:
+def decode(
+    stored: StoredImage,
+    colour: Colour | None = None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
+) -> Picture:
     """Decode a stored image to a picture of linear values.
 
     - `colour`: The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's
       built-in configuration, such as "ACEScg". Default: floats are linear; integers have the space
       that the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
+    - `expand`: What highlights of integer files are expanded up to.
     - Returns: float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer
       files, or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor
       divided by alpha.
@@ -299,6 +307,8 @@ def decode(stored: StoredImage, colour: Colour | None = None, *, raw: bool = Fal
     if not raw:
         taken_as, values, said = linear(values, stored, colour)
         notes += said
+        if numbers in ("uint8", "uint16"):
+            values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     return Picture(
         pixels=np.ascontiguousarray(values),

@@ -7,6 +7,7 @@ The laws need no reference picture. They take any callable that maps an image to
 from __future__ import annotations
 
 from vkbloom.testing.frame_files import read_frame
+from vkbloom.testing.law_report import LawReport, LawRow, report
 from vkbloom.testing.laws import (
     assert_additive,
     assert_bounded_fireflies,
@@ -38,6 +39,8 @@ __all__ = [
     "Diagnosis",
     "FrameDifferenceWarning",
     "FrameRegression",
+    "LawReport",
+    "LawRow",
     "Probe",
     "ResolutionResponse",
     "Response",
@@ -57,6 +60,7 @@ __all__ = [
     "diagnose",
     "point_spread",
     "read_frame",
+    "report",
     "resolution_response",
     "response",
     "stability",

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 
 from vkbloom.checks import check_number
+from vkbloom.testing.deviations import compare_with_law
 from vkbloom.testing.probe import Bloom, Image, Probe
 
 __all__ = [
@@ -23,8 +24,6 @@ __all__ = [
     "assert_no_ringing",
     "assert_superposition",
     "assert_symmetric",
-    "compare_with_law",
-    "fail",
 ]
 
 _DEFAULT = Probe()
@@ -388,40 +387,6 @@ def assert_bounded_fireflies(
                 np.minimum(result, dark + limit),
                 error + dark_error,
             )
-
-
-def compare_with_law(
-    assertion: str,
-    law: str,
-    found: Image,
-    expected: Image,
-    allowed: float,
-    *,
-    border: int = 0,
-    note: str = "",
-) -> None:
-    """Raise AssertionError with the deviation, its position and the law if a value is wrong.
-
-    `found`, `expected`: ndarray of float64, shape (H, W, C).
-    """
-    __tracebackhide__ = True
-    difference = np.abs(found - expected)
-    place = np.unravel_index(int(difference.argmax()), difference.shape)
-    if difference[place] > allowed:
-        y, x, channel = (int(index) for index in place)
-        fail(
-            assertion,
-            law,
-            f"{found[place]:.6g} instead of {expected[place]:.6g} at x {x + border}, "
-            f"y {y + border}, channel {channel}: off by {difference[place]:.3g}, {allowed:.3g} "
-            f"allowed{note}",
-        )
-
-
-def fail(assertion: str, law: str, figure: str) -> NoReturn:
-    """Raise AssertionError with the figure and the law."""
-    __tracebackhide__ = True
-    raise AssertionError(f"{assertion}: {figure}\n  law: {law}")
 
 
 def _divisible_by_four(probe: Probe, image: Image) -> Image:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, check_number
-from vkbloom.testing.laws import fail
+from vkbloom.testing.deviations import fail
 from vkbloom.testing.point_spread import border_share, check_inside
 from vkbloom.testing.probe import Bloom, Image, Probe
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_number
-from vkbloom.testing.laws import compare_with_law, fail
+from vkbloom.testing.deviations import compare_with_law, fail, is_within
 from vkbloom.testing.probe import Bloom, Image, Probe
 
 __all__ = [
@@ -190,10 +190,11 @@ def assert_centroid_kept(
             distance = np.arange(len(profile), dtype=np.float64) - place[axis]
             off = float((profile * distance).sum() / profile.sum())
             allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
-            if abs(off) > allowed:
+            law = "the centroid of the light of a pixel is that pixel"
+            if not is_within(law, abs(off), allowed):
                 fail(
                     "assert_centroid_kept",
-                    "the centroid of the light of a pixel is that pixel",
+                    law,
                     f"the centroid is {name} {place[axis] + off:.6g}, {off:+.3g} pixels from "
                     f"{name} {place[axis]}, channel {channel}: {allowed:.3g} allowed",
                 )
@@ -260,11 +261,14 @@ def assert_spread(
             # The error of the variance is 2 sigma times the error of the standard deviation.
             variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
             allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
-            if not abs(found - pair[axis]) <= allowed:
+            law = (
+                f"the standard deviation of the light of a pixel along {name} is "
+                f"{pair[axis]:.6g} pixels"
+            )
+            if not is_within(law, abs(found - pair[axis]), allowed):
                 fail(
                     "assert_spread",
-                    f"the standard deviation of the light of a pixel along {name} is "
-                    f"{pair[axis]:.6g} pixels",
+                    law,
                     f"it is {found:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
                     f"{channel}: off by {abs(found - pair[axis]):.3g}, {allowed:.3g} allowed",
                 )

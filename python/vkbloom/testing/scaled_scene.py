@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_number
-from vkbloom.testing.laws import fail
+from vkbloom.testing.deviations import fail
 from vkbloom.testing.moving_light import area_sampled
 from vkbloom.testing.probe import Bloom, Image, Probe
 

@@ -1,0 +1,82 @@
+// Variants of passes that read only the pixel at their own position, and the complete pass as a
+// compute shader.
+#include "variants/variant.h"
+
+#include <string.h>
+
+static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
+static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(threshold);
+static const struct vkb_shader *const kino_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(kino_bright);
+static const struct vkb_shader *const highlights_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(highlights);
+static const struct vkb_shader *const scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
+
+// Whether the pass is a composite whose images have the same size and format.
+static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return vkb_is_composite(pass) && pass->constants.bloom != BLOOM_LINES && !pass->constants.masked
+        && vkb_same_size(graph, pass->reads[0], pass->targets[0])
+        && vkb_same_size(graph, pass->reads[1], pass->targets[0])
+        && vkb_has_format_of(graph, pass->reads[0], pass->reads[1])
+        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
+}
+
+// Whether the pass is a threshold pass between images of the same format.
+static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return vkb_is_threshold(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
+}
+
+// The shaders for a pass from an image of the target's size and format; NULL: it is none of those
+// that need no filter then.
+static const struct vkb_shader *const *unfiltered_shaders(const struct vkb_graph *graph,
+                                                          const struct vkb_pass_row *pass)
+{
+    if (pass->constants.masked || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
+        || !vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
+        return NULL;
+    return pass->shader == &vkb_shader_kino_prefilter_frag    ? kino_shaders
+         : pass->shader == &vkb_shader_blender_prefilter_frag ? highlights_shaders
+         : pass->shader == &vkb_shader_pyramid_up_frag && vkb_only_scales(graph, pass)
+             ? scale_shaders
+             : NULL;
+}
+
+// Turns a pass that reads only the pixel at its own position into one that loads it, from the first
+// `read_count` images.
+static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                        enum vkb_format format, uint32_t read_count)
+{
+    vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
+    vkb_drop_reads(row, read_count);
+}
+
+bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const struct vkb_graph *graph = choice->graph;
+    const enum vkb_format format = graph->images[pass->reads[0]].format;
+    const struct vkb_shader *const *unfiltered = unfiltered_shaders(graph, pass);
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    if (choice->variants == VKB_VARIANTS_GPU)
+        vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
+    else if (vkb_fits_words(choice, pass) && blends(graph, pass))
+        load_pixels(&row, blend_shaders[format], format, 2);
+    else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
+        load_pixels(&row, threshold_shaders[format], format, 1);
+    else if (vkb_fits_words(choice, pass) && unfiltered)
+        load_pixels(&row, unfiltered[format], format, 1);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                    bool *fits, struct vkb_error *error)
+{
+    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
+         && vkb_is_written_once(&choice->plain, pass->targets[0]);
+    return !*fits || vkb_add_fullscreen(choice, pass, error);
+}
