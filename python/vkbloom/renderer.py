@@ -201,8 +201,8 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        variants = _variants()
         check_for_driver()
+        variants = _variants()
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
         self._core = _core.Renderer(
