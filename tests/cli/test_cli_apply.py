@@ -67,7 +67,9 @@ def run(*arguments: str | Path, adapter: str = "auto") -> Result:
 def done(*arguments: str | Path) -> Result:
     """Run a command that must succeed without output on standard error."""
     result = run(*arguments)
-    assert (result.exit_code, result.stderr) == (0, "")
+    # bevy_natural mixes, and a note says that it darkens highlights: see test_cli_photo.py.
+    lines = [line for line in result.stderr.splitlines() if "darkens the highlights" not in line]
+    assert (result.exit_code, lines) == (0, [])
     return result
 
 
