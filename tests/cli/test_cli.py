@@ -113,7 +113,7 @@ def test_wrong_use_is_one_line_and_status_2(arguments: tuple[str, ...], message:
         (OSError("damaged"), "damaged"),
         (ValueError("a.gltf: damaged"), "a.gltf: damaged"),
         (ModuleNotFoundError("pip install vkbloom[scenes]"), "pip install vkbloom[scenes]"),
-        (MemoryError(), "MemoryError"),
+        (MemoryError(), "memory is short"),
     ],
 )
 def test_a_failure_is_one_line_and_status_1(

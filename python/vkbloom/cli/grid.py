@@ -20,8 +20,9 @@ from typing import Any, Final
 import click
 
 import vkbloom
+from vkbloom import no_bloom
 from vkbloom.checks import import_extra
-from vkbloom.cli import axis_options, no_bloom
+from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
