@@ -17,6 +17,7 @@ import hypothesis
 import pytest
 
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
+from vkbloom.registry import METHODS
 
 #: The adapter of the tests. For a GPU, set VKBLOOM_TEST_ADAPTER=hardware.
 ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")
@@ -61,6 +62,15 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
         patch.setenv("VKBLOOM_ADAPTER", ADAPTER)
         yield
+
+
+@pytest.fixture(autouse=True)
+def methods_of_the_package() -> Iterator[None]:
+    """No test finds a method that another one has loaded."""
+    yield
+    for name in [*METHODS]:
+        if METHODS.is_added(name):
+            METHODS.unregister(name)
 
 
 class RunsOwnModules:

@@ -4,6 +4,7 @@
 #define VKB_GRAPH_H
 
 #include "graph/params.h"
+#include "graph/resource.h"
 #include "spirv.h"
 #include "vulkan/barrier.h"
 #include "vulkan/format.h"
@@ -15,6 +16,10 @@ enum {
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
+    // That a method brings along, and that a pass binds.
+    VKB_MAX_RESOURCES = 16,
+    // Of a pass, beside its parameters.
+    VKB_MAX_DESCRIPTORS = VKB_MAX_READS + VKB_MAX_RESOURCES + 1,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
@@ -113,6 +118,12 @@ struct vkb_pass_row {
     // Largest distance of a read from the target's position, in source rows; INFINITY: anywhere.
     float reach;
     enum vkb_band_rows band_rows;
+    // Bound after the images read. Their owner outlives the row.
+    const struct vkb_resource *const *resources;
+    uint32_t resource_count;
+    // Of a pass that changes resources, or reads changed ones: other than in the request before, so
+    // that it runs in each request; 0: of no such pass.
+    uint64_t turn;
     enum vkb_block block;
     union vkb_params params;
 };

@@ -161,7 +161,9 @@ static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed,
     for (uint32_t i = 0; i < plan->output_count; ++i)
         wanted[plan->outputs[i]] = true;
     for (uint32_t i = graph->pass_count; i-- > 0;) {
-        needed[i] = !skipped[i] && writes_wanted(&graph->passes[i], wanted);
+        // A pass with a turn may write what no image shows.
+        needed[i] =
+            !skipped[i] && (graph->passes[i].turn || writes_wanted(&graph->passes[i], wanted));
         if (needed[i])
             mark_images(&graph->passes[i], wanted);
     }

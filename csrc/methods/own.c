@@ -46,6 +46,9 @@ static bool add_pass(const struct vkb_own_pass *pass, const char *name,
     row.reach = INFINITY;
     row.block = VKB_BLOCK_own;
     row.params.own = pass->params;
+    row.resources = pass->resources;
+    row.resource_count = pass->resource_count;
+    row.turn = pass->turn;
     return vkb_graph_add_pass(graph, &row, error);
 }
 

@@ -78,6 +78,9 @@ struct vkb_own_pass {
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
     uint32_t read_count;
     struct vkb_own_params params;
+    const struct vkb_resource *resources[VKB_MAX_RESOURCES];
+    uint32_t resource_count;
+    uint64_t turn;
 };
 
 struct vkb_settings {

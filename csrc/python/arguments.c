@@ -265,8 +265,8 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
         && require_kernel(settings) && vkb_read_glare(reader->object, settings);
 }
 
-bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
-                       struct vkb_settings *settings)
+static bool read_fields(const struct vkb_module_state *state, PyObject *object,
+                        struct vkb_settings *settings)
 {
     PyObject *type = (PyObject *)Py_TYPE(object);
     struct reader reader = {.state = state, .object = object};
@@ -280,5 +280,19 @@ bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
     }
     const bool done = read_all(&reader, settings);
     Py_XDECREF(reader.fields);
+    return done;
+}
+
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings)
+{
+    static const char VIEW[] = "core_view";
+
+    // Fields of a method that was loaded at run time may have the names of other methods' fields.
+    if (!PyObject_HasAttrString((PyObject *)Py_TYPE(object), VIEW))
+        return read_fields(state, object, settings);
+    PyObject *view = PyObject_GetAttrString(object, VIEW);
+    const bool done = view && read_fields(state, view, settings);
+    Py_XDECREF(view);
     return done;
 }

@@ -98,6 +98,8 @@ static PyMethodDef functions[] = {
      "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
      "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
+    {"resource", vkb_make_resource, METH_VARARGS,
+     "Make a texture or a buffer that passes of run time bind."},
     {"shader", vkb_make_shader, METH_VARARGS,
      "shader(name, spirv, dispatch=None) -> Shader. `dispatch` is the same pass as a compute "
      "shader."},
@@ -274,6 +276,7 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
                 && add_type(module, &vkb_shader_spec, "Shader", &state->shader_type)
+                && add_type(module, &vkb_resource_spec, "Resource", &state->resource_type)
                 && vkb_make_attributes(state)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
@@ -297,6 +300,7 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
     Py_VISIT(state->shader_type);
+    Py_VISIT(state->resource_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -313,6 +317,7 @@ static int clear(PyObject *module)
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
     Py_CLEAR(state->shader_type);
+    Py_CLEAR(state->resource_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

@@ -14,7 +14,8 @@
 #include <stdatomic.h>
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type,
+        *resource_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
@@ -39,7 +40,7 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec, vkb_shader_spec;
+    vkb_pages_spec, vkb_shader_spec, vkb_resource_spec;
 
 // The data of a submission until the device has finished it. If nobody waits for it any more, it is
 // abandoned: the renderer owns it.
@@ -200,6 +201,9 @@ bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uin
                      struct vkb_settings *settings);
 void vkb_release_passes(struct vkb_held_passes *held);
 
+// Of a Resource object, which keeps it.
+const struct vkb_resource *vkb_resource_of(PyObject *object);
+
 // In hex.
 PyObject *vkb_hash_text(const struct vkb_hash *hash);
 
@@ -248,6 +252,7 @@ bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_make_shader(PyObject *module, PyObject *arguments);
+PyObject *vkb_make_resource(PyObject *module, PyObject *arguments);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 

@@ -188,25 +188,51 @@ static bool read_content(const Py_buffer *params, const char *format, PyObject *
     return false;
 }
 
+static bool read_resources(const struct vkb_module_state *state, PyObject *resources,
+                           struct vkb_own_pass *pass)
+{
+    const Py_ssize_t count = PyTuple_Size(resources);
+
+    if (count > VKB_MAX_RESOURCES) {
+        PyErr_Format(PyExc_ValueError, "passes: %s has %zd textures and buffers, more than %d",
+                     pass->name, count, VKB_MAX_RESOURCES);
+        return false;
+    }
+    for (; pass->resource_count < count; ++pass->resource_count) {
+        PyObject *item = PyTuple_GetItem(resources, pass->resource_count);
+        if (!PyObject_TypeCheck(item, (PyTypeObject *)state->resource_type)) {
+            PyErr_Format(PyExc_TypeError, "passes: %R is not a Resource", item);
+            return false;
+        }
+        pass->resources[pass->resource_count] = vkb_resource_of(item);
+    }
+    return true;
+}
+
 // (name, shader, (width, height), format or None, (name of an image read, ...), whether it is a
-// framebuffer, bytes of its parameters, (width, height) of a workgroup's pixels or None)
+// framebuffer, bytes of its parameters, (width, height) of a workgroup's pixels or None, and where
+// it has them (resource, ...) and its turn)
 static bool read_pass(const struct vkb_module_state *state, PyObject *tuple,
                       struct vkb_own_pass *pass)
 {
     const char *name, *format;
-    PyObject *shader, *reads, *block;
+    PyObject *shader, *reads, *block, *resources = NULL;
+    unsigned long long turn = 0;
     Py_buffer params = {0};
     int framebuffer;
 
     if (!vkb_require_tuple(tuple, "core_passes")
-        || !PyArg_ParseTuple(tuple, "sO!(O&O&)zO!py*O:core_passes", &name, state->shader_type,
+        || !PyArg_ParseTuple(tuple, "sO!(O&O&)zO!py*O|O!K:core_passes", &name, state->shader_type,
                              &shader, vkb_read_uint32, &pass->width, vkb_read_uint32, &pass->height,
-                             &format, &PyTuple_Type, &reads, &framebuffer, &params, &block))
+                             &format, &PyTuple_Type, &reads, &framebuffer, &params, &block,
+                             &PyTuple_Type, &resources, &turn))
         return false;
     pass->shader = &((struct shader_object *)shader)->shader;
     pass->framebuffer = framebuffer;
+    pass->turn = turn;
     const bool done = copy_name(name, pass->name) && read_reads(reads, pass)
-                   && read_content(&params, format, block, pass);
+                   && read_content(&params, format, block, pass)
+                   && (!resources || read_resources(state, resources, pass));
     PyBuffer_Release(&params);
     return done;
 }

@@ -20,11 +20,16 @@ struct vkb_words {
     int32_t reads[VKB_MAX_WORDS][4];  // width, height, words in a row, 0
 };
 
+struct vkb_resource_layout;
+
 struct vkb_bindings {
     VkSampler filter, nearest;  // each created at its first use
     // By the number of images that a pass reads.
     VkDescriptorSetLayout set_layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
     VkPipelineLayout layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
+    // Of passes with resources, each created at its first use.
+    struct vkb_resource_layout *resource_layouts;
+    size_t resource_layout_count, resource_layout_capacity;
 };
 
 bool vkb_bindings_create(const struct vkb_device *device, struct vkb_bindings *bindings,
@@ -36,6 +41,14 @@ void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *
 // texels from it.
 bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
                           enum vkb_format format, VkSampler *sampler, struct vkb_error *error);
+
+// Creates the layouts of a pass with resources, if they are not there. *number differs between
+// layouts; 0: the pass has no resources.
+bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          const struct vkb_pass_row *pass, uint32_t *number,
+                          struct vkb_error *error);
+
+VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource);
 
 // The number of images that the pass reads through descriptors, with the scene's cubemap or
 // textures.

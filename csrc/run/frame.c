@@ -19,6 +19,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     vkb_submissions_destroy(device, &frame->submissions);
     vkb_buffer_destroy(device, &frame->constants);
     vkb_image_cache_destroy(device, &frame->cache);
+    vkb_resources_destroy(device, &frame->resources);
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         vkb_upload_destroy(device, &frame->uploads[kind]);
     vkb_scene_destroy(device, &frame->scene);
@@ -29,6 +30,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
 
 static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
 {
+    const uint32_t resources = sets * VKB_MAX_RESOURCES;
     const struct VolkDeviceTable *vk = &run->device->vk;
     struct vkb_submission *submission = run->submission;
 
@@ -38,23 +40,24 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     vk->vkDestroyDescriptorPool(run->device->handle, submission->descriptors, NULL);
     submission->descriptors = VK_NULL_HANDLE;
     submission->descriptor_capacity = 0;
-    if (!VK(error,
-            vk->vkCreateDescriptorPool(
-                run->device->handle,
-                &(VkDescriptorPoolCreateInfo){
-                    .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                    .maxSets = sets,
-                    .poolSizeCount = 5,
-                    .pPoolSizes =
-                        (VkDescriptorPoolSize[]){
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets},
-                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, sets * VKB_MAX_READS},
-                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, sets * (VKB_MAX_LOADS + 1)},
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
-                            {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets},
-                        },
-                },
-                NULL, &submission->descriptors)))
+    if (!VK(error, vk->vkCreateDescriptorPool(
+                       run->device->handle,
+                       &(VkDescriptorPoolCreateInfo){
+                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
+                           .maxSets = sets,
+                           .poolSizeCount = 5,
+                           .pPoolSizes =
+                               (VkDescriptorPoolSize[]){
+                                   {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets + resources},
+                                   {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                    sets * VKB_MAX_READS + resources},
+                                   {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+                                    sets * (VKB_MAX_LOADS + 1) + resources},
+                                   {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
+                                   {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets + resources},
+                               },
+                       },
+                       NULL, &submission->descriptors)))
         return false;
     submission->descriptor_capacity = sets;
     return true;
@@ -291,6 +294,7 @@ static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb
     if (!vkb_submissions_wait(device, &frame->submissions, error))
         return false;
     vkb_image_cache_destroy(device, &frame->cache);
+    vkb_resources_destroy(device, &frame->resources);
     frame->stale = false;
     return true;
 }
@@ -307,6 +311,7 @@ static void trim(const struct vkb_device *device, struct vkb_frame *frame,
 
     vkb_pipelines_trim(device, &frame->pipelines, &age);
     vkb_image_cache_trim(device, &frame->cache, &age);
+    vkb_resources_trim(device, &frame->resources, &age);
 }
 
 struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)

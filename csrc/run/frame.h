@@ -8,6 +8,7 @@
 #include "run/in_place.h"
 #include "run/pipeline.h"
 #include "run/resident.h"
+#include "run/resources.h"
 #include "run/screen.h"
 #include "run/submission.h"
 #include "scene/scene.h"
@@ -23,6 +24,7 @@ struct vkb_frame {
     struct vkb_specials specials;  // of the inputs of the last submission
     struct vkb_buffer constants;   // staging memory of images that are filled once
     struct vkb_image_cache cache;
+    struct vkb_resources resources;
     struct vkb_planner planner;
     uint64_t submitted;  // submissions so far
     struct vkb_screen *screens;

@@ -31,8 +31,8 @@ struct pipeline_key {
     uint32_t blend;  // enum vkb_blend
     uint32_t target_count;
     uint32_t image_count;  // of the descriptors
+    uint32_t layout;       // of a pass with resources
     struct vkb_constants constants;
-    uint32_t unused;  // fills the 8 bytes
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
@@ -446,6 +446,8 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     struct pipeline_key key;
 
     memset(&key, 0, sizeof key);
+    if (!vkb_bindings_prepare(device, &pipelines->bindings, pass, &key.layout, error))
+        return false;
     key.vertex = vkb_shader_hash(pass->vertex);
     key.shader = vkb_shader_hash(pass->shader);
     key.geometry = pass->geometry;

@@ -65,15 +65,31 @@ struct binding {
     const struct band *band;
 };
 
-// Fills the set with the parameters, the images read and the target of a dispatch.
+static void write_resource(const struct vkb_run *run, const struct vkb_resource *resource,
+                           VkDescriptorImageInfo *image, VkDescriptorBufferInfo *buffer,
+                           VkWriteDescriptorSet *write)
+{
+    const struct vkb_resource_entry *entry = vkb_resources_find(&run->frame->resources, resource);
+
+    *image = (VkDescriptorImageInfo){entry->sampler, entry->view, VK_IMAGE_LAYOUT_GENERAL};
+    *buffer = (VkDescriptorBufferInfo){.buffer = entry->buffer.handle, .range = VK_WHOLE_SIZE};
+    *write = (VkWriteDescriptorSet){
+        .descriptorType = vkb_resource_descriptor(resource),
+        .pImageInfo = image,
+        .pBufferInfo = buffer,
+    };
+}
+
+// Fills the set with the parameters, the images read, the resources and the target of a dispatch.
 static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
                               VkDescriptorSet set, struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
     const struct vkb_binding_types types = vkb_pass_binding_types(pass);
-    VkDescriptorImageInfo images[VKB_MAX_READS + 1];
-    VkWriteDescriptorSet writes[VKB_MAX_READS + 2];
+    VkDescriptorImageInfo images[VKB_MAX_DESCRIPTORS];
+    VkDescriptorBufferInfo buffers[VKB_MAX_RESOURCES];
+    VkWriteDescriptorSet writes[VKB_MAX_DESCRIPTORS + 1];
     uint32_t write_count = 0;
     VkDescriptorBufferInfo params = {
         .buffer = run->submission->uniforms.handle,
@@ -101,16 +117,22 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         }
         ++write_count;
     }
+    for (uint32_t i = 0; i < pass->resource_count; ++i) {
+        write_resource(run, pass->resources[i], &images[image_count + i], &buffers[i],
+                       &writes[write_count]);
+        writes[write_count++].dstBinding = image_count + i + 1;
+    }
+    const uint32_t last = image_count + pass->resource_count;
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
         const struct vkb_image *target = &run->images[pass->targets[0]]->image;
-        images[image_count] = (VkDescriptorImageInfo){
+        images[last] = (VkDescriptorImageInfo){
             .imageView = target->view,
             .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
-            .dstBinding = image_count + 1,
+            .dstBinding = last + 1,
             .descriptorType = types.target,
-            .pImageInfo = &images[image_count],
+            .pImageInfo = &images[last],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };
     }
@@ -490,10 +512,28 @@ static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end
     return true;
 }
 
+// Loads the resources of a pass. If passes change them, this one waits for all before it.
+static bool load_resources(struct vkb_run *run, const struct vkb_pass_row *pass,
+                           struct vkb_error *error)
+{
+    VkCommandBuffer commands = run->submission->commands.buffer;
+
+    if (!vkb_resources_load(run->device, commands, run->submission->number, pass,
+                            &run->frame->resources, error))
+        return false;
+    if (pass->turn)
+        vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_RESOURCE,
+                           VKB_ACCESS_RESOURCE);
+    return true;
+}
+
 bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
 {
     struct vkb_run *run = context;
 
+    for (uint32_t i = first; i < end; ++i)
+        if (!load_resources(run, &run->graph->passes[i], error))
+            return false;
     if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
         return record_render_pass(run, first, end, error);
     for (uint32_t i = first; i < end; ++i)

@@ -77,6 +77,14 @@ static const struct access_info {
             .reads = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_GENERAL,
         },
+    [VKB_ACCESS_RESOURCE] =
+        {
+            .stages = VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT | VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT
+                    | VK_PIPELINE_STAGE_TRANSFER_BIT,
+            .reads = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_UNIFORM_READ_BIT,
+            .writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
+            .layout = VK_IMAGE_LAYOUT_GENERAL,
+        },
     [VKB_ACCESS_COPY_SOURCE] =
         {
             .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,

@@ -16,6 +16,7 @@ enum vkb_access {
     VKB_ACCESS_DISPATCH_STORED,   // written by a compute shader
     VKB_ACCESS_DISPATCH_CHANGED,  // loaded and stored by one compute shader
     VKB_ACCESS_ANY_READ,          // read by any shader or by a copy, in the general layout
+    VKB_ACCESS_RESOURCE,  // of what methods bring along: filled, read or written by any shader
     VKB_ACCESS_COPY_SOURCE,
     VKB_ACCESS_COPY_TARGET,
     VKB_ACCESS_ACQUIRED,   // of a swapchain's image, whose content is discarded

@@ -121,28 +121,34 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
     if (device->scalar_layout)
         extensions[extension_count++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
-    return VK(error, vk->vkCreateDevice(
-                         device->adapter.physical,
-                         &(VkDeviceCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                             .pNext = device->scalar_layout ? &scalar_layout : NULL,
-                             .pEnabledFeatures =
-                                 &(VkPhysicalDeviceFeatures){
-                                     .shaderStorageImageWriteWithoutFormat = device->dispatch,
-                                     .shaderInt64 = available.shaderInt64,
-                                 },
-                             .queueCreateInfoCount = 1,
-                             .pQueueCreateInfos =
-                                 &(VkDeviceQueueCreateInfo){
-                                     .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                     .queueFamilyIndex = device->adapter.queue_family,
-                                     .queueCount = 1,
-                                     .pQueuePriorities = &(float){1.0f},
-                                 },
-                             .enabledExtensionCount = extension_count,
-                             .ppEnabledExtensionNames = extensions,
-                         },
-                         NULL, &device->handle));
+    return VK(error,
+              vk->vkCreateDevice(
+                  device->adapter.physical,
+                  &(VkDeviceCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                      .pNext = device->scalar_layout ? &scalar_layout : NULL,
+                      .pEnabledFeatures =
+                          &(VkPhysicalDeviceFeatures){
+                              .shaderStorageImageWriteWithoutFormat = device->dispatch,
+                              .shaderInt64 = available.shaderInt64,
+                              // For passes that are given at run time.
+                              .fragmentStoresAndAtomics = available.fragmentStoresAndAtomics,
+                              .shaderStorageImageExtendedFormats =
+                                  available.shaderStorageImageExtendedFormats,
+                              .shaderImageGatherExtended = available.shaderImageGatherExtended,
+                          },
+                      .queueCreateInfoCount = 1,
+                      .pQueueCreateInfos =
+                          &(VkDeviceQueueCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                              .queueFamilyIndex = device->adapter.queue_family,
+                              .queueCount = 1,
+                              .pQueuePriorities = &(float){1.0f},
+                          },
+                      .enabledExtensionCount = extension_count,
+                      .ppEnabledExtensionNames = extensions,
+                  },
+                  NULL, &device->handle));
 }
 
 static uint64_t timestamp_mask(const struct vkb_device *device)

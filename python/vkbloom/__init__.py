@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from vkbloom.methods.unreal import UnrealBloom
     from vkbloom.named_glares import glares
     from vkbloom.named_settings import presets
+    from vkbloom.own.method import load_method
     from vkbloom.plans import Pass, Plan
     from vkbloom.scene import Camera, Scene
     from vkbloom.surface import Surface
@@ -97,6 +98,7 @@ _LATE = {
     "fit_pyramid": "vkbloom.fits",
     "glares": "vkbloom.named_glares",
     "grid_to_zarr": "vkbloom.grid.zarr_grid",
+    "load_method": "vkbloom.own.method",
     "presets": "vkbloom.named_settings",
     "read": "vkbloom.io.array_files",
     "response_curves": "vkbloom.grid.curves",
@@ -152,6 +154,7 @@ __all__ = [
     "gaussian_weights",
     "glares",
     "grid_to_zarr",
+    "load_method",
     "presets",
     "psf",
     "read",

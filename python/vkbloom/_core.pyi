@@ -58,6 +58,17 @@ def plan(
     source: Source, settings: object, names: tuple[str, ...] | None, variants: str = "fragment", /
 ) -> Plan: ...
 def shader(name: str, spirv: bytes, dispatch: bytes | None = None, /) -> Shader: ...
+def resource(
+    serial: int,
+    kind: int,
+    format: int,
+    sides: tuple[int, int, int, int],
+    linear: bool,
+    border: int,
+    size: int,
+    data: bytes | None,
+    /,
+) -> Resource: ...
 def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 
 class Renderer:
@@ -137,6 +148,8 @@ class Plan:
     def size(self) -> int: ...
     def shares_images(self, other: Plan, /) -> bool: ...
     def is_of_image(self, source: Source, /) -> bool: ...
+
+class Resource: ...
 
 class Shader:
     @property

@@ -298,6 +298,10 @@ class Record:
         """Return the classes of stored records by name."""
         raise NotImplementedError
 
+    @classmethod
+    def _check_stored(cls, values: dict[str, Any]) -> None:
+        """Take from the stored values what is no field, and check it."""
+
     def to_dict(self) -> dict[str, Any]:
         """Return the name of the class, and the fields by name.
 
@@ -363,10 +367,12 @@ class Record:
         key, classes, own = cls._class_key, cls._classes(), cls._class_name()
         name = fields.get(key, own)
         if not isinstance(name, str) or name not in classes:
-            raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}")
+            load = "; load its file with vkbloom.load_method" if "sha256" in fields else ""
+            raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}{load}")
         if own not in (None, name):
             raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
         values = {field: value for field, value in fields.items() if field != key}
+        classes[name]._check_stored(values)
         declared = fields_of(classes[name])
         unknown = [field for field in values if field not in declared]
         if unknown:

@@ -58,6 +58,10 @@ class Registry(Mapping[str, type[Any]]):
     def __len__(self) -> int:
         return len(self._sources)
 
+    def is_added(self, name: str) -> bool:
+        """Return whether the class was added at run time."""
+        return isinstance(self._sources.get(name), type)
+
     def class_named(self, name: str) -> type[Any] | None:
         """Return the class with this name in Python; None if there is none."""
         for key, source in self._sources.items():

@@ -108,6 +108,7 @@ def _paired(
 ) -> Iterator[requests.Work]:
     """Yield each image with its settings. Errors are raised in order."""
     count = 0
+    state: dict[Any, Any] = {}
     for image in images:
         if isinstance(settings, Settings):
             one = settings
@@ -115,7 +116,7 @@ def _paired(
             one = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Work(image_source(image), one)
+        work = requests.Work(image_source(image), one._in_sequence(count, state))
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield work
@@ -948,7 +949,7 @@ class Renderer:
             if last is settings and last_names == names and plan.is_of_image(source):
                 return plan
         plan = self._core.plan(source, settings, names)
-        self._planned = settings, names, plan
+        self._planned = None if settings._has_state else (settings, names, plan)
         return plan
 
     def _run_many(

@@ -207,6 +207,15 @@ class Settings(Record):
         place, field = stage_field_of(self.glare, name)
         return getattr(self.glare[place], field)
 
+    @property
+    def _has_state(self) -> bool:
+        """Whether frames depend on those before; only own methods can."""
+        return False
+
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+        """Return the settings for a frame of a sequence, whose frames share the state."""
+        return self
+
     @classmethod
     def _classes(cls) -> Mapping[str, type[Settings]]:
         return METHODS

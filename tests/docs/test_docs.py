@@ -53,6 +53,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     np.save("picture.npy", photo)
     (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
     Path("grid.toml").write_text(grid)
+    (own,) = blocks(ROOT / "docs" / "own_methods.md", "glsl")
+    Path("soft.hook").write_text(own)
     return tmp_path
 
 

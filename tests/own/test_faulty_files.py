@@ -3,13 +3,16 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vkbloom import ShaderError
 from vkbloom.own.compiler import compile_shader
 from vkbloom.own.file import OwnFile, read_file
 from vkbloom.own.glsl import write_shader
-from vkbloom.own.source import read_source
+from vkbloom.own.source import Source, checked, read_source
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "own_methods"
 BODY = "vec4 hook() { return HOOKED_texOff(0); }\n"
 PASS = "//!HOOK MAIN\n//!BIND HOOKED\n" + BODY
 TEXTURE = "//!TEXTURE t\n//!SIZE 2 1\n//!FORMAT r8\n00ff\n"
@@ -173,7 +176,7 @@ def test_a_faulty_file_is_refused(
 def compile_all(file: OwnFile) -> None:
     values = {one.name: one.default for one in file.params}
     for stage, one in file.runs():
-        compile_shader(file.source, one, write_shader(file, one, stage, values))
+        compile_shader(file, one, write_shader(file, one, stage, values))
 
 
 @pytest.mark.parametrize(
@@ -189,6 +192,54 @@ def test_a_pass_that_does_not_compile_is_refused(
     with pytest.raises(ShaderError) as caught:
         compile_all(read)
     assert cause in message_of(caught.value, file, line, text)
+
+
+def test_a_name_that_glsl_does_not_accept(tmp_path: Path) -> None:
+    file = tmp_path / "faulty.hook"
+    text = (
+        param("TYPE float").replace("PARAM p", "PARAM while").replace("texOff(0)", "texOff(while)")
+    )
+    file.write_text(text)
+    with pytest.raises(ShaderError) as caught:
+        compile_all(read_file(read_source(file)))
+    assert "while" in str(caught.value)
+    assert str(caught.value).startswith(f"{file}:")
+
+
+WORDS = (
+    "//!",
+    "//!HOOK MAIN\n",
+    "//!BIND A\n",
+    "//!PARAM x\n",
+    "\n",
+    "\0",
+    " ",
+    "-1",
+    "/",
+    "é",
+    "9" * 20,
+)
+
+
+@given(data=st.data())
+@settings(max_examples=300)
+def test_no_mutation_ends_in_another_error(data: st.DataObject) -> None:
+    text = data.draw(
+        st.sampled_from([file.read_text() for file in sorted(EXAMPLES.glob("*.hook"))])
+    )
+    for _ in range(data.draw(st.integers(1, 4))):
+        start = data.draw(st.integers(0, len(text)))
+        end = start + data.draw(st.integers(0, 40))
+        text = text[:start] + data.draw(st.sampled_from(("", *WORDS))) + text[end:]
+    message = "mutated:"
+    try:
+        file = read_file(checked(Source("mutated", text)))
+        values = {one.name: one.default for one in file.params}
+        for stage, one in file.runs():
+            write_shader(file, one, stage, values)
+    except ValueError as error:
+        message = str(error)
+    assert message.startswith("mutated:")
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:

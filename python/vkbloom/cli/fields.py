@@ -20,7 +20,7 @@ from vkbloom.fields import FieldInfo, Kind, fields_of
 from vkbloom.glare.base import Glare
 from vkbloom.named_glares import glares
 from vkbloom.psf.base import PSF, functions
-from vkbloom.registry import STAGES
+from vkbloom.registry import METHODS, STAGES
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]
@@ -261,8 +261,15 @@ class FieldOptions(click.Option):
             fields: dict[str, dict[str, FieldInfo]] = {}
             for label, kind in kinds.items():
                 for name, info in fields_of(kind).items():
-                    if name not in inherited:
-                        fields.setdefault(name, {})[label] = info
+                    if name in inherited:
+                        continue
+                    if METHODS.is_added(label) and any(
+                        (one.kind, one.choices) != (info.kind, info.choices)
+                        for one in fields.get(name, {}).values()
+                    ):
+                        # An own method was loaded for this call: its field has the option.
+                        del fields[name]
+                    fields.setdefault(name, {})[label] = info
             made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
             self._made = kinds, made
         return self._made[1]

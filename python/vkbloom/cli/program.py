@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from click.core import ParameterSource
 
 import vkbloom
 from vkbloom.free_memory import ADVICE, memory_left
+from vkbloom.registry import METHODS
 
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = (
@@ -60,7 +62,8 @@ class Program(click.Group):
         """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
         options["standalone_mode"] = False
         try:
-            status = super().main(args, prog_name, **options)
+            words = with_methods(sys.argv[1:] if args is None else args)
+            status = super().main(words, prog_name, **options)
         except click.UsageError as error:
             where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
             _exit(2, error.format_message() + where)
@@ -77,6 +80,26 @@ class Program(click.Group):
                 _exit(1, _described(error))
             raise
         sys.exit(status)
+
+
+def with_methods(words: Sequence[str]) -> list[str]:
+    """Load the files of own methods after --method; return the words with the methods' names."""
+    changed = list(words)
+    for place, word in enumerate(changed):
+        option, _, value = word.partition("=")
+        if option != "--method":
+            continue
+        joined = bool(value)
+        if not joined and place + 1 < len(changed):
+            value = changed[place + 1]
+        if value in METHODS or not os.path.isfile(value):
+            continue
+        name = vkbloom.load_method(value).method
+        if joined:
+            changed[place] = f"--method={name}"
+        else:
+            changed[place + 1] = name
+    return changed
 
 
 def _is_from_interrupt(error: BaseException | None) -> bool:

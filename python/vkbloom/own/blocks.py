@@ -112,6 +112,8 @@ def read_directive(source: Source, kind: str, content: str, line: int) -> Direct
             return Directive(name, content.removeprefix(name).strip(), line)
     word = (re.findall(r"\w+", content) or [content])[0]
     block = "a pass" if kind == "PASS" else f"a block {kind}"
+    begun = any(content.startswith(names[0]) for names in DIRECTIVES.values())
+    advice = "; an empty line must stand before a new block" if begun else ""
     raise source.fault(
-        line, f"directive: {word!r} is not one of {block}: {', '.join(DIRECTIVES[kind])}"
+        line, f"directive: {word!r} is not one of {block}: {', '.join(DIRECTIVES[kind])}{advice}"
     )

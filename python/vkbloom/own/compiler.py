@@ -19,9 +19,9 @@ import numpy as np
 
 from vkbloom._core import ShaderError
 from vkbloom.io import pipeline_cache
+from vkbloom.own.file import OwnFile
 from vkbloom.own.glsl import BODY, Shader
 from vkbloom.own.passes import OwnPass
-from vkbloom.own.source import Source
 from vkbloom.own.spirv import without_contraction
 
 #: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result.
@@ -38,8 +38,8 @@ SPIRV_MAGIC: Final = 0x07230203
 MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
 MISSING: Final = (
-    "own methods need the compiler glslang; pip install 'vkbloom[shaders]', or on Debian or "
-    "Ubuntu: apt install glslang-tools"
+    "own methods need the compiler glslang (glslangValidator); on Debian or Ubuntu: apt install "
+    "glslang-tools"
 )
 
 
@@ -64,16 +64,16 @@ def identity() -> bytes:
     return known.digest()
 
 
-def compile_shader(source: Source, one: OwnPass, shader: Shader) -> bytes:
+def compile_shader(file: OwnFile, one: OwnPass, shader: Shader) -> bytes:
     """Return the SPIR-V of a pass, from the cache where it is there."""
     key = hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).hexdigest()
     folder = pipeline_cache.folder()
-    file = None if folder is None else folder / "own" / f"{key}.spv"
-    known = None if file is None else read_cached(file)
+    kept = None if folder is None else folder / "own" / f"{key}.spv"
+    known = None if kept is None else read_cached(kept)
     if known is None:
-        known = compiled(source, one, shader)
-        if file is not None:
-            write_cached(file, known)
+        known = compiled(file, one, shader)
+        if kept is not None:
+            write_cached(kept, known)
     return known
 
 
@@ -102,7 +102,7 @@ def write_cached(file: Path, code: bytes) -> None:
         os.replace(temporary, file)
 
 
-def compiled(source: Source, one: OwnPass, shader: Shader) -> bytes:
+def compiled(file: OwnFile, one: OwnPass, shader: Shader) -> bytes:
     """Run the compiler; raise ShaderError with the user's file and line if it refuses."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         target = Path(folder) / "shader.spv"
@@ -111,10 +111,10 @@ def compiled(source: Source, one: OwnPass, shader: Shader) -> bytes:
         status, text = run_limited(command, shader.text, folder)
         code = target.read_bytes() if status == 0 and target.exists() else b""
     if not code:
-        raise ShaderError(explained(source, one, status, text))
+        raise ShaderError(explained(file, one, status, text))
     words = np.frombuffer(code, "=u4")
     if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
-        raise ShaderError(source.where(one.line, "the compiler's result is not SPIR-V"))
+        raise ShaderError(file.source.where(one.line, "the compiler's result is not SPIR-V"))
     return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
 
 
@@ -160,8 +160,9 @@ def limit(process: int) -> None:
             resource.prlimit(process, which, (most, most))
 
 
-def explained(source: Source, one: OwnPass, status: int, text: str) -> str:
+def explained(file: OwnFile, one: OwnPass, status: int, text: str) -> str:
     """Return the message of a pass that does not compile."""
+    source = file.source
     if status < 0 or status > 128:
         return source.where(
             one.line,
@@ -177,4 +178,9 @@ def explained(source: Source, one: OwnPass, status: int, text: str) -> str:
         return source.where(one.body_line, f"the pass defines no function '{kind}'")
     found = MESSAGE.search(text)
     cause = found[3].strip() if found else text.strip().split("\n")[-1]
+    # A name of a block that GLSL does not accept, in the lines before the body.
+    lines = {block.name: block.line for block in (*file.params, *file.given.values())}
+    for name in re.findall(r"'(\w+)'", cause):
+        if name in lines:
+            return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")
     return source.where(one.body_line, f"the pass is not complete GLSL: {cause}")

@@ -1,13 +1,12 @@
 """The GLSL of a pass: what its body finds, the body, and a main function.
 
-Binding 0 is the block of parameters. The images follow in the order of `images`, then the target
-of a compute pass, the textures and the buffers of the file.
+Binding 0 is the block of parameters. The images follow in the order of `images`, then the textures
+and the buffers of the file, and last the target of a compute pass.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 from collections.abc import Mapping
 from typing import Final
@@ -71,6 +70,16 @@ class Shader:
     images: tuple[str, ...]
     textures: tuple[Texture, ...]
     buffers: tuple[Buffer, ...]
+
+    def packed(self, given: Mapping[str, object]) -> bytes:
+        """Return the block of parameters in std140; vectors are first, so there are no gaps."""
+        kinds = {"int": "<i4", "uint": "<u4"}
+        return b"".join(
+            np.asarray(given[member.of or member.name])
+            .astype(kinds.get(member.type, "<f4"))
+            .tobytes()
+            for member in self.members
+        )
 
 
 def without_remarks(text: str) -> str:
@@ -173,17 +182,16 @@ def write_shader(file: OwnFile, one: OwnPass, stage: str, values: Mapping[str, f
         lines.append(f"layout(binding = {place + 1}) uniform sampler2D {sampler};")
         lines += [image_lines(name, sampler, compute) for name in names]
     binding = len(images) + 1
-    if one.compute:
-        width, height = one.compute.threads
-        lines.append(f"layout(local_size_x = {width}, local_size_y = {height}) in;")
-        lines.append(f"layout(binding = {binding}) uniform writeonly image2D out_image;")
-        binding += 1
     for texture in textures:
         lines.append(texture_lines(texture, binding))
         binding += 1
     for buffer in buffers:
         lines.append(buffer_lines(buffer, binding))
         binding += 1
+    if one.compute:
+        width, height = one.compute.threads
+        lines.append(f"layout(local_size_x = {width}, local_size_y = {height}) in;")
+        lines.append(f"layout(binding = {binding}) uniform writeonly image2D out_image;")
     lines += [
         "#define tex_offset vec2(0.0)",
         "#define linearize(c) (c)",
@@ -228,15 +236,3 @@ def main_lines(compute: bool) -> str:
         return "void main() { hook(); }"
     renamed = "".join(f"#undef {name}\n#define {name} vkb_{name}\n" for name in ROUNDING_NAMES)
     return renamed + MAIN
-
-
-def packed_members(shader: Shader, given: Mapping[str, object]) -> bytes:
-    """Return the block of parameters as bytes, in std140; vectors are first, so without gaps."""
-    data = b""
-    for member in shader.members:
-        value = given[member.of or member.name]
-        kind = {"int": "<i4", "uint": "<u4"}.get(member.type, "<f4")
-        if isinstance(value, float) and math.isinf(value):
-            raise ValueError(f"{member.name}: {value} is not finite")
-        data += np.asarray(value).astype(kind).tobytes()
-    return data

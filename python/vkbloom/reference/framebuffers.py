@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom.registry import METHODS, Reference
 
-from . import glare
+from . import glare, own
 from .compositing import CompositeSettings, check_settings, composite_checked
 from .image import BlurInput, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
@@ -108,6 +108,9 @@ def apply(
     >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
     True
     """
+    if (twin := getattr(settings, "twin", None)) is not None:
+        scene = as_float(image, "image", (3, 4))
+        return own.framebuffers(twin, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked(image, settings, mask, emission)
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     return framebuffers(

@@ -1,0 +1,292 @@
+"""Own methods as settings: the classes that `load_method` makes."""
+
+from __future__ import annotations
+
+import copy
+import copyreg
+import dataclasses
+import keyword
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final, Literal, Self
+
+from numpy.typing import NDArray
+
+from vkbloom.fields import number_field, value_field
+from vkbloom.own.file import OwnFile, read_file
+from vkbloom.own.params import Param
+from vkbloom.own.planning import Request, Row, planned
+from vkbloom.own.resources import made_resources
+from vkbloom.own.shaders import Shaders
+from vkbloom.own.source import Source, read_source
+from vkbloom.registry import METHODS
+from vkbloom.settings import Settings
+
+Twin = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
+
+#: Fields that a file without BLOOM has not, since it composites by itself.
+COMPOSITED: Final = ("intensity", "composite")
+
+
+class OwnType(type):
+    """The type of the classes, which are pickled as the text that they are made of."""
+
+    method: str
+    file: OwnFile
+    twin: Twin | None
+
+
+class CoreView:
+    """The fields that the core reads of own settings: those of all settings."""
+
+    method = "own"
+
+    def __init__(self, settings: OwnMethod) -> None:
+        for field in dataclasses.fields(Settings):
+            setattr(self, field.name, getattr(settings, field.name))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OwnMethod(Settings, metaclass=OwnType):
+    """Base class of the settings of own methods."""
+
+    file: ClassVar[OwnFile]
+    shaders: ClassVar[Shaders]
+    twin: ClassVar[Twin | None] = None
+    _place: ClassVar[int] = 0
+    _state: ClassVar[dict[Any, Any] | None] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.file.saves_bloom:
+            for name in COMPOSITED:
+                if getattr(self, name) != getattr(type(self), name):
+                    raise ValueError(
+                        f"{name}: {getattr(self, name)!r} is not {getattr(type(self), name)!r}; "
+                        f"the method {self.method} composites by itself, since it saves no BLOOM"
+                    )
+
+    def numbers(self) -> dict[str, float]:
+        """Return the number of each parameter."""
+        return {param.name: param.plain(getattr(self, param.name)) for param in self.file.params}
+
+    @property
+    def core_view(self) -> CoreView:
+        """What the core reads in place of the settings."""
+        return CoreView(self)
+
+    def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Row, ...]:
+        """Return the passes of a frame, as rows."""
+        if self._state is None:
+            changed = made_resources(self.file, storage=True)
+        elif (changed := self._state.get(type(self), {})) == {}:
+            changed = self._state[type(self)] = made_resources(self.file, storage=True)
+        request = Request(
+            frame,
+            buffers,
+            self.numbers(),
+            self.dither_seed,
+            self._place,
+            {**self.shaders.resources, **changed},
+        )
+        return planned(self.file, self.shaders, request)
+
+    @property
+    def _has_state(self) -> bool:
+        """Whether passes change textures or buffers, so that frames depend on those before."""
+        return any(block.storage for block in self.file.given.values())
+
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+        """Return a copy for a frame of a sequence, which counts the frames before it."""
+        copied = copy.copy(self)
+        object.__setattr__(copied, "_place", place)
+        object.__setattr__(copied, "_state", state)
+        return copied
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return method, SHA-256 of the text, and the fields."""
+        return {"method": self.method, "sha256": self.file.source.digest, **super().to_dict()}
+
+    @classmethod
+    def _check_stored(cls, values: dict[str, Any]) -> None:
+        digest = values.pop("sha256", cls.file.source.digest)
+        if digest != cls.file.source.digest:
+            raise ValueError(
+                f"sha256: the method {cls.method} that is loaded, {cls.file.source.name}, has "
+                f"another text; load the file that has {digest} with vkbloom.load_method"
+            )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return settings_of, (type(self), values)
+
+
+def settings_of(kind: type[OwnMethod], values: dict[str, Any]) -> OwnMethod:
+    """Return settings of a class; for pickle."""
+    return kind(**values)
+
+
+def class_of(name: str, source: Source, twin: Twin | None) -> type[OwnMethod]:
+    """Return the class of a text: the one that is registered, or a new one; for pickle."""
+    if name in METHODS:
+        known = METHODS[name]
+        if isinstance(known, OwnType) and known.file.source == source:
+            return known
+    return registered(name, source, twin)
+
+
+def reduced(kind: OwnType) -> Any:
+    """Return how a class is made again; for pickle."""
+    if kind is OwnMethod:
+        return kind.__name__
+    return class_of, (kind.method, kind.file.source, kind.twin)
+
+
+copyreg.pickle(OwnType, reduced)
+
+
+def load_method(
+    source: str | Path, *, name: str | None = None, reference: Twin | None = None
+) -> type[Settings]:
+    """Load a method from a file of passes in the syntax of mpv's user shaders.
+
+    Parameters
+    ----------
+    source : path or str
+        The file, or its text, which contains a line feed.
+    name : str, optional
+        The method's name, an identifier that no method of the package has. Default: the file's stem
+        with _ in place of other characters, "own" for a text. A method that was loaded under this
+        name is replaced.
+    reference : callable, optional
+        A twin in NumPy: ``reference(image, settings)`` gets an array (H, W, 4) in float64 and
+        returns framebuffers by name, with ``bloom`` or ``final``. `reference.apply` calls it.
+
+    Returns
+    -------
+    type
+        A class of settings with the fields of all settings, and one for each ``//!PARAM``. An ENUM
+        is a choice of its names.
+
+    Raises
+    ------
+    ValueError
+        The file is not valid; the message names file and line, and quotes the line. Or the name is
+        not possible, or a PARAM has the name of a field of all settings.
+    ShaderError
+        A pass does not compile; the message names file and line. Or the compiler is missing.
+    OSError
+        The file cannot be read.
+
+    See Also
+    --------
+    Settings : The fields of all methods.
+    Renderer.apply : Uses settings.
+
+    Notes
+    -----
+    Passes can bind ``MAIN`` (the frame), ``GLOW`` (what glows), and what they saved. Saved textures
+    are framebuffers under their lower-case names. A file that saves ``BLOOM`` leaves the composite
+    to the package; any other file replaces the picture.
+
+    Examples
+    --------
+    >>> text = '''//!PARAM gain
+    ... //!TYPE float
+    ... //!MINIMUM 0
+    ... //!MAXIMUM 4
+    ... 2
+    ... //!HOOK MAIN
+    ... //!BIND GLOW
+    ... //!SAVE BLOOM
+    ... vec4 hook() { return gain * GLOW_tex(GLOW_pos); }
+    ... '''
+    >>> Gained = vkbloom.load_method(text, name="gained")
+    >>> Gained(gain=3).gain
+    3.0
+    """
+    read = read_source(source)
+    if name is None:
+        name = own_name(Path(read.name).stem if read.name != "<text>" else "own")
+    elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise ValueError(f"name: {name!r} is not an identifier")
+    return registered(name, read, reference)
+
+
+def own_name(stem: str) -> str:
+    """Return an identifier for a file's stem."""
+    name = re.sub(r"\W", "_", stem)
+    return name if name.isidentifier() and not keyword.iskeyword(name) else f"_{name}"
+
+
+def registered(name: str, source: Source, twin: Twin | None) -> type[OwnMethod]:
+    """Make the class of a text, and register it."""
+    if name in METHODS and not isinstance(METHODS[name], OwnType):
+        raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
+    file = read_file(source)
+    shaders = Shaders(name, file)
+    shaders.compile_all({param.name: param.default for param in file.params})
+    fields = [(param.name, *field_of(file, param)) for param in file.params]
+    kind: Any = dataclasses.make_dataclass(
+        class_name(name),
+        fields,
+        bases=(OwnMethod,),
+        namespace={
+            "__doc__": f"The method {name}, loaded from {source.name}.",
+            "__module__": __name__,
+            "method": name,
+            "file": file,
+            "shaders": shaders,
+            "twin": None if twin is None else staticmethod(twin),
+        },
+        frozen=True,
+        kw_only=True,
+    )
+    METHODS.register(kind)
+    made: type[OwnMethod] = kind
+    return made
+
+
+def class_name(name: str) -> str:
+    """Return the name of a method's class: soft_bloom is SoftBloom."""
+    joined = "".join(part[:1].upper() + part[1:] for part in name.split("_"))
+    return joined if joined.isidentifier() else f"Own{joined}"
+
+
+def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
+    """Return type and declaration of a parameter's field."""
+    if hasattr(OwnMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
+        raise file.source.fault(
+            param.line, f"PARAM: {param.name!r} is a name that all settings have; rename it"
+        )
+    if param.names:
+        read = EnumReader(param.name, param.names)
+        return Literal[param.names], value_field(
+            param.names[0], kind="choice", choices=param.names, read=read, text=param.description
+        )
+    whole = param.number != "float"
+    default = int(param.default) if whole else param.default
+    return (int if whole else float), number_field(
+        default=default, range=(param.low, param.high), text=param.description
+    )
+
+
+#: Names that classes of settings have beside their attributes.
+TAKEN: Final = {"method", "sha256", "threshold", "self"}
+
+
+@dataclasses.dataclass(frozen=True)
+class EnumReader:
+    """Reads the value of an ENUM: one of its names, or the index of one."""
+
+    name: str
+    names: tuple[str, ...]
+
+    def __call__(self, value: object) -> str:
+        """Return the name."""
+        if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < len(self.names):
+            return self.names[value]
+        if isinstance(value, str) and value in self.names:
+            return self.names[self.names.index(value)]
+        raise ValueError(f"{self.name}: {value!r} is not one of {', '.join(self.names)}")
