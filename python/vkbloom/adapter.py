@@ -9,7 +9,6 @@ import os
 from types import ModuleType
 
 from vkbloom import _core
-from vkbloom.free_memory import check_for_driver
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +127,6 @@ def adapters() -> tuple[AdapterInfo, ...]:
     >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
     True
     """
-    check_for_driver()
     found: list[_core.AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):
         with contextlib.suppress(_core.AdapterNotFoundError):

@@ -8,18 +8,13 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from vkbloom import _core
-
-__all__ = ["ADVICE", "address_space_left", "check_for_driver", "memory_left", "shortage"]
+__all__ = ["ADVICE", "address_space_left", "memory_left"]
 
 #: What helps where memory is short.
 ADVICE: Final = (
     "raise the limit (ulimit -v), close other programs, or use less memory: half floats (--half), "
     "smaller bloom buffers (--bloom-scale), or smaller pictures"
 )
-# Address space that opening a driver takes. lavapipe with LLVM 15 maps 400 to 700 MB, and ends the
-# process if it cannot.
-_DRIVER_BYTES: Final = 512 << 20
 
 
 def address_space_left() -> int | None:
@@ -56,20 +51,3 @@ def memory_left() -> int | None:
         )
         left.append(max(most - used, 0))
     return min(left, default=None)
-
-
-def shortage() -> str:
-    """Return that the limit of address space is too low for a driver; "" if it is not."""
-    left = address_space_left()
-    if left is None or left >= _DRIVER_BYTES:
-        return ""
-    return (
-        f"memory is short: the process can allocate {left >> 20} MiB more, but opening a Vulkan "
-        f"driver needs about {_DRIVER_BYTES >> 20} MiB"
-    )
-
-
-def check_for_driver() -> None:
-    """Raise OutOfMemoryError where a driver could not be opened, since it might crash."""
-    if said := shortage():
-        raise _core.OutOfMemoryError(f"{said}; {ADVICE}")

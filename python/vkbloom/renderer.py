@@ -16,7 +16,6 @@ from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
-from vkbloom.free_memory import check_for_driver
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
@@ -201,7 +200,6 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        check_for_driver()
         variants = _variants()
         from vkbloom.io import pipeline_cache  # noqa: PLC0415  costs start-up time
 
@@ -523,8 +521,8 @@ class Renderer:
         -----
         The device works on the next settings while the caller uses a frame. So after the first
         frame, settings are taken from the iterable before earlier frames are yielded. An error in
-        settings is raised after the frames of all earlier settings. Wrong types in a sequence, and
-        names of framebuffers that its settings do not have, are raised by the call.
+        settings is raised after the frames of all earlier settings. Names of framebuffers that none
+        of the settings of a sequence has are raised by the call.
 
         Examples
         --------
@@ -964,8 +962,9 @@ class Renderer:
         if self.closed:
             raise ValueError("the renderer is closed")
         if isinstance(settings_seq, abc.Sequence):
-            settings_seq = tuple(map(check_settings, settings_seq))
-            self._check_names(source, settings_seq, names)
+            settings_seq = tuple(settings_seq)
+            if names:
+                self._check_names(source, settings_seq, names)
         return self._run_work(
             (requests.Work(source, check_settings(one)) for one in settings_seq), names
         )
@@ -976,22 +975,19 @@ class Renderer:
         settings: Settings | Sequence[Settings],
         names: tuple[str, ...] | None,
     ) -> None:
-        """Raise ValueError for attachments that no image of this kind has, of whatever size."""
-        if not names:
-            return
-        for one in {settings} if isinstance(settings, Settings) else dict.fromkeys(settings):
-            try:
-                plan = self._core.plan(source, one, None)
-            except (_core.Error, ValueError):
-                # An error of these settings is raised after the frames of earlier ones.
-                continue
-            known = [name for name, _, _ in plan.outputs]
-            kinds = {_NUMBER.sub("#", name) for name in known}
-            for name in names:
-                if _NUMBER.sub("#", name) not in kinds:
-                    raise ValueError(
-                        f"attachments: unknown framebuffer {name!r}; available: {', '.join(known)}"
-                    )
+        """Raise ValueError for attachments that none of the settings has, at any size."""
+        found: dict[str, None] = {}
+        for one in [settings] if isinstance(settings, Settings) else settings:
+            # An error of these settings is raised in their turn, after the frames of earlier ones.
+            with contextlib.suppress(_core.Error, TypeError, ValueError):
+                plan = self._core.plan(source, check_settings(one), None)
+                found.update((name, None) for name, _, _ in plan.outputs)
+        kinds = {_NUMBER.sub("#", name) for name in found}
+        for name in names or ():
+            if found and _NUMBER.sub("#", name) not in kinds:
+                raise ValueError(
+                    f"attachments: unknown framebuffer {name!r}; available: {', '.join(found)}"
+                )
 
     def _run_work(
         self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None

@@ -22,7 +22,11 @@ IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
 
 def run(*words: object) -> Result:
-    return CliRunner().invoke(program, ["apply", *map(str, words)])
+    given = [*map(str, words)]
+    if not {"--preset", "--method", "--help"} & {*given}:
+        # Files of integers start from the preset photo: see test_cli_photo.py.
+        given += ["--preset", "bevy_natural", "--composite", "add"]
+    return CliRunner().invoke(program, ["apply", *given])
 
 
 def names(folder: Path) -> list[str]:
@@ -265,7 +269,8 @@ def test_glare_without_light_is_noted(tmp_path: Path, glare: str, said: str | No
     """A threshold is subtracted after the halvings, in which a pixel of light vanishes."""
     point = np.zeros((64, 64, 3), np.uint8)
     point[32, 32] = 255
-    result = run(store_png(tmp_path / "a.png", point), tmp_path / "b.png", "--glare", glare)
+    path = store_png(tmp_path / "a.png", point)
+    result = run(path, tmp_path / "b.png", "--glare", glare)
     assert result.exit_code == 0, result.stderr
     if said is None:
         assert result.stderr == ""

@@ -126,7 +126,7 @@ def build(mutation: Mutation, whole: Path, tree: Path) -> Path:
     (core,) = (tree / "python").rglob("_core*.so")
     (spirv,) = (tree / "build").rglob("spirv.o")
     objects = sorted((tree / "build").rglob("*.o"))
-    succeed(tree, *compiler(), "-fPIC", "-c", "build/spirv/spirv.c", "-o", spirv)
+    succeed(tree, *compiler(), "-fPIC", "-Icsrc", "-c", "build/spirv/spirv.c", "-o", spirv)
     succeed(tree, *compiler(), "-shared", *objects, "-o", core, "-lm", "-ldl")
     return tree / "python"
 

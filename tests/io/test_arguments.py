@@ -56,8 +56,6 @@ CALLS: dict[str, Callable[[vkbloom.Renderer], object]] = {
         vkbloom.Scene.ufo(), [vkbloom.Pyramid(levels=2)], (64, 48), attachments=("nonsense",)
     ),
     "attachments type": lambda one: one.apply_many(IMAGE, settings(), attachments=(3,)),  # type: ignore[arg-type]
-    "settings: 'x'": lambda one: one.apply_many(IMAGE, [vkbloom.Pyramid(), "x"]),  # type: ignore[list-item]
-    "settings: 3": lambda one: one.render_many(vkbloom.Scene.ufo(), [3]),  # type: ignore[list-item]
     "psf: 'spencer'": lambda _: vkbloom.Convolution(psf="spencer"),
     "psf: complex": lambda _: vkbloom.Convolution(psf=np.ones((3, 3), complex)),
     "psf: an array": lambda _: vkbloom.Convolution(psf=[[1, 2], [3]]),

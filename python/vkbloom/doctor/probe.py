@@ -17,7 +17,6 @@ from vkbloom import _core
 from vkbloom.adapter import bundled_driver
 from vkbloom.doctor import trial
 from vkbloom.doctor.child import ANSWER_MARK
-from vkbloom.free_memory import check_for_driver
 
 # The names that the core tries, in its order.
 _LOADER_NAMES: Final = {
@@ -104,7 +103,6 @@ def loader() -> dict[str, Any]:
 
 def adapters() -> dict[str, Any]:
     """Return the adapters of the system's loader and of the bundled driver."""
-    check_for_driver()
     found: list[dict[str, Any]] = []
     reasons: list[str] = []
     for driver in dict.fromkeys(("", bundled_driver())):
