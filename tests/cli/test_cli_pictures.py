@@ -130,7 +130,7 @@ def test_pipes(tmp_path: Path) -> None:
             check=True,
         )
         (tmp_path / f"piped.{kind}").write_bytes(done.stdout)
-        assert run(path, tmp_path / f"b.{kind}").exit_code == 0
+        assert run(path, tmp_path / f"b.{kind}", "--preset", "photo").exit_code == 0
         piped = vkbloom.read(tmp_path / f"piped.{kind}")
         assert np.array_equal(piped, vkbloom.read(tmp_path / f"b.{kind}"))
 

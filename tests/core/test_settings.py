@@ -33,6 +33,7 @@ DEFAULTS = {
     "tonemap": "none",
     "exposure": 0.0,
     "encoding": "none",
+    "reference_white": 203.0,
     "dither": False,
     "dither_seed": 0,
     "bloom_size": None,

@@ -23,6 +23,9 @@ def modules() -> Iterator[list[tuple[int, ...]]]:
     data = Path(_core.__file__).read_bytes()
     words = np.frombuffer(data[: len(data) // 4 * 4], np.uint32)
     for start in np.flatnonzero(words == MAGIC):
+        # The core also compares with this number.
+        if words[start + 1] & 0xFFFF00FF != 0x00010000:
+            continue
         position = int(start) + HEADER_WORDS
         instructions: list[tuple[int, ...]] = []
         # A module ends with its last function.
