@@ -202,10 +202,10 @@ static bool build_graph(const struct job *job, const struct vkb_settings *settin
         .glow_intensity = 1.0,
         .has_glow = true,
     };
-    const bool built = job->source == SOURCE_IMAGE
-                         ? vkb_build_image(settings, &image, graph, error)
-                         : vkb_build_scene(job->source == SOURCE_FORWARD ? "forward" : "deferred",
-                                           settings, &scene, graph, error);
+    const bool built = job->source == SOURCE_IMAGE ? vkb_build_image(settings, &image, graph, error)
+                     : job->source == SOURCE_FORWARD
+                         ? vkb_build_forward(settings, &scene, graph, error)
+                         : vkb_build_deferred(settings, &scene, graph, error);
 
     return built
         && vkb_variants_choose(job->renderer->variants, &job->renderer->device, graph, error)
