@@ -73,7 +73,8 @@ def apply_file(
     The file is read, rendered and written in bands of rows. So it may be larger than the memory,
     and larger than an image of the device. The result is that of `Renderer.apply` for the complete
     image, bit by bit on a CPU. Where the bloom reaches too far for bands, the device holds the
-    complete image. Its alpha is as stored, also with ``alpha="max"`` and "blur".
+    complete image. With ``alpha`` "max" and "blur", straight colours are multiplied by alpha first,
+    and divided by it afterwards.
 
     Parameters
     ----------
