@@ -301,10 +301,8 @@ def _shape_cure(shape: tuple[int, ...]) -> str:
 
 def check_attachments(attachments: str | Sequence[str]) -> tuple[str, ...] | None:
     """Return the names of the requested framebuffers; None for all."""
-    if attachments == "all":
-        return None
     if isinstance(attachments, str):
-        return (attachments,)
+        return None if attachments == "all" else (attachments,)
     try:
         names = tuple(attachments)
     except TypeError:

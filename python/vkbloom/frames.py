@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import dimensions
 
@@ -190,6 +191,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         )
         return dataset
 
+    @checked
     def save(self, path: str | os.PathLike[str]) -> list[Path]:
         """Write the framebuffers to image files without loss.
 
@@ -256,6 +258,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         return files.save(self, path)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read framebuffers from files that `save` wrote.
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import no_bloom
+from vkbloom.argument_types import checked
 from vkbloom.banded import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
@@ -50,6 +51,7 @@ def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
         return False
 
 
+@checked
 def apply_file(
     source: str | os.PathLike[str],
     target: str | os.PathLike[str],

@@ -14,6 +14,7 @@ import numpy as np
 
 from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.frames import Frames
 from vkbloom.image import Image
@@ -115,7 +116,9 @@ def _paired(
             one = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Work(image_source(image), one._in_sequence(count, state))
+        work = requests.Work(
+            image_source(image, name=f"images[{count}]"), one._in_sequence(count, state)
+        )
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield work
@@ -193,9 +196,8 @@ class Renderer:
     True
     """
 
+    @checked
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
-        if not isinstance(adapter, str):
-            raise TypeError(f"adapter: {adapter!r} is not a name")
         if not adapter:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
@@ -251,6 +253,7 @@ class Renderer:
         self._planned = self._kept = None
         self._core.close()
 
+    @checked
     def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:
         """Capture the work of the device inside the context as one frame of RenderDoc.
 
@@ -318,6 +321,7 @@ class Renderer:
 
         return display.renderer_html(self.info, closed=self.closed)
 
+    @checked
     def render(
         self,
         scene: Scene,
@@ -401,6 +405,7 @@ class Renderer:
         source = scene_source(scene, size, shading, time)
         return self._run_one(source, settings, check_attachments(attachments), out)
 
+    @checked
     def apply(
         self,
         image: NDArray[Any] | Image,
@@ -489,6 +494,7 @@ class Renderer:
         source = image_source(image, mask, emission)
         return self._run_one(source, settings, check_attachments(attachments), out)
 
+    @checked
     def apply_many(
         self,
         image: NDArray[Any] | Image,
@@ -534,6 +540,7 @@ class Renderer:
         """
         return self._run_many(image_source(image), settings_seq, check_attachments(attachments))
 
+    @checked
     def apply_each(
         self,
         images: Iterable[NDArray[Any] | Image],
@@ -599,7 +606,9 @@ class Renderer:
                 raise TypeError(
                     f"settings: {settings!r} is not a Settings or a sequence of Settings"
                 )
-            settings = [check_settings(one) for one in settings]
+            settings = [
+                check_settings(one, f"settings[{place}]") for place, one in enumerate(settings)
+            ]
             if isinstance(images, abc.Sized) and len(images) != len(settings):
                 raise ValueError(
                     f"settings: {len(settings)} Settings do not match the {len(images)} images"
@@ -611,6 +620,7 @@ class Renderer:
         results = requests.run(work, self._core, names, alone=True)
         return (self._frames_of(one, result) for one, result in results)
 
+    @checked
     def upload(
         self,
         image: NDArray[Any],
@@ -670,6 +680,7 @@ class Renderer:
             emission=emission is not None,
         )
 
+    @checked
     def render_many(
         self,
         scene: Scene,
@@ -716,6 +727,7 @@ class Renderer:
         names = check_attachments(attachments)
         return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
 
+    @checked
     def plan(
         self,
         source: Scene | NDArray[Any] | Image,
@@ -783,12 +795,12 @@ class Renderer:
             for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
                 if is_given:
                     raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            kind, (shape, dtype) = "image", image_kind(source)
+            kind, (shape, dtype) = "image", image_kind(source, "source")
             height, width, channels = shape
             planned = image_source(source)
         else:
             width, height = check_size("size", _SCENE_SIZE if size is None else size)
-            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0)
+            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0, "source")
         plan = self._core.plan(planned, settings, names)
         outputs = framebuffers(plan)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
@@ -805,6 +817,7 @@ class Renderer:
             passes,
         )
 
+    @checked
     def grid(
         self,
         source: Scene
@@ -966,7 +979,11 @@ class Renderer:
             if names:
                 self._check_names(source, settings_seq, names)
         return self._run_work(
-            (requests.Work(source, check_settings(one)) for one in settings_seq), names
+            (
+                requests.Work(source, check_settings(one, f"settings_seq[{place}]"))
+                for place, one in enumerate(settings_seq)
+            ),
+            names,
         )
 
     def _check_names(

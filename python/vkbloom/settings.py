@@ -253,11 +253,11 @@ def check_shading(shading: str) -> Shading:
     return shading
 
 
-def check_settings(settings: Settings | None) -> Settings:
+def check_settings(settings: Settings | None, name: str = "settings") -> Settings:
     """Return the settings, `Separable()` for None; raise TypeError for anything else."""
     if settings is None:
         default: Settings = METHODS["separable"]()
         return default
     if not isinstance(settings, Settings):
-        raise TypeError(f"settings: {settings!r} is not a Settings")
+        raise TypeError(f"{name}: {settings!r} is not a Settings")
     return settings

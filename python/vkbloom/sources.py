@@ -21,17 +21,23 @@ __all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_s
 
 
 def image_source(
-    image: object, mask: object | None = None, emission: object | None = None
+    image: object,
+    mask: object | None = None,
+    emission: object | None = None,
+    name: str = "image",
 ) -> _core.Source:
-    """Return the core's Source of an image. Its arrays must not change while it is used."""
+    """Return the core's Source of an image. Its arrays must not change while it is used.
+
+    Errors of the image start with `name`.
+    """
     if isinstance(image, Image):
-        for name, given in (("mask", mask), ("emission", emission)):
+        for what, given in (("mask", mask), ("emission", emission)):
             if given is not None:
                 raise ValueError(
-                    f"{name}: the image was uploaded already; upload it together with its {name}"
+                    f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
         return image._source
-    checked = check_image(image)
+    checked = check_image(image, name)
     height, width, _ = checked.shape
     return _core.image_source(
         checked,
@@ -47,22 +53,22 @@ def is_image(source: object) -> bool:
     )
 
 
-def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
+def image_kind(image: object, name: str = "image") -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Return shape and dtype of an image, which may be on the device."""
-    checked = image if isinstance(image, Image) else check_image(image)
+    checked = image if isinstance(image, Image) else check_image(image, name)
     return checked.shape, checked.dtype
 
 
 def scene_source(
-    scene: Scene, size: tuple[int, int], shading: Shading, time: float
+    scene: Scene, size: tuple[int, int], shading: Shading, time: float, name: str = "scene"
 ) -> _core.Source:
-    """Return the core's Source of a scene's frame."""
+    """Return the core's Source of a scene's frame. Errors of the scene start with `name`."""
     check_shading(shading)
     turns = check_time(time)
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if not isinstance(scene, Scene):
-        raise TypeError(f"scene: a Scene is needed, not {type(scene).__name__}")
+        raise TypeError(f"{name}: a Scene is needed, not {type(scene).__name__}")
     return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_image, check_index, import_extra
 from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
@@ -58,6 +59,7 @@ def fit(
     max_calls: int = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
+@checked
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],

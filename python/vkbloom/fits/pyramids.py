@@ -9,6 +9,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_index, check_size, import_extra
 from vkbloom.fits.losses import Measure, light
 from vkbloom.fits.result import FitResult
@@ -18,11 +19,12 @@ from vkbloom.renderer import Renderer
 
 __all__ = ["fit_pyramid"]
 
-_Loss = Literal["relative", "log"]
+PyramidLoss = Literal["relative", "log"]
 # Rows of the matrix are not weighted by more than 1 over this share of the peak.
 _DARK: Final = 1e-4
 
 
+@checked
 def fit_pyramid(
     psf: PSF,
     levels: int = 8,
@@ -31,7 +33,7 @@ def fit_pyramid(
     pixels_per_degree: float | None = None,
     radius: float = 1.0,
     direct: bool = False,
-    loss: _Loss = "relative",
+    loss: PyramidLoss = "relative",
     renderer: Renderer | None = None,
 ) -> FitResult:
     """Find the level weights of a pyramid whose point spread is closest to a given one.
@@ -97,8 +99,8 @@ def fit_pyramid(
     if not isinstance(psf, PSF):
         raise TypeError(f"psf: {psf!r} is not a PSF")
     check_index("levels", levels, 1, 16)
-    if loss not in get_args(_Loss):
-        raise ValueError(f"loss: {loss!r} is not one of {', '.join(get_args(_Loss))}")
+    if loss not in get_args(PyramidLoss):
+        raise ValueError(f"loss: {loss!r} is not one of {', '.join(get_args(PyramidLoss))}")
     width, height = check_size("size", size)
     began = time.perf_counter()
     wanted = psf.array((width, height), pixels_per_degree).mean(axis=2, keepdims=True)
@@ -146,7 +148,7 @@ def fit_pyramid(
 
 
 def _nonnegative(
-    columns: NDArray[np.float64], wanted: NDArray[np.float64], loss: _Loss
+    columns: NDArray[np.float64], wanted: NDArray[np.float64], loss: PyramidLoss
 ) -> NDArray[np.float64]:
     """Return the non-negative weights of columns whose sum is closest."""
     nnls = import_extra("scipy.optimize", "fit", "Fitting a pyramid").nnls

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_size
 from vkbloom.fits.fitting import fit
 from vkbloom.fits.losses import Loss
@@ -45,6 +46,7 @@ _SIDE: Final = 1 / 30
 _LEAST_SIDE: Final = 3
 
 
+@checked
 def translate(
     settings: Settings,
     to: Settings | type[Settings],

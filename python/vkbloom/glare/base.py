@@ -112,7 +112,10 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
         raise TypeError(f"glare: {glare!r} is not a sequence of stages")
     found = []
     for one in glare:
-        stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
+        try:
+            stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"glare: {error}") from None
         if not isinstance(stage, Glare):
             raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
         found.append(stage)

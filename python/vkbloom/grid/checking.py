@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vkbloom.argument_types import checked
 from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import DONE, Chunks
 from vkbloom.grid.identity import fingerprint
@@ -65,6 +66,7 @@ class GridReport:
         return "\n".join([f"{self.done} of {self.points} points are done", *self.problems])
 
 
+@checked
 def check_grid(store: Any) -> GridReport:
     """Check a grid's store for missing and damaged data, without changing it.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import import_extra
 from vkbloom.grid import views
 
@@ -19,6 +20,7 @@ __all__ = ["response_curves"]
 _WIDTH, _HEIGHT = 6.4, 3.2  # inches of one diagram
 
 
+@checked
 def response_curves(
     dataset: xarray.Dataset,
     axis: str | None = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_index
 from vkbloom.framebuffers import leading
 from vkbloom.grid import views
@@ -24,6 +25,7 @@ _CELL: Final = 40
 _LETTER_WIDTH: Final = 0.6
 
 
+@checked
 def contact_sheet(
     dataset: xarray.Dataset,
     rows: str | None = None,

@@ -302,7 +302,7 @@ def _image_source(
 
 
 def _checked(image: object) -> NDArray[Any] | Image:
-    return image if isinstance(image, Image) else check_image(image)
+    return image if isinstance(image, Image) else check_image(image, "source")
 
 
 def digest(value: object) -> str:

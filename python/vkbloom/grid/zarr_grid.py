@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import import_extra
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import chunk_in
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["check_chunks", "grid_to_zarr"]
 
 
+@checked
 def grid_to_zarr(
     source: Scene | NDArray[Any] | Sequence[NDArray[Any]] | Mapping[str, NDArray[Any]],
     settings: Settings | None,

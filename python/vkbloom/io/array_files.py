@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.expansion import check_expansion
@@ -54,6 +55,7 @@ def read(
     expand: float | None = ...,
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
+@checked
 def read(
     path: str | os.PathLike[str],
     *,
@@ -160,6 +162,7 @@ def read(
     return pixels, facts
 
 
+@checked
 def write(
     path: str | os.PathLike[str],
     array: NDArray[Any],
@@ -233,8 +236,6 @@ def write(
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(check_name(path))
-    if metadata is not None and not isinstance(metadata, Mapping):
-        raise TypeError(f"metadata: {metadata!r} is not a mapping of names to values")
     values = _checked(array)
     is_float = values.dtype.kind == "f"
     if encoding is not None and (encoding not in _ENCODINGS or not is_float):

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 from vkbloom import _core
+from vkbloom.argument_types import checked
 from vkbloom.checks import as_float, check_floats
 from vkbloom.fields import choice_field, flag_field, number_field, value_field
 from vkbloom.settings import Settings
@@ -110,6 +111,7 @@ class Separable(Settings):
     direct: bool = flag_field("direct")
 
 
+@checked
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
     """Make a normalized Gaussian half-kernel.
 

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final, Literal, Self
 
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.fields import number_field, value_field
 from vkbloom.own.file import OwnFile, read_file
 from vkbloom.own.params import Param
@@ -146,6 +147,7 @@ def reduced(kind: OwnType) -> Any:
 copyreg.pickle(OwnType, reduced)
 
 
+@checked
 def load_method(
     source: str | Path, *, name: str | None = None, reference: Twin | None = None
 ) -> type[Settings]:

@@ -148,7 +148,7 @@ def _check_mask(mask: Any) -> iris | ArrayValue:
         return mask
     if isinstance(mask, dict) and "blades" in mask:
         return iris(**mask)
-    held = ArrayValue(mask)
+    held = ArrayValue(mask, "mask")
     array = held.array
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
         raise ValueError(f"mask: shape {array.shape} is not (n, n)")

@@ -251,7 +251,7 @@ def check_radii(name: str, values: ArrayLike) -> Array:
         if np.iscomplexobj(values):
             raise TypeError
         numbers = np.asarray(values, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
     if numbers.ndim != 1 or not (numbers >= 0).all():
         raise ValueError(f"{name}: {values!r} is not a sequence of numbers of at least 0")

@@ -19,7 +19,10 @@ __all__ = ["measured"]
 
 def _read_settings(settings: Any) -> Settings:
     if isinstance(settings, Mapping):
-        settings = Settings.from_dict(settings)
+        try:
+            settings = Settings.from_dict(settings)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"settings: {error}") from None
     if not isinstance(settings, Settings):
         raise TypeError(f"settings: {settings!r} is not a Settings")
     if settings.threshold is not None:

@@ -93,14 +93,7 @@ def check_values(name: str, values: Any) -> ArrayValue:
         raise TypeError(
             f"{name}: an array is needed, not {values!r}; read a file first: vkbloom.read(...)"
         )
-    try:
-        is_complex = np.iscomplexobj(values)
-        held = None if is_complex else ArrayValue(values)
-    except (TypeError, ValueError) as error:
-        kind = type(values).__name__
-        raise type(error)(f"{name}: an array is needed, not {kind}; NumPy: {error}") from error
-    if held is None:
-        raise TypeError(f"{name}: complex numbers are not energies; pass its real part")
+    held = ArrayValue(values, name)
     array = held.array
     if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,)) or 0 in array.shape:
         raise ValueError(

@@ -21,12 +21,19 @@ class ArrayValue:
 
     __slots__ = ("_hash", "array")
 
-    def __init__(self, array: Any) -> None:
-        if isinstance(array, Mapping):
-            array = _from_plain(array)
-        elif isinstance(array, ArrayValue):
-            array = array.array
-        values = np.array(array, np.float32, order="C")
+    def __init__(self, array: Any, name: str = "array") -> None:
+        try:
+            plain = _from_plain(array) if isinstance(array, Mapping) else array
+            given = np.asarray(plain)
+            # An array of Python objects raises for complex numbers by itself.
+            is_complex = given.dtype.kind == "c"
+            values = np.array(given.real, np.float32, order="C")
+        except (TypeError, ValueError, OverflowError) as error:
+            kind = ValueError if isinstance(error, OverflowError) else type(error)
+            what = type(array).__name__
+            raise kind(f"{name}: an array is needed, not {what}; NumPy: {error}") from error
+        if is_complex:
+            raise TypeError(f"{name}: complex numbers are not energies; pass its real part")
         values.flags.writeable = False
         self.array: NDArray[np.float32] = values
         self._hash = hash((values.shape, zlib.crc32(values.tobytes())))

@@ -8,6 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vkbloom.argument_types import checked
+
 from .image import as_float, format_of, storage
 from .sampling import Array
 from .tone_map import ENCODINGS, TONE_MAPS
@@ -48,6 +50,7 @@ def check_settings(settings: object) -> None:
         raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
 
 
+@checked
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,

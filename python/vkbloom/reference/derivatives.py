@@ -8,9 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.fields import fields_of
 
-from .framebuffers import checked, framebuffers
+from .framebuffers import checked_image, framebuffers
 from .sampling import Array
 from .tape import Traced, gradients, value_of
 
@@ -20,6 +21,7 @@ __all__ = ["DISCRETE", "differentiable", "vjp"]
 DISCRETE: Final = frozenset({"anamorphism", "bloom_scale", "pixels_per_degree", "size"})
 
 
+@checked
 def vjp(
     image: NDArray[Any],
     settings: Any,
@@ -84,7 +86,7 @@ def vjp(
     >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
     np.float64(1.5)
     """
-    scene, source, weights, _ = checked(image, settings, mask, emission)
+    scene, source, weights, _ = checked_image(image, settings, mask, emission)
     inputs: dict[str, Traced] = {"image": Traced(scene)}
     if emission is not None:
         inputs["emission"] = Traced(source)

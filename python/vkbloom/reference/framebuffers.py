@@ -8,11 +8,12 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.registry import METHODS, Reference
 
 from . import glare, own
 from .compositing import CompositeSettings, check_settings, composite_checked
-from .image import BlurInput, as_float, as_mask, finite, format_of, storage
+from .image import BlurInput, as_array, as_float, as_mask, finite, format_of, storage
 from .sampling import Array, sample
 from .threshold import apply_threshold, masked
 
@@ -39,6 +40,7 @@ class Settings(CompositeSettings, Protocol):
     def glare(self) -> tuple[Any, ...]: ...
 
 
+@checked
 def apply(
     image: NDArray[Any],
     settings: Settings,
@@ -111,7 +113,7 @@ def apply(
     if (twin := getattr(settings, "twin", None)) is not None:
         scene = as_float(image, "image", (3, 4))
         return own.framebuffers(twin, scene, settings, np.asarray(image).dtype)
-    scene, source, weights, format = checked(image, settings, mask, emission)
+    scene, source, weights, format = checked_image(image, settings, mask, emission)
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     return framebuffers(
         scene,
@@ -124,7 +126,7 @@ def apply(
     )
 
 
-def checked(
+def checked_image(
     image: NDArray[Any],
     settings: Settings,
     mask: NDArray[Any] | None,
@@ -185,6 +187,7 @@ def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
 
+@checked
 def passes(
     glow: NDArray[Any],
     settings: Settings,
@@ -257,6 +260,7 @@ def passes(
     return _with_alphas(framebuffers)
 
 
+@checked
 def blur(
     glow: NDArray[Any],
     settings: Settings,
@@ -294,6 +298,7 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
+@checked
 def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
@@ -349,7 +354,9 @@ def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:
 def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
     """Return an emission in real units."""
     values = as_float(emission, "emission", (3, 4))
-    kinds = [(part.shape, part.dtype) for part in map(np.asarray, (image, emission))]
+    kinds = [
+        (part.shape, part.dtype) for part in (np.asarray(image), as_array(emission, "emission"))
+    ]
     if kinds[0] != kinds[1]:
         raise ValueError(
             f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"

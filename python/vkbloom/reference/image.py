@@ -29,7 +29,7 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     - `image`: ndarray, shape (H, W, C); uint8 (read as value / 255), float16, float32 or float64.
     - Returns: ndarray of float64, shape (H, W, C).
     """
-    array = np.asarray(image)
+    array = as_array(image, name)
     if array.dtype.name not in _FORMATS:
         raise TypeError(
             f"{name} must be uint8, float16, float32 or float64, not {array.dtype.name}"
@@ -43,13 +43,23 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     return real / 255 if array.dtype == np.uint8 else real
 
 
+def as_array(values: object, name: str) -> NDArray[Any]:
+    """Return an array view, or raise an error that names the argument."""
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name} must be an array; NumPy: {error}") from None
+
+
 def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     """Return a mask as values of 0 to 1.
 
     - `mask`: ndarray, shape (H, W); uint8 (read as value / 255), bool, or floats.
     - Returns: ndarray of float64, shape (H, W, 1).
     """
-    array = np.asarray(mask)
+    array = as_array(mask, "mask")
+    if array.dtype.kind not in "buf":
+        raise TypeError(f"mask must be of numbers, not {array.dtype}")
     if array.shape != size[::-1]:
         raise ValueError(f"mask must have the image's shape {size[::-1]}, not {array.shape}")
     values = array.astype(np.float64) / (255 if array.dtype == np.uint8 else 1)
@@ -65,7 +75,12 @@ def finite(image: Array) -> Array:
 
 def format_of(image: NDArray[Any], format: str | None) -> str:
     """Return the format of the bloom buffers: `format`, or by default that of the image's dtype."""
-    return _FORMATS[np.asarray(image).dtype.name] if format is None else format
+    if format is not None:
+        return format
+    dtype = np.asarray(image).dtype
+    if dtype.name not in _FORMATS:
+        raise TypeError(f"dtype: {dtype} is not one of {', '.join(_FORMATS)}")
+    return _FORMATS[dtype.name]
 
 
 @dataclasses.dataclass(frozen=True)

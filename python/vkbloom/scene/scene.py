@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from vkbloom.argument_types import checked
 from vkbloom.scene import skybox as sky
 from vkbloom.scene.mesh import Mesh
 from vkbloom.scene.skybox import Cubemap, SkyboxSource
@@ -209,6 +210,7 @@ class Scene:
             return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
+    @checked
     def from_gltf(
         cls,
         base: str | os.PathLike[str],

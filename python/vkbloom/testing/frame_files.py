@@ -7,11 +7,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.io import image_reading
 
 __all__ = ["read_frame"]
 
 
+@checked
 def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Read an image file with its stored values.
 

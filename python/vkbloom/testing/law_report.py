@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from vkbloom.argument_types import checked
 from vkbloom.testing import laws, point_spread
 from vkbloom.testing.deviations import measuring
 from vkbloom.testing.probe import Bloom, Probe
@@ -191,6 +192,7 @@ class LawReport:
         )
 
 
+@checked
 def report(
     bloom: Bloom, *, size: tuple[int, int] = (256, 256), probe: Probe | None = None
 ) -> LawReport:

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_number
 from vkbloom.testing.deviations import compare_with_law
 from vkbloom.testing.probe import Bloom, Image, Probe
@@ -29,6 +30,7 @@ __all__ = [
 _DEFAULT = Probe()
 
 
+@checked
 def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
 
@@ -83,6 +85,7 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     )
 
 
+@checked
 def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
@@ -150,6 +153,7 @@ def assert_additive(
     )
 
 
+@checked
 def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
     """Assert the gain of flat images.
 
@@ -201,6 +205,7 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         )
 
 
+@checked
 def assert_symmetric(
     bloom: Bloom,
     probe: Probe = _DEFAULT,
@@ -255,6 +260,7 @@ def assert_symmetric(
         )
 
 
+@checked
 def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
     """Assert that the bloom of an edge has no dark or bright line beside the edge.
 
@@ -320,6 +326,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
         )
 
 
+@checked
 def assert_bounded_fireflies(
     bloom: Bloom,
     limit: float = 1.0,

@@ -11,15 +11,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_index, check_number
 from vkbloom.testing.deviations import fail
 from vkbloom.testing.point_spread import border_share, check_inside
 from vkbloom.testing.probe import Bloom, Image, Probe
 
-__all__ = ["Sequence", "Stability", "area_sampled", "assert_stable", "stability"]
+__all__ = ["MovingBloom", "Stability", "area_sampled", "assert_stable", "stability"]
 
 #: A temporal bloom: takes the images of a sequence, in their order, and returns their blooms.
-Sequence = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
+MovingBloom = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
 
 PATHS: Final = ("x", "y", "xy")
 # Side of the light in pixels.
@@ -110,8 +111,9 @@ class Stability:
         return dataclasses.replace(self, **arrays)
 
 
+@checked
 def stability(
-    bloom: Bloom | Sequence,
+    bloom: Bloom | MovingBloom,
     *,
     texel: int = 8,
     steps: float = 8,
@@ -207,8 +209,9 @@ def stability(
     )
 
 
+@checked
 def assert_stable(
-    bloom: Bloom | Sequence,
+    bloom: Bloom | MovingBloom,
     *,
     ripple: float = 0.02,
     jitter: float = 0.1,

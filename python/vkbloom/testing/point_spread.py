@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_number
 from vkbloom.testing.deviations import compare_with_law, fail, is_within
 from vkbloom.testing.probe import Bloom, Image, Probe
@@ -32,6 +33,7 @@ _DEFAULT = Probe()
 _AT_THE_BORDER: Final = 1e-3
 
 
+@checked
 def point_spread(
     bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
@@ -80,6 +82,7 @@ def point_spread(
     return _measured(bloom, probe, at)[0]
 
 
+@checked
 def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
 
@@ -135,6 +138,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     )
 
 
+@checked
 def assert_centroid_kept(
     bloom: Bloom,
     probe: Probe = _DEFAULT,
@@ -200,6 +204,7 @@ def assert_centroid_kept(
                 )
 
 
+@checked
 def assert_spread(
     bloom: Bloom,
     sigma: float | tuple[float, float],
@@ -342,6 +347,7 @@ class Response:
         )
 
 
+@checked
 def response(
     bloom: Callable[..., NDArray[Any]],
     parameter: str,

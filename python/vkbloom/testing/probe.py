@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import check_number, check_size
+from vkbloom.checks import check_index, check_number, check_size
 
 __all__ = ["Bloom", "Image", "Probe"]
 
@@ -85,9 +85,12 @@ class Probe:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", check_size("size", self.size))
-        if self.channels not in (None, 1, 2, 3, 4):
-            raise ValueError(f"channels: {self.channels!r} is out of range, 1 to 4 or None")
-        dtype = np.dtype(self.dtype)
+        if self.channels is not None:
+            check_index("channels", self.channels, 1, 4)
+        try:
+            dtype = np.dtype(self.dtype)
+        except TypeError:
+            raise TypeError(f"dtype: {self.dtype!r} is not a dtype") from None
         if dtype.name not in _ERRORS:
             raise ValueError(f"dtype: {dtype} is not one of {', '.join(_ERRORS)}")
         object.__setattr__(self, "dtype", dtype)

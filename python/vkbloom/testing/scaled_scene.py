@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_number
 from vkbloom.testing.deviations import fail
 from vkbloom.testing.moving_light import area_sampled
@@ -68,6 +69,7 @@ class ResolutionResponse:
         return "\n".join("  ".join(cell.rjust(11) for cell in row) for row in rows)
 
 
+@checked
 def resolution_response(
     bloom: Bloom,
     scales: Sequence[float] = _SCALES,
@@ -135,6 +137,7 @@ def resolution_response(
     return ResolutionResponse(sizes=sizes, r50=r50, r90=r90, peak=peak)
 
 
+@checked
 def assert_resolution_independent(
     bloom: Bloom,
     scales: Sequence[float] = _SCALES,

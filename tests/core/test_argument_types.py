@@ -1,0 +1,216 @@
+"""Arguments of a wrong type raise TypeError or ValueError that names the argument."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vkbloom
+from vkbloom import psf, reference, testing
+
+#: Random values by their type.
+VALUES = {
+    "none": st.none(),
+    "bool": st.booleans(),
+    "int": st.integers(),
+    "float": st.floats(),
+    "complex": st.complex_numbers(allow_nan=False),
+    "str": st.text(max_size=8),
+    "bytes": st.binary(max_size=8),
+    "list": st.lists(st.just(object()), min_size=1, max_size=3),
+    "dict": st.dictionaries(st.integers(), st.none(), min_size=1, max_size=3),
+    "set": st.frozensets(st.integers(), min_size=1, max_size=3),
+    "object": st.builds(object),
+    "function": st.just(lambda: None),
+    "class": st.sampled_from((int, dict, object)),
+    "array": st.builds(np.zeros, st.tuples(st.integers(1, 3), st.integers(1, 3)), st.just(complex)),
+}
+#: The types that a part of an annotation accepts, of those above. Classes accept none of them.
+NUMBERS = {"bool", "int", "float"}
+ACCEPTED = {
+    "None": {"none"},
+    "bool": {"bool"},
+    "int": {"bool", "int"},
+    "float": NUMBERS,
+    "str": {"str"},
+    "Callable": {"function", "class"},
+    "Bloom": {"function", "class"},
+    "MovingBloom": {"function", "class"},
+    "Loss": {"str", "function", "class"},
+    "Any": set(VALUES),
+    "DTypeLike": {"none", "str", "class", "list", "dict"},
+}
+TEXTS = (
+    r"Literal|Shading|\w*Colour|\w*Encoding|PyramidLoss|Composite|Alpha|ToneMap|\w*Mode|\w*Format"
+)
+CONTAINERS = r"Sequence|Iterable|Mapping|tuple|NDArray|type|Bounds|os\.PathLike|Path|Twin|ArrayLike"
+CLASSES = r"Settings|Renderer|Scene|Camera|Image|PSF|PSFLike|Probe|(xarray\.)?Dataset"
+
+IMAGE = np.zeros((8, 8, 3), np.float32)
+SEPARABLE = vkbloom.Separable()
+GAUSSIAN = psf.gaussian(1.0)
+
+
+def blurred(image):
+    return image
+
+
+#: Valid arguments of the public functions that need some.
+NEEDED = {
+    "array": IMAGE,
+    "image": IMAGE,
+    "images": [IMAGE],
+    "source": IMAGE,
+    "target": IMAGE,
+    "glow": IMAGE,
+    "scene": IMAGE,
+    "a": IMAGE,
+    "b": IMAGE,
+    "settings": SEPARABLE,
+    "settings_seq": [SEPARABLE],
+    "to": SEPARABLE,
+    "vary": ["intensity"],
+    "psf": GAUSSIAN,
+    "bloom": blurred,
+    "path": "a.png",
+    "base": "a.gltf",
+    "store": "a.zarr",
+    "size": (8, 8),
+    "axes": {"intensity": [1.0]},
+    "sigma": 1.0,
+    "gain": 1.0,
+    "parameter": "intensity",
+    "values": [1.0],
+    "radii": [1.0],
+    "frequencies": [0.1],
+    "mask": np.ones((8, 8)),
+    "dataset": xarray.Dataset(
+        {"final": (("intensity", "y", "x", "channel"), np.zeros((1, 8, 8, 3)))},
+        {"intensity": [1.0]},
+        {"axes": ["intensity"]},
+    ),
+}
+OTHERS = {
+    "apply_file": {"source": "a.exr", "target": "b.exr"},
+    "load_method": {"source": "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(1); }\n"},
+    "unreal": {"image": np.ones((3, 3))},
+    "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),
+    "response": {"bloom": lambda image, intensity: image},
+    "render_many": {"scene": vkbloom.Scene.ufo()},
+    "samples": {"values": np.ones((3, 3))},
+}
+FUNCTIONS = (
+    vkbloom.apply_file,
+    vkbloom.check_grid,
+    vkbloom.contact_sheet,
+    vkbloom.fit,
+    vkbloom.fit_pyramid,
+    vkbloom.gaussian_weights,
+    vkbloom.grid_to_zarr,
+    vkbloom.load_method,
+    vkbloom.read,
+    vkbloom.response_curves,
+    vkbloom.translate,
+    vkbloom.write,
+    vkbloom.Camera,
+    vkbloom.Renderer,
+    vkbloom.Scene.from_gltf,
+    GAUSSIAN.array,
+    GAUSSIAN.encircled_energy,
+    GAUSSIAN.mtf,
+    GAUSSIAN.save,
+    *(getattr(reference, name) for name in reference.__all__),
+    *(getattr(psf, name) for name in psf.__all__ if name != "PSF"),
+    *(
+        getattr(testing, name)
+        for name in testing.__all__
+        if name.islower() or name in ("Probe", "Tolerances")
+    ),
+    *(
+        getattr(vkbloom, name)
+        for name in vkbloom.__all__
+        if inspect.isclass(getattr(vkbloom, name))
+        and issubclass(getattr(vkbloom, name), vkbloom.Settings | vkbloom.Glare)
+        and name not in ("Settings", "Glare", "GlareLight")
+    ),
+)
+METHODS = ("apply", "apply_each", "apply_many", "capture", "grid", "plan", "render_many", "upload")
+
+
+def accepted(annotation):
+    """Return the types of values that an annotation accepts; None for one that is unknown."""
+    found = set()
+    for part in re.split(r"\s*\|\s*(?![^\[]*\])", annotation.strip("\"'")):
+        name = part.partition("[")[0]
+        if re.fullmatch(TEXTS, name):
+            found.add("str")
+        elif re.fullmatch(CONTAINERS, name):
+            found |= {"class"} if name == "type" else {"function"} if name == "Twin" else set()
+        elif name in ACCEPTED:
+            found |= ACCEPTED[name]
+        elif not re.fullmatch(CLASSES, name):
+            return None
+    return found
+
+
+def wrong_arguments(function):
+    """Return pairs of a parameter and a strategy of values of a wrong type."""
+    found = []
+    for name, parameter in inspect.signature(function).parameters.items():
+        types = accepted(str(parameter.annotation))
+        if types is not None and (wrong := set(VALUES) - types):
+            found.append((name, st.one_of([VALUES[one] for one in sorted(wrong)])))
+    return found
+
+
+def check(function, arguments, name, value):
+    """Call a function with one argument of a wrong type, which it may accept."""
+    try:
+        function(**arguments | {name: value})
+    except (TypeError, ValueError) as error:
+        assert re.search(rf"\b{name}\b", str(error)), f"{name}: {value!r}"
+
+
+def needed(function):
+    """Return valid values of the parameters without a default."""
+    parameters = inspect.signature(function).parameters.items()
+    values = NEEDED | OTHERS.get(function.__name__, {})
+    return {
+        name: values[name] for name, parameter in parameters if parameter.default is parameter.empty
+    }
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda one: f"{one.__module__}.{one.__name__}")
+def test_a_wrong_type_is_an_error_that_names_the_argument(function):
+    wrong = wrong_arguments(function)
+    if not wrong:
+        pytest.skip("the function's parameters accept every type")
+
+    @settings(max_examples=200, deadline=None)
+    @given(st.sampled_from(wrong).flatmap(lambda one: st.tuples(st.just(one[0]), one[1])))
+    def run(argument):
+        check(function, needed(function), *argument)
+
+    run()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_wrong_type_is_an_error_of_the_renderers_methods(renderer, method):
+    function = getattr(renderer, method)
+
+    @settings(max_examples=200, deadline=None)
+    @given(
+        st.sampled_from(wrong_arguments(function)).flatmap(
+            lambda one: st.tuples(st.just(one[0]), one[1])
+        )
+    )
+    def run(argument):
+        check(function, needed(function), *argument)
+
+    run()
