@@ -38,6 +38,12 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
 // Published methods store only their levels in R11G11B10.
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
 
+// Adds the first image of the bloom, the framebuffer "glow"; for Blender's glare, whose glow are its
+// highlights, an image "frame" that is none.
+bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
+                   enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
+                   struct vkb_error *error);
+
 // The values of SAMPLING_ROWS for a pass that writes `target`.
 struct vkb_sampling {
     int width, height;
