@@ -207,9 +207,10 @@ def test_a_worker_with_another_driver_or_version_is_refused(
 ) -> None:
     """As if the grid were laid out on another machine than the workers."""
     lay_out = cluster.lay_out_there
+    changes: Any = {what: other}
 
     def laid_out_elsewhere(*arguments: Any) -> Any:
-        return replace(lay_out(*arguments), **{what: other})
+        return replace(lay_out(*arguments), **changes)
 
     monkeypatch.setattr(cluster, "lay_out_there", laid_out_elsewhere)
     own = {"adapter": "llvmpipe", "driver": "Mesa", "version": vkbloom.__version__}[what]
