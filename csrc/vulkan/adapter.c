@@ -1,7 +1,5 @@
 #include "vulkan/adapter.h"
 
-#include "vulkan/choice.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -148,88 +146,4 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
         *count += usable;
     }
     return true;
-}
-
-// The best adapter of one source: the system's loader, or a driver without it.
-struct source {
-    struct vkb_instance *instance;
-    struct vkb_adapter_info best;
-    bool found;
-};
-
-// Opens the source, and finds the best adapter that fits; adds the names of all to the text.
-static bool open_source(struct source *source, const char *choice, const char *driver,
-                        bool validation, char (*names)[VKB_CHOICE_NAMES], struct vkb_error *error)
-{
-    struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
-    uint32_t count, best;
-
-    *source = (struct source){.instance = vkb_instance_open(driver, validation, error)};
-    if (!source->instance || !vkb_adapters_list(source->instance, adapters, &count, error))
-        return false;
-    for (uint32_t i = 0; i < count; ++i)
-        vkb_choice_describe(choice, &adapters[i], *names);
-    if (!vkb_choice_best(choice, adapters, count, &best, error))
-        return false;
-    source->found = best < count;
-    if (source->found)
-        source->best = adapters[best];
-    return true;
-}
-
-static void close_source(struct source *source)
-{
-    if (source->instance)
-        vkb_instance_close(source->instance);
-    *source = (struct source){0};
-}
-
-// Whether an adapter of the bundled driver, which is a CPU, would come before that one.
-static bool is_last_resort(const struct source *source)
-{
-    return !source->found
-        || vkb_adapter_preference(&source->best)
-               >= vkb_adapter_preference(&(struct vkb_adapter_info){
-                   .device_type = VK_PHYSICAL_DEVICE_TYPE_CPU,
-               });
-}
-
-// The system's adapters, then the driver's where it could be better. No system's adapter is no
-// failure where there is a driver.
-static bool open_sources(struct source *system, struct source *bundled, const char *choice,
-                         const char *driver, bool validation, char (*names)[VKB_CHOICE_NAMES],
-                         struct vkb_error *error)
-{
-    if (!driver[0] || strcmp(choice, "software") != 0) {
-        if (!open_source(system, choice, "", validation, names, error)
-            && (!driver[0] || error->kind != VKB_ERROR_ADAPTER_NOT_FOUND))
-            return false;
-        if (!driver[0] || !is_last_resort(system))
-            return true;
-    }
-    *error = (struct vkb_error){0};
-    return open_source(bundled, choice, driver, validation, names, error);
-}
-
-bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
-                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
-                      struct vkb_error *error)
-{
-    struct source system = {0}, bundled = {0};
-    char names[VKB_CHOICE_NAMES] = "";
-    bool done = open_sources(&system, &bundled, choice, driver, validation, &names, error);
-    struct source *best = bundled.found ? &bundled : &system;
-
-    if (done && !best->found)
-        done = vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
-                        "no Vulkan adapter for \"%s\"%s; found: %s. %s", choice,
-                        vkb_choice_hint(choice), names[0] ? names : "none", vkb_install_hint);
-    if (done) {
-        *instance = best->instance;
-        *chosen = best->best;
-        best->instance = NULL;
-    }
-    close_source(&system);
-    close_source(&bundled);
-    return done;
 }

@@ -44,11 +44,4 @@ bool vkb_has_extension(const struct vkb_instance *instance, VkPhysicalDevice phy
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
                        uint32_t *count, struct vkb_error *error);
 
-// Opens the instance of the adapter that `choice` selects (choice.h). `driver` is the path of a
-// bundled driver; "" means none. The bundled software adapter takes precedence over the system's;
-// for "software" the system's drivers are then not opened. On failure no instance is left open.
-bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
-                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
-                      struct vkb_error *error);
-
 #endif

@@ -5,9 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NVIDIA = 0x10de };
+enum {
+    NVIDIA = 0x10de,
+    NAMES_SIZE = 1536,
+};
 
-int vkb_adapter_preference(const struct vkb_adapter_info *adapter)
+// The rank of an adapter for "auto"; lower is better.
+static int preference(const struct vkb_adapter_info *adapter)
 {
     switch (adapter->device_type) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
@@ -171,14 +175,29 @@ static bool has_nvidia(const struct vkb_adapter_info *adapters, uint32_t count)
     return false;
 }
 
+// Adds the adapter to a list for messages.
+static void add_name(const char *choice, const struct vkb_adapter_info *adapter,
+                     char names[NAMES_SIZE])
+{
+    const size_t length = strlen(names);
+    char uuid[VKB_UUID_TEXT_SIZE], place[VKB_UUID_TEXT_SIZE + VKB_PCI_SIZE + 16] = "";
+
+    vkb_uuid_text(adapter->uuid, uuid);
+    if (!is_cpu(adapter) || is_one_device(choice))
+        snprintf(place, sizeof place, ", uuid:%s%s%s", uuid, adapter->pci[0] ? ", pci:" : "",
+                 adapter->pci);
+    snprintf(names + length, NAMES_SIZE - length, "%s%s (%s%s%s)", length ? ", " : "",
+             adapter->name, vkb_adapter_type(adapter), adapter->bundled ? ", bundled" : "", place);
+}
+
 static bool fail_equal(const char *choice, const struct vkb_adapter_info *adapters, uint32_t count,
                        uint32_t best, struct vkb_error *error)
 {
-    char names[VKB_CHOICE_NAMES] = "", uuid[VKB_UUID_TEXT_SIZE];
+    char names[NAMES_SIZE] = "", uuid[VKB_UUID_TEXT_SIZE];
 
     for (uint32_t i = 0; i < count; ++i)
         if (fits(&adapters[i], choice) && same_name(&adapters[i], &adapters[best]))
-            vkb_choice_describe(choice, &adapters[i], names);
+            add_name(choice, &adapters[i], names);
     vkb_uuid_text(adapters[best].uuid, uuid);
     return vkb_fail(error, VKB_ERROR_VALUE,
                     "adapter: \"%s\" fits several equal GPUs: %s. Name one, such as \"uuid:%s\", "
@@ -186,8 +205,9 @@ static bool fail_equal(const char *choice, const struct vkb_adapter_info *adapte
                     choice, names, uuid);
 }
 
-bool vkb_choice_best(const char *choice, const struct vkb_adapter_info *adapters, uint32_t count,
-                     uint32_t *best, struct vkb_error *error)
+// *best: the index of the adapter; `count`: none fits. Fails if a name fits several equal GPUs.
+static bool choose(const char *choice, const struct vkb_adapter_info *adapters, uint32_t count,
+                   uint32_t *best, struct vkb_error *error)
 {
     const char *list = has_nvidia(adapters, count) ? limiting_list(choice) : NULL;
     const uint32_t named = list ? visible(adapters, count, list) : count;
@@ -199,8 +219,7 @@ bool vkb_choice_best(const char *choice, const struct vkb_adapter_info *adapters
     }
     for (uint32_t i = 0; i < count; ++i)
         if (fits(&adapters[i], choice) && !(list && adapters[i].vendor == NVIDIA)
-            && (*best == count
-                || vkb_adapter_preference(&adapters[i]) < vkb_adapter_preference(&adapters[*best])))
+            && (*best == count || preference(&adapters[i]) < preference(&adapters[*best])))
             *best = i;
     for (uint32_t i = 0; *best < count && is_name(choice) && i < count; ++i)
         // Two drivers may offer one device.
@@ -211,21 +230,91 @@ bool vkb_choice_best(const char *choice, const struct vkb_adapter_info *adapters
     return true;
 }
 
-void vkb_choice_describe(const char *choice, const struct vkb_adapter_info *adapter,
-                         char names[VKB_CHOICE_NAMES])
-{
-    const size_t length = strlen(names);
-    char uuid[VKB_UUID_TEXT_SIZE], place[VKB_UUID_TEXT_SIZE + VKB_PCI_SIZE + 16] = "";
-
-    vkb_uuid_text(adapter->uuid, uuid);
-    if (!is_cpu(adapter) || is_one_device(choice))
-        snprintf(place, sizeof place, ", uuid:%s%s%s", uuid, adapter->pci[0] ? ", pci:" : "",
-                 adapter->pci);
-    snprintf(names + length, VKB_CHOICE_NAMES - length, "%s%s (%s%s%s)", length ? ", " : "",
-             adapter->name, vkb_adapter_type(adapter), adapter->bundled ? ", bundled" : "", place);
-}
-
-const char *vkb_choice_hint(const char *choice)
+// What limits the choice, for messages.
+static const char *hint(const char *choice)
 {
     return limiting_list(choice) ? " among the GPUs that CUDA_VISIBLE_DEVICES names" : "";
+}
+
+// The best adapter of one source: the system's loader, or a driver without it.
+struct source {
+    struct vkb_instance *instance;
+    struct vkb_adapter_info best;
+    bool found;
+};
+
+// Opens the source, and finds the best adapter that fits; adds the names of all to the text.
+static bool open_source(struct source *source, const char *choice, const char *driver,
+                        bool validation, char (*names)[NAMES_SIZE], struct vkb_error *error)
+{
+    struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
+    uint32_t count, best;
+
+    *source = (struct source){.instance = vkb_instance_open(driver, validation, error)};
+    if (!source->instance || !vkb_adapters_list(source->instance, adapters, &count, error))
+        return false;
+    for (uint32_t i = 0; i < count; ++i)
+        add_name(choice, &adapters[i], *names);
+    if (!choose(choice, adapters, count, &best, error))
+        return false;
+    source->found = best < count;
+    if (source->found)
+        source->best = adapters[best];
+    return true;
+}
+
+static void close_source(struct source *source)
+{
+    if (source->instance)
+        vkb_instance_close(source->instance);
+    *source = (struct source){0};
+}
+
+// Whether an adapter of the bundled driver, which is a CPU, would come before that one.
+static bool is_last_resort(const struct source *source)
+{
+    return !source->found
+        || preference(&source->best) >= preference(&(struct vkb_adapter_info){
+               .device_type = VK_PHYSICAL_DEVICE_TYPE_CPU,
+           });
+}
+
+// The system's adapters, then the driver's where it could be better. No system's adapter is no
+// failure where there is a driver.
+static bool open_sources(struct source *system, struct source *bundled, const char *choice,
+                         const char *driver, bool validation, char (*names)[NAMES_SIZE],
+                         struct vkb_error *error)
+{
+    if (!driver[0] || strcmp(choice, "software") != 0) {
+        if (!open_source(system, choice, "", validation, names, error)
+            && (!driver[0] || error->kind != VKB_ERROR_ADAPTER_NOT_FOUND))
+            return false;
+        if (!driver[0] || !is_last_resort(system))
+            return true;
+    }
+    *error = (struct vkb_error){0};
+    return open_source(bundled, choice, driver, validation, names, error);
+}
+
+bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
+                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
+                      struct vkb_error *error)
+{
+    struct source system = {0}, bundled = {0};
+    char names[NAMES_SIZE] = "";
+    bool done = open_sources(&system, &bundled, choice, driver, validation, &names, error);
+    struct source *best = bundled.found ? &bundled : &system;
+
+    if (done && !best->found)
+        done = vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                        "no Vulkan adapter for \"%s\"%s; found: %s. %s", choice, hint(choice),
+                        names[0] ? names : "none", vkb_install_hint);
+    if (done) {
+        *instance = best->instance;
+        *chosen = best->best;
+        best->instance = NULL;
+    }
+    close_source(&system);
+    close_source(&bundled);
+    return done;
 }

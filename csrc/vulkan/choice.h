@@ -6,20 +6,11 @@
 
 #include "vulkan/adapter.h"
 
-enum { VKB_CHOICE_NAMES = 1536 };
-
-// The rank of an adapter for "auto"; lower is better.
-int vkb_adapter_preference(const struct vkb_adapter_info *adapter);
-
-// *best: the index of the adapter; `count`: none fits. Fails if a name fits several equal GPUs.
-bool vkb_choice_best(const char *choice, const struct vkb_adapter_info *adapters, uint32_t count,
-                     uint32_t *best, struct vkb_error *error);
-
-// Adds the adapter to a list for messages.
-void vkb_choice_describe(const char *choice, const struct vkb_adapter_info *adapter,
-                         char names[VKB_CHOICE_NAMES]);
-
-// What limits the choice, for messages; "": nothing.
-const char *vkb_choice_hint(const char *choice);
+// Opens the instance of the adapter that `choice` selects. `driver` is the path of a
+// bundled driver; "" means none. The bundled software adapter takes precedence over the system's;
+// for "software" the system's drivers are then not opened. On failure no instance is left open.
+bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
+                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
+                      struct vkb_error *error);
 
 #endif
