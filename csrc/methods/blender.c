@@ -299,9 +299,13 @@ static bool add_highlights(struct glare *glare, struct vkb_error *error)
         .height = (source->buffers.height + factor - 1) / factor,
     };
     levels->count = 1;
-    if (!vkb_levels_image(levels, factor > 1 ? "highlights" : "glow", 0, levels->sizes[0],
-                          &levels->downs[0], error))
+    if (!vkb_levels_image(levels, "glow", 0, source->buffers, &glow, error)
+        || (factor > 1
+            && !vkb_levels_image(levels, "highlights", 0, levels->sizes[0], &levels->downs[0],
+                                 error)))
         return false;
+    if (factor == 1)
+        levels->downs[0] = glow;
     struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_blender_prefilter_frag,
                                                 source->glow, levels->downs[0]);
     if (factor > 1) {
@@ -310,9 +314,7 @@ static bool add_highlights(struct glare *glare, struct vkb_error *error)
     }
     vkb_mask_prefilter(levels, &row);
     return vkb_graph_add_pass(levels->graph, &row, error)
-        && (factor == 1
-            || (vkb_levels_image(levels, "glow", 0, source->buffers, &glow, error)
-                && vkb_levels_resize(levels, levels->downs[0], 1.0, glow, error)));
+        && (factor == 1 || vkb_levels_resize(levels, levels->downs[0], 1.0, glow, error));
 }
 
 // The glare, enlarged, saturated and tinted.

@@ -53,8 +53,8 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
     images = _TYPES[settings.type](bright, settings, store, (width, height))
     light = sample(images.pop("light"), source.size)
-    rgb = saturated(light[..., :3], settings.saturation) * np.array(settings.tint)
-    alpha = light[..., 3:] * (sum(settings.tint) / 3)
+    rgb = np.multiply(saturated(light[..., :3], settings.saturation), settings.tint)
+    alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
     return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
 
 

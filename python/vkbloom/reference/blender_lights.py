@@ -35,9 +35,9 @@ def _streaks(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -
     Iteration i is half of the sum of four taps, 4^i pixels apart, with the weights f^k for
     f = fade^(4^i). The sum of the rays is divided by 6 - iterations.
     """
-    total: Array = np.zeros_like(bright)
+    total: Any = 0.0
     for ray in range(settings.streaks):
-        angle = math.radians(settings.streaks_angle) + 2 * math.pi * ray / settings.streaks
+        angle = np.radians(settings.streaks_angle) + 2 * math.pi * ray / settings.streaks
         light = bright
         for i in range(settings.iterations):
             step = 4.0**i
@@ -45,7 +45,7 @@ def _streaks(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -
             taps = [
                 settings.fade ** (step * tap)
                 * tap_colours(tap, kept, bright.shape[2])
-                * moved_by(light, tap * step * math.cos(angle), -tap * step * math.sin(angle))
+                * moved_by(light, tap * step * np.cos(angle), -tap * step * np.sin(angle))
                 for tap in range(4)
             ]
             light = store(sum(taps[1:], taps[0]) / 2)
@@ -94,10 +94,10 @@ def _ghost_scales(iterations: int, iteration: int) -> list[float]:
     return [-0.99 / scale if k % 2 else scale for k, scale in enumerate(scales)]
 
 
-def _ghost_tints(modulation: float, channels: int) -> Array:
-    kept = 1 - modulation
-    tints = np.array([[1, 1, 1], [1, kept, kept], [kept, kept, 1], [kept, 1, kept]]) / 4
-    return np.concatenate([tints, *[tints.mean(axis=1, keepdims=True)] * (channels - 3)], axis=1)
+def _ghost_tint(modulation: float, ghost: int, channels: int) -> Array:
+    """Return the factors of a ghost's channels; that of alpha is their mean."""
+    tint = tap_colours(ghost, 1 - modulation, 3) / 4
+    return np.concatenate([tint, *[tint.sum(axis=0, keepdims=True) / 3] * (channels - 3)])
 
 
 def _ghosts(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -> Images:
@@ -105,10 +105,10 @@ def _ghosts(bright: Array, settings: BlenderGlare, store: Storage, size: Any) ->
     radius = 16 / FACTORS[settings.quality]
     small = store(_scaled(store(_gaussian(bright, radius)), 2.13))
     light = store(small + _scaled(store(_gaussian(bright, 2 * radius)), -0.97))
-    total = np.zeros_like(bright)
-    tints = _ghost_tints(settings.color_modulation, bright.shape[2])
+    total: Any = 0.0
     for i in range(1, settings.iterations):
-        for scale, tint in zip(_ghost_scales(settings.iterations, i), tints, strict=True):
+        for ghost, scale in enumerate(_ghost_scales(settings.iterations, i)):
+            tint = _ghost_tint(settings.color_modulation, ghost, bright.shape[2])
             total = total + tint * _scaled(light, scale)
         light = total = store(total)
     return {"light": total}
@@ -116,7 +116,7 @@ def _ghosts(bright: Array, settings: BlenderGlare, store: Storage, size: Any) ->
 
 def _ghosts_gain(settings: BlenderGlare, size: Any) -> Array:
     """Return the value at the centre, where nothing has fallen yet."""
-    added = _ghost_tints(settings.color_modulation, 3).sum(axis=0)
+    added = sum(_ghost_tint(settings.color_modulation, ghost, 3) for ghost in range(4))
     first: Array = 2 * added
     return first * (1 + added) ** (settings.iterations - 2)
 
@@ -142,8 +142,8 @@ def _recursed(lines: Array, inside: Array, settings: BlenderGlare, store: Storag
     `inside` is 1 inside of the image, and 0 where a line has no pixel.
     """
     count, fade = len(lines), settings.fade
-    nothing = np.zeros_like(lines[0])
-    values = list(lines)
+    nothing = 0 * lines[0]
+    values = [lines[at] for at in range(count)]
     for step in range(1, settings.iterations):
         for order in (range(count), range(count - 1, -1, -1)):
             for at in order:
@@ -152,7 +152,7 @@ def _recursed(lines: Array, inside: Array, settings: BlenderGlare, store: Storag
                 ]
                 mixed = (1 - fade) * values[at] + fade * (ends[0] + ends[1]) / 2
                 values[at] = inside[at] * store(mixed)
-    return np.stack(values)
+    return np.concatenate([value[np.newaxis] for value in values])
 
 
 def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -> Images:
@@ -160,7 +160,7 @@ def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: An
 
     A diagonal is a column of the image whose rows are shifted.
     """
-    height, width, channels = bright.shape
+    height, width, _ = bright.shape
     upwards = bright[::-1]
     if not settings.diagonal:
         one = np.ones((max(height, width), 1, 1))
@@ -168,14 +168,12 @@ def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: An
         return {"light": store(_recursed(upwards, one, settings, store) + across)[::-1]}
     total: Any = 0.0
     rows = np.arange(height)[:, np.newaxis]
-    for slope in (1, -1):
-        # Of a row's pixels, the columns in which they stand.
-        columns = np.arange(width) + (height - 1 - rows if slope > 0 else rows)
-        lines = np.zeros((height, width + height - 1, channels))
-        inside = np.zeros((height, width + height - 1, 1))
-        lines[rows, columns] = upwards
-        inside[rows, columns] = 1
-        total = total + _recursed(lines, inside, settings, store)[rows, columns]
+    for shift in (height - 1 - rows, rows):
+        place = np.arange(width + height - 1) - shift
+        inside = ((place >= 0) & (place < width)).astype(np.float64)[..., np.newaxis]
+        lines = inside * upwards[rows, np.clip(place, 0, width - 1)]
+        filtered = _recursed(lines, inside, settings, store)
+        total = total + filtered[rows, np.arange(width) + shift]
     return {"light": store(total)[::-1]}
 
 
@@ -213,7 +211,7 @@ def _sun_beams(bright: Array, settings: BlenderGlare, store: Storage, size: Any)
     step_x, step_y = (sun_x - share_x) / distance, (sun_y - share_y) / distance
     # With single floats, as the number is the integer below a product.
     count = (np.float32(1) - np.float32(jitter)) * steps.astype(np.float32)
-    total: Any = np.zeros_like(bright)
+    total: Any = 0.0
     weights = np.zeros((height, width))
     going = np.ones((height, width), np.bool_)
     for i in range(int(count.max()) + 1):

@@ -17,7 +17,9 @@ from .tape import Traced, gradients, value_of
 __all__ = ["DISCRETE", "differentiable", "vjp"]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
-DISCRETE: Final = frozenset({"anamorphism", "bloom_scale", "pixels_per_degree", "size"})
+DISCRETE: Final = frozenset(
+    {"anamorphism", "bloom_scale", "jitter", "pixels_per_degree", "size", "sun_position"}
+)
 
 
 def vjp(
@@ -154,7 +156,7 @@ class _TracedSettings:
                 _TracedSettings(stage, inputs, f"glare.{place}.")
                 for place, stage in enumerate(stages)
             )
-        if hasattr(settings, "kernel"):
+        if callable(getattr(settings, "kernel", None)):
             self._inputs = inputs
             self.kernel = self._kernel
 
