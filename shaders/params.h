@@ -597,6 +597,7 @@
     NAME(STORED_SINGLE, 2, single) \
     NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
     NAME(STORED_UFLOAT, 4, ufloat) \
+    NAME(STORED_SRGB8, 5, srgb8) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(BLOOM_LIT, 2, lit) \

@@ -1,6 +1,6 @@
-// Blender's Glare node: formulas of the compositor of Blender 5.0 (node_composite_glare.cc). From the
-// frame come the highlights, in the size of the quality; from these a glare of the same size, by the
-// type; and from this the bloom.
+// Blender's Glare node: formulas of the compositor of Blender 5.0 (node_composite_glare.cc). From
+// the frame come the highlights, in the size of the quality; from these a glare of the same size,
+// by the type; and from this the bloom.
 #include "methods/methods.h"
 #include "passes/blur.h"
 #include "passes/levels.h"
@@ -85,8 +85,8 @@ static bool add_streaks(struct glare *glare, uint32_t *light, struct vkb_error *
 
     for (int i = 0; i < values->streaks; ++i, before = *light) {
         // Blender reads in the direction of the angle.
-        const double angle = acos(-1.0)
-                           * (1.0 + values->streaks_angle / 180.0 + 2.0 * i / values->streaks);
+        const double angle =
+            acos(-1.0) * (1.0 + values->streaks_angle / 180.0 + 2.0 * i / values->streaks);
         uint32_t from = glare->levels.downs[0];
         for (int iteration = 0; iteration < values->iterations; ++iteration, from = *light) {
             const bool last = iteration == values->iterations - 1;

@@ -153,8 +153,8 @@ bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stag
 {
     const struct vkb_glare_values *values = &stage->values;
     const bool ghosts = stage->kind == VKB_STAGE_GHOSTS;
-    struct vkb_pass_row row = glare_row(
-        levels, ghosts ? &vkb_shader_ghosts_frag : &vkb_shader_halo_frag, from, to);
+    struct vkb_pass_row row =
+        glare_row(levels, ghosts ? &vkb_shader_ghosts_frag : &vkb_shader_halo_frag, from, to);
 
     if (ghosts)
         add_before(&row, before);

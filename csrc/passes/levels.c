@@ -276,7 +276,7 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
 bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
                        uint32_t *top, double *below, struct vkb_error *error)
 {
-    const bool means = vkb_ends_at_one(levels->source->format);
+    const bool means = vkb_stores_means(levels->source->format);
 
     *top = levels->downs[levels->count - 1];
     *below = combination->smallest;

@@ -71,9 +71,13 @@ bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
                           index, error);
 }
 
+enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers)
+{
+    return buffers == VKB_FORMAT_RGBA8_SRGB ? buffers : vkb_end_format(settings, buffers);
+}
+
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
 {
-    return buffers == VKB_FORMAT_RG11B10_UFLOAT && vkb_is_published(settings)
-             ? VKB_FORMAT_RGBA32_FLOAT
-             : buffers;
+    return vkb_is_rounded(buffers) && vkb_is_published(settings) ? VKB_FORMAT_RGBA32_FLOAT
+                                                                 : buffers;
 }

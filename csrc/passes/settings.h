@@ -96,8 +96,8 @@ struct vkb_settings {
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
     uint32_t level_weight_count;  // 0: none are given
-    float tint[3];          // of Blender's glare, and the position of its sun
-    float sun_position[2];  // as shares of the sides from the lower left
+    float tint[3];                // of Blender's glare, and the position of its sun
+    float sun_position[2];        // as shares of the sides from the lower left
     struct vkb_kernel_data kernel;
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;

@@ -17,12 +17,12 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 // The saturation (max - min) / max is multiplied, and is then 0 to 1.
 vec3 saturated(vec3 value)
 {
-    float most = max(value.r, max(value.g, value.b));
-    float spread = most - min(value.r, min(value.g, value.b));
+    float most = max(value.r, max(value.g, value.b)), least = min(value.r, min(value.g, value.b));
+    float spread = most - least;
     if (most <= 0.0 || spread == 0.0)
         return vec3(most);
     float wanted = min(params.saturation * (spread / most), 1.0);
-    return most - (most - value) * (wanted * most / spread);
+    return most * (1.0 - wanted) + (value - least) * (wanted * most / spread);
 }
 
 vec4 shade()

@@ -38,7 +38,9 @@ class Blender:
         scene.render.filepath = str(Path(self._folder.name, "rest"))
         scene.render.compositor_device = "CPU"
         scene.render.compositor_precision = "FULL"
-        tree = scene.compositing_node_group = bpy.data.node_groups.new("glare", "CompositorNodeTree")
+        tree = scene.compositing_node_group = bpy.data.node_groups.new(
+            "glare", "CompositorNodeTree"
+        )
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
         self._tree = tree
         self._image, self._kernel = (tree.nodes.new("CompositorNodeImage") for _ in range(2))
@@ -68,7 +70,7 @@ class Blender:
         return {"Blender": bpy.app.version_string}
 
     def render(self, image: np.ndarray, parameters: dict[str, Any]) -> dict[str, np.ndarray]:
-        """Return Highlights, Glare and Image of a frame, top row first, as "glow", "glare", "final".
+        """Return Highlights, Glare and Image of a frame, top row first: "glow", "glare", "final".
 
         `parameters` are fields of `vkbloom.BlenderGlare`; `kernel` is an array.
         """

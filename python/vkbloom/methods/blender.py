@@ -10,13 +10,10 @@ from vkbloom.checks import check_floats, check_number
 from vkbloom.core_kernel import CoreKernel
 from vkbloom.fields import choice_field, flag_field, number_field, value_field
 from vkbloom.methods.blender_kernels import core_kernel_of, kernel_sides
-from vkbloom.methods.convolution import read_psf
-from vkbloom.psf.base import PSF
+from vkbloom.methods.convolution import PSFLike, read_psf
 from vkbloom.settings import BloomFormat, Composite, Settings, no_knee
 
-GlareType = Literal[
-    "bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"
-]
+GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
 Quality = Literal["high", "medium", "low"]
 Version = Literal["5.0", "4.3"]
 
@@ -165,13 +162,8 @@ class BlenderGlare(Settings):
     diagonal: bool = flag_field("diagonal")
     sun_position: tuple[float, ...] = value_field((0.5, 0.5), read=_read_position)
     jitter: float = number_field("jitter")
-    kernel: PSF | None = value_field(None, kind="psf", read=read_psf)
+    kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
     version: Version = choice_field("version", ("5.0", "4.3"), option="blender-version")
-
-    @property
-    def needs_kernel(self) -> bool:
-        """Whether the core convolves with a kernel."""
-        return self.type in ("fog_glow", "kernel")
 
     def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
         """Return the kernel as the core reads it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,8 @@ def kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> NDArray[np.fl
     """Return the kernel in pixels of the glare, (h, w, 3), with its point at [h // 2, w // 2]."""
     size = glare_size(buffers, settings.quality)
     if settings.type == "kernel":
-        image = np.ones((1, 1, 3)) if settings.kernel is None else settings.kernel.kernel(size)
+        psf = cast("PSF | None", settings.kernel)
+        image = np.ones((1, 1, 3)) if psf is None else psf.kernel(size)
         return _turned(_normalized(image))
     values = (_fog_glow_of_4_3 if settings.version == "4.3" else _fog_glow)(size, settings.size)
     return np.repeat(values[..., np.newaxis], 3, axis=2)
@@ -51,10 +52,9 @@ def kernel_sides(settings: BlenderGlare, buffers: tuple[int, int]) -> tuple[int,
 
 def core_kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
     """Return the kernel as the core reads it."""
-    used = {"type": settings.type, "quality": settings.quality, "version": settings.version}
-    return _kept_kernel(
-        type(settings)(**used, size=settings.size, kernel=settings.kernel), buffers
-    )
+    used: dict[str, Any] = {"type": settings.type, "quality": settings.quality}
+    used["version"] = settings.version
+    return _kept_kernel(type(settings)(**used, size=settings.size, kernel=settings.kernel), buffers)
 
 
 @kept
@@ -89,7 +89,8 @@ def _fog_glow(size: tuple[int, int], share: float) -> NDArray[np.float64]:
         values: NDArray[np.float64] = density(degrees * np.hypot(columns, rows[:, np.newaxis]))
         return values[..., 0]
 
-    return at(*offsets) / at(*around).sum()
+    kernel: NDArray[np.float64] = at(*offsets) / at(*around).sum()
+    return kernel
 
 
 def _side_of_4_3(size: tuple[int, int], share: float) -> int:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .blender_lights import FACTORS, GAINS, LIGHTS
-from .image import BlurInput, Storage, storage
+from .image import BlurInput, Storage, finite, storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
-from .threshold import brightest, firefly_weight, masked
+from .threshold import brightest, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
@@ -64,7 +64,9 @@ def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
     The saturation of a grey is 0. Streaks and ghosts have colours.
     """
     one = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
-    found = one * GAINS[settings.type](settings, size) if settings.type in GAINS else np.full(3, one)
+    found = (
+        one * GAINS[settings.type](settings, size) if settings.type in GAINS else np.full(3, one)
+    )
     tinted = saturated(found, settings.saturation) * np.array(settings.tint)
     return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
 
@@ -79,7 +81,8 @@ def saturated(rgb: Array, saturation: float) -> Array:
     above, spread = np.where(most > 0, most, 1.0), most - least
     wanted = np.clip(saturation * spread / above, 0.0, 1.0)
     scale = wanted * above / np.where(spread > 0, spread, 1.0)
-    return np.where(most > 0, most - (most - rgb) * scale, most)
+    result: Array = np.where(most > 0, most * (1 - wanted) + (rgb - least) * scale, most)
+    return result
 
 
 def _means(image: Array, factor: int) -> Array:
@@ -90,9 +93,8 @@ def _means(image: Array, factor: int) -> Array:
         if axis == 0:
             places = (length - 1 - places)[::-1]
         taps = image[places] if axis == 0 else image[:, places]
-        image = sum(
-            (taps[i::factor] if axis == 0 else taps[:, i::factor]) for i in range(factor)
-        ) / factor
+        parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
+        image = sum(parts[1:], parts[0]) / factor
     return image
 
 
@@ -115,14 +117,18 @@ def _bloom(
         shrink = _weighted_taps if k == 1 else downsample
         downs.append(store(shrink(downs[-1], level)))
     levels = combine(
-        downs, BlurInput(bright, (width, height), store), upsample=tent_of_target, last=linear,
-        gain=1 / count, end=lambda image: image,
+        downs,
+        BlurInput(bright, (width, height), store),
+        upsample=tent_of_target,
+        last=linear,
+        gain=1 / count,
+        end=lambda image: image,
     )
     del levels["down_0"]
     return {**levels, "light": levels.pop("bloom")}
 
 
-_TYPES = {"bloom": _bloom, **LIGHTS}
+_TYPES: dict[str, Any] = {"bloom": _bloom, **LIGHTS}
 
 
 def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
@@ -155,8 +161,11 @@ def _smooth_min(values: Array, end: float, width: float) -> Array:
 
 
 def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
-    result = np.zeros((size[1], size[0], image.shape[2]))
+    """Return the 13 taps of half the size; 0 where negative weights make it undefined."""
+    result: Any = 0.0
     for places, group_share in _GROUPS:
         taps = [sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)]) for x, y in places]
-        result += group_share * weighted_mean((firefly_weight(brightest(tap)), tap) for tap in taps)
-    return result
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = weighted_mean((1 / (1 + brightest(tap)), tap) for tap in taps)
+        result = result + group_share * mean
+    return finite(result)

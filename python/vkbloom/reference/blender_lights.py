@@ -57,9 +57,7 @@ def _streaks_gain(settings: BlenderGlare, size: Any) -> Array:
     value = np.ones(3)
     for i in range(settings.iterations):
         kept = 1 - settings.color_modulation ** (i + 1)
-        weights = [
-            settings.fade ** (4.0**i * tap) * tap_colours(tap, kept, 3) for tap in range(4)
-        ]
+        weights = [settings.fade ** (4.0**i * tap) * tap_colours(tap, kept, 3) for tap in range(4)]
         value = value * sum(weights) / 2
     return value * settings.streaks / (6 - settings.iterations)
 
@@ -116,9 +114,9 @@ def _ghosts(bright: Array, settings: BlenderGlare, store: Storage, size: Any) ->
 
 def _ghosts_gain(settings: BlenderGlare, size: Any) -> Array:
     """Return the value at the centre, where nothing has fallen yet."""
-    added = sum(_ghost_tint(settings.color_modulation, ghost, 3) for ghost in range(4))
-    first: Array = 2 * added
-    return first * (1 + added) ** (settings.iterations - 2)
+    added: Any = sum(_ghost_tint(settings.color_modulation, ghost, 3) for ghost in range(4))
+    value: Array = 2 * added * (1 + added) ** (settings.iterations - 2)
+    return value
 
 
 def _convolved(
@@ -177,7 +175,7 @@ def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: An
     return {"light": store(total)[::-1]}
 
 
-def _hashed(x: Array, y: Array) -> Array:
+def _hashed(x: Any, y: Any) -> Array:
     """Return numbers of 0 to 1 from pairs of integers: the end of Bob Jenkins' lookup3."""
     start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
     a, b = start + x.astype(np.uint32), start + y.astype(np.uint32)
@@ -228,7 +226,7 @@ def _sun_beams(bright: Array, settings: BlenderGlare, store: Storage, size: Any)
     return {"light": store(np.where((weights > 0)[..., np.newaxis], mean, upwards))[::-1]}
 
 
-LIGHTS: Final = {
+LIGHTS: Final[dict[str, Any]] = {
     "streaks": _streaks,
     "ghosts": _ghosts,
     "fog_glow": _convolved,
@@ -237,7 +235,7 @@ LIGHTS: Final = {
     "sun_beams": _sun_beams,
 }
 #: The factors of a flat image, for each channel, of the types in which they are not 1.
-GAINS: Final = {
+GAINS: Final[dict[str, Any]] = {
     "streaks": _streaks_gain,
     "ghosts": _ghosts_gain,
     "fog_glow": _kernel_gain,
