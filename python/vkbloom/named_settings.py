@@ -73,8 +73,8 @@ class _Presets(dict[str, "Settings"]):
 #:   effects: copy.glsl @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc, with the environment's defaults
 #:   up to 4.5 and from 4.6 on.
 #: - ``"blender_bloom"``, ``"blender_ghosts"``, ``"blender_streaks"``, ``"blender_simple_star"``,
-#:   ``"blender_sun_beams"``, ``"blender_fog_glow"``: types of the Glare node of Blender 5.0, quality
-#:   High, its defaults.
+#:   ``"blender_sun_beams"``, ``"blender_fog_glow"``: types of the Glare node of Blender 5.0 in
+#:   quality High, with its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 #: - ``"spencer_photopic"``: the glare of an eye by day, `vkbloom.psf.spencer`. The functions of
 #:   ``"spencer_photopic"``, ``"unreal_convolution"`` and ``"iris_6"`` describe all light of a

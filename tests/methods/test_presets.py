@@ -182,7 +182,10 @@ def test_a_scene_is_blurred_as_an_image_is(renderer: Renderer, name: str) -> Non
     [
         # 3 * (1 + 4) pixels are reached, in the middle half of a side the ghosts are.
         (BlenderGlare(type="streaks", iterations=2), (slice(20, 60), slice(20, 70))),
-        (BlenderGlare(type="streaks", streaks=1, fade=0.8, iterations=2), (slice(20, 60),)),
+        (
+            BlenderGlare(type="streaks", streaks=1, fade=0.8, iterations=2),
+            (slice(20, 60), slice(20, 60)),
+        ),
         (BlenderGlare(type="simple_star", fade=0.75), (slice(36, 44), slice(41, 49))),
         (BlenderGlare(type="ghosts", quality="low"), (slice(40, 41), slice(45, 46))),
         (BlenderGlare(type="fog_glow", size=0.0), (slice(40, 41), slice(45, 46))),

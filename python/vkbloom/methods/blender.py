@@ -146,7 +146,8 @@ class BlenderGlare(Settings):
     composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", range=(0, 1))
     format: BloomFormat | None = "rgba16float"
-    # On the command line, --size is the size of a frame, and --version the program's.
+    # On the command line, --size is the size of a frame, --version the program's, and --streaks a
+    # stage of glare.
     type: GlareType = choice_field("type", option="glare-type")
     quality: Quality = choice_field("quality", option="glare-quality")
     smoothness: float = number_field("smoothness")
@@ -154,7 +155,7 @@ class BlenderGlare(Settings):
     saturation: float = number_field("saturation", slider=(0, 1))
     tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
     size: float = number_field("size", option="glare-size")
-    streaks: int = number_field("streaks")
+    streaks: int = number_field("streaks", option="glare-streaks")
     streaks_angle: float = number_field("streaks_angle", unit="degree")
     iterations: int = number_field("iterations", default=3, range=(2, 5))
     fade: float = number_field("fade")

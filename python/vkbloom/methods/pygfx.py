@@ -20,8 +20,8 @@ class PygfxBloom(Settings):
     filter_radius : float
         Distance of the tent's taps as a share of the width, 0 to 1.
     karis_average : bool
-        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only, also
-        of negative ones. A mean that is not finite is 0.
+        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only. A
+        luminance may be negative; a mean that is not finite is 0.
     threshold : None
         pygfx has none.
     composite : {"mix"}
