@@ -316,7 +316,19 @@ static PyObject *get_exported(PyObject *object, void *unused)
     return PyBool_FromLong(is_exported((struct vkb_source_object *)object));
 }
 
+static PyObject *get_kind(PyObject *object, void *unused)
+{
+    const struct vkb_image_source *image = &((struct vkb_source_object *)object)->source.image;
+
+    (void)unused;
+    return Py_BuildValue("((IIi)s)", image->size.height, image->size.width, (int)image->channels,
+                         image->format == VKB_FORMAT_RGBA8_UNORM    ? "uint8"
+                         : image->format == VKB_FORMAT_RGBA16_FLOAT ? "float16"
+                                                                    : "float32");
+}
+
 static PyGetSetDef attributes[] = {
+    {"kind", get_kind, NULL, "(shape, dtype) of an image.", NULL},
     {"exported", get_exported, NULL, "Whether an image is in memory that CUDA shares.", NULL},
     {"resident", is_resident, NULL, "Whether it is an image that stays on a device.", NULL},
     {0},

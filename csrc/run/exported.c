@@ -94,6 +94,9 @@ static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
     };
     if (!work.to.buffer)
         work.to = work.counts;
+    // All add to the same counts.
+    vkb_barrier_record(run->device, run->submission->commands.buffer, NULL, true,
+                       VKB_ACCESS_DISPATCH_CHANGED, VKB_ACCESS_DISPATCH_CHANGED);
     return vkb_gather_create(run->device, run->frame->pipelines.cache, &run->frame->gather, error)
         && vkb_gather_record(run->device, &run->frame->gather, run->submission->commands.buffer,
                              run->submission->descriptors, &work, error);

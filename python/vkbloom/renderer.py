@@ -691,9 +691,8 @@ class Renderer:
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
-        shape, dtype = image_kind(image)
-        height, width, channels = shape
         source = image_source(image, mask, emission, self._core)
+        shape, dtype = source.kind
         if source.exported:
             # It is a copy already, but for what is on the host.
             mask, emission = (
@@ -704,8 +703,8 @@ class Renderer:
             source = self._core.upload(source, None, False)
         return Image(
             source,
-            (height, width, channels),
-            dtype,
+            shape,
+            np.dtype(dtype),
             mask=mask is not None,
             emission=emission is not None,
         )
