@@ -25,7 +25,6 @@ _LAST: Final = ("exposure", "tonemap")
 # Numbers of methods that are rarely changed.
 _RARE: Final = (
     "clamp_max",
-    "loops",
     "low_frequency_boost_curvature",
     "luminance_cap",
     "max_mip_dimension",
