@@ -903,8 +903,8 @@ class Renderer:
         >>> grid["final"].sel(preset="kino", intensity=0.5).shape
         (32, 48, 3)
         """
+        from vkbloom.grid.layout import ask  # noqa: PLC0415
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
-        from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
             source,

@@ -38,8 +38,8 @@ from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import default_preset, settings_options
-from vkbloom.grid.image_files import FileForm, GridFiles
-from vkbloom.grid.plan import Grid, Layout, ask
+from vkbloom.grid.image_folder import FileForm, GridFiles
+from vkbloom.grid.layout import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import visit
 from vkbloom.grid.zarr_grid import check_chunks
