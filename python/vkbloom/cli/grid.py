@@ -40,6 +40,7 @@ from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import default_preset, settings_options
 from vkbloom.grid.image_folder import FileForm, GridFiles
 from vkbloom.grid.layout import Grid, Layout, ask
+from vkbloom.grid.parts import WHOLE, Part, read_part
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import visit
 from vkbloom.grid.zarr_grid import check_chunks
@@ -48,6 +49,11 @@ from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import SHADINGS, Shading
 
 _STORE: Final = ".zarr"
+
+
+def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | None:
+    with as_wrong_use():
+        return None if value is None else read_part(value)
 
 
 @click.command(cls=CommandWithFile)
@@ -117,6 +123,14 @@ _STORE: Final = ".zarr"
     "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
 )
 @click.option(
+    "--part",
+    metavar="I/N",
+    callback=_part,
+    help="Render part I of N, from 1, of the same grid; implies --resume. Other processes may "
+    "render other parts at the same time. auto/N takes I, and auto also N, from the environment of "
+    "a job array, such as SLURM_ARRAY_TASK_ID.",
+)
+@click.option(
     "--workers",
     metavar="N",
     type=click.IntRange(min=1),
@@ -154,6 +168,7 @@ def command(
     chunk_words: tuple[str, ...],
     suffix: str,
     resume: bool,
+    part: Part | None,
     workers: int | None,
     scheduler: str | None,
     sheet: str | None,
@@ -177,12 +192,10 @@ def command(
     """
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
-    output = _Output(out, suffix, resume, sheet, curves)
+    output = _Output(out, suffix, resume or part is not None, part, sheet, curves)
     output.check(needs_store=bool(reduce_words or chunk_words), has_frames=attachments != "none")
     chunks = axis_options.chunk_counts(chunk_words)
-    begun, axes = _begun_and_axes(axis_words, settings, is_of_images=bool(images))
-    if not axes and len(images) < 2:
-        raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
+    begun, axes = _begun_and_axes(axis_words, settings, len(images))
     reduce = axis_options.named_reductions(reduce_words, settings)
     pictures = [read_picture(one, subimage, input_colour, layer=layer, raw=raw) for one in images]
     requested = _source(images, pictures, scene), begun, axes
@@ -215,6 +228,7 @@ class _Output:
     name: str
     suffix: str
     resume: bool
+    part: Part | None
     sheet: str | None
     curves: str | None
 
@@ -243,7 +257,13 @@ class _Output:
     def store(self, points: int, requested: tuple[Any, Any, Any], **options: Any) -> None:
         """Render into a store, and draw the sheet and the curves from it."""
         dataset = vkbloom.grid_to_zarr(
-            *requested, self.name, resume=self.resume, on_mended=note, progress=True, **options
+            *requested,
+            self.name,
+            resume=self.resume,
+            part=self.part,
+            on_mended=note,
+            progress=True,
+            **options,
         )
         self._tell(points, dataset.attrs["passes_run"], dataset.attrs["passes_saved"])
         if self.sheet:
@@ -261,7 +281,9 @@ class _Output:
         forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
 
         def prepared(layout: Layout) -> GridFiles:
-            files = GridFiles(Path(self.name), f".{self.suffix.lstrip('.')}", grid, layout, forms)
+            suffix = f".{self.suffix.lstrip('.')}"
+            part = self.part or WHOLE
+            files = GridFiles(Path(self.name), suffix, grid, layout, forms, part=part)
             files.prepare(resume=self.resume)
             return files
 
@@ -269,17 +291,20 @@ class _Output:
         self._tell(math.prod(grid.shape), tally.ran, tally.saved)
 
     def _tell(self, points: int, ran: int, saved: int) -> None:
-        click.echo(f"wrote {self.name}, {points} points; passes run {ran}, saved {saved}")
+        which = f"part {self.part[0]}/{self.part[1]} of " if self.part else ""
+        click.echo(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
 
 
 def _begun_and_axes(
-    words: Sequence[str], settings: vkbloom.Settings, *, is_of_images: bool
+    words: Sequence[str], settings: vkbloom.Settings, image_count: int
 ) -> tuple[vkbloom.Settings | None, dict[str, Any]]:
     """Return the settings that the axes vary, None where an axis has presets; and the axes."""
+    if not words and image_count < 2:
+        raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
     axes = axis_options.axis_values(words, settings)
     if "preset" not in axes:
         return settings, axes
-    if settings != vkbloom.presets[default_preset(is_of_images)]:
+    if settings != vkbloom.presets[default_preset(image_count > 0)]:
         raise click.UsageError(
             "--axis preset sets all settings; leave out options of settings, and vary fields by "
             "further axes"
