@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -38,6 +38,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import default_preset, settings_options
 from vkbloom.grid.image_files import FileForm, GridFiles
+from vkbloom.grid.parts import WHOLE, Part, read_part
 from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import visit
@@ -46,7 +47,15 @@ from vkbloom.io import image_writing, safe_writing
 from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import SHADINGS, Shading
 
+if TYPE_CHECKING:
+    import xarray
+
 _STORE: Final = ".zarr"
+
+
+def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | None:
+    with as_wrong_use():
+        return None if value is None else read_part(value)
 
 
 @click.command(cls=CommandWithFile)
@@ -116,6 +125,14 @@ _STORE: Final = ".zarr"
     "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
 )
 @click.option(
+    "--part",
+    metavar="I/N",
+    callback=_part,
+    help="Render part I of N, from 1, of the same grid; implies --resume. Other processes may "
+    "render other parts at the same time. auto/N takes I, and auto also N, from the environment of "
+    "a job array, such as SLURM_ARRAY_TASK_ID.",
+)
+@click.option(
     "--workers",
     metavar="N",
     type=click.IntRange(min=1),
@@ -153,6 +170,7 @@ def command(
     chunk_words: tuple[str, ...],
     suffix: str,
     resume: bool,
+    part: Part | None,
     workers: int | None,
     scheduler: str | None,
     sheet: str | None,
@@ -223,7 +241,8 @@ def command(
                 axes,
                 out,
                 chunks=chunks,
-                resume=resume,
+                resume=resume or part is not None,
+                part=part,
                 on_mended=note,
                 progress=True,
                 **shared,
@@ -234,13 +253,24 @@ def command(
             forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
 
             def prepared(layout: Layout) -> GridFiles:
-                files = GridFiles(Path(out), f".{suffix.lstrip('.')}", grid, layout, forms)
-                files.prepare(resume=resume)
+                files = GridFiles(
+                    Path(out), f".{suffix.lstrip('.')}", grid, layout, forms, part=part or WHOLE
+                )
+                files.prepare(resume=resume or part is not None)
                 return files
 
             tally = render_grid(grid, prepared, progress=True, **device)
             ran, saved = tally.ran, tally.saved
-    click.echo(f"wrote {out}, {math.prod(grid.shape)} points; passes run {ran}, saved {saved}")
+    which = f"part {part[0]}/{part[1]} of " if part else ""
+    click.echo(
+        f"wrote {out}, {which}{math.prod(grid.shape)} points; passes run {ran}, saved {saved}"
+    )
+    if is_store:
+        _draw(dataset, sheet, curves)
+
+
+def _draw(dataset: xarray.Dataset, sheet: str | None, curves: str | None) -> None:
+    """Write the contact sheet and the curves that were requested."""
     if sheet:
         safe_writing.write_file(Path(sheet), vkbloom.contact_sheet(dataset))
         click.echo(f"wrote {sheet}")

@@ -4,7 +4,7 @@
 module                     job
 ========================== ========================================================================
 axes, sources              the axes, and the scene or images
-order                      the order of the points, and blocks of points
+order, parts               the order of the points, and blocks of points
 passes                     the number of passes of a step, and of a point rendered alone
 plan                       the requested grid, and its layout: variables, shapes, dtypes
 filling, reductions        render blocks of points into arrays; figures of frames
