@@ -132,11 +132,13 @@ class Renderer:
     Parameters
     ----------
     adapter : str
-        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
-        part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` if it is installed,
-        otherwise the system's. VKBLOOM_DRIVER selects another driver by the path of its library or
-        manifest, or "system".
+        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", a part
+        of an adapter's name in any case, "uuid:" with a device's UUID or its beginning, or "pci:"
+        with its address ("pci:0000:3b:00.0"). The environment variable VKBLOOM_ADAPTER replaces
+        "auto". Where CUDA_VISIBLE_DEVICES is set, of NVIDIA's GPUs only the first one that it names
+        is taken, unless `adapter` is a UUID or an address. "software" is the driver of the package
+        ``vkbloom-lavapipe`` if it is installed, otherwise the system's. VKBLOOM_DRIVER selects
+        another driver by the path of its library or manifest, or "system".
     validation : bool
         Enables the Khronos validation layer with synchronization validation. A call that causes
         messages raises `ValidationError` with the first one.
@@ -154,8 +156,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT
-        names variants that the adapter cannot run.
+        `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
+        out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
 
     See Also
     --------
