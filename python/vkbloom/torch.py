@@ -291,7 +291,7 @@ def _number(renderer: Renderer | None) -> int:
     return id(renderer)
 
 
-def _each(
+def _each(  # noqa: PLR0917
     image: Any, mask: Any, emission: Any, values: Sequence[Any], names: str, text: str
 ) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
     """Yield the index, the arrays and the settings of each image of a batch."""
