@@ -36,7 +36,7 @@ void vkb_dealloc(PyObject *object);
 // Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
 
-// (name, type, driver, driver_info, api_version, driver UUID as bytes)
+// (name, type, driver, driver_info, api_version, driver UUID as bytes, bundled, UUID, PCI address)
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,

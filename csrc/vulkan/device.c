@@ -10,21 +10,7 @@
 static bool has_extension(const struct vkb_device *device, const char *name, bool *found,
                           struct vkb_error *error)
 {
-    const struct vkb_instance_table *vk = &device->instance->vk;
-    const VkPhysicalDevice physical = device->adapter.physical;
-    VkExtensionProperties *extensions;
-    uint32_t count = 0;
-
-    *found = false;
-    if (!VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
-        || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
-        return false;
-    bool done =
-        VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
-    for (uint32_t i = 0; done && i < count; ++i)
-        *found |= strcmp(extensions[i].extensionName, name) == 0;
-    vkb_free(extensions);
-    return done;
+    return vkb_has_extension(device->instance, device->adapter.physical, name, found, error);
 }
 
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)

@@ -2,7 +2,7 @@
 #ifndef VKB_DEVICE_H
 #define VKB_DEVICE_H
 
-#include "vulkan/adapter.h"
+#include "vulkan/choice.h"
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"

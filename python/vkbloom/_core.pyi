@@ -12,7 +12,7 @@ MAX_LAYERS: int
 MAX_STAGES: int
 MOST_GHOSTS: int
 
-AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
+AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
 _Array = NDArray[Any]
 _Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
 _Texture = tuple[tuple[_Array, ...], str, str, str, str, str]

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from vkbloom.gradients import Pullback
     from vkbloom.plans import Plan
     from vkbloom.scene import Scene
 
@@ -131,11 +132,13 @@ class Renderer:
     Parameters
     ----------
     adapter : str
-        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
-        part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` if it is installed,
-        otherwise the system's. VKBLOOM_DRIVER selects another driver by the path of its library or
-        manifest, or "system".
+        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", a part
+        of an adapter's name in any case, "uuid:" with a device's UUID or its beginning, or "pci:"
+        with its address ("pci:0000:3b:00.0"). The environment variable VKBLOOM_ADAPTER replaces
+        "auto". Where CUDA_VISIBLE_DEVICES is set, of NVIDIA's GPUs only the first one that it names
+        is taken, unless `adapter` is a UUID or an address. "software" is the driver of the package
+        ``vkbloom-lavapipe`` if it is installed, otherwise the system's. VKBLOOM_DRIVER selects
+        another driver by the path of its library or manifest, or "system".
     validation : bool
         Enables the Khronos validation layer with synchronization validation. A call that causes
         messages raises `ValidationError` with the first one.
@@ -153,8 +156,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT
-        names variants that the adapter cannot run.
+        `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
+        out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
 
     See Also
     --------
@@ -488,6 +491,63 @@ class Renderer:
         settings = check_settings(settings)
         source = image_source(image, mask, emission)
         return self._run_one(source, settings, check_attachments(attachments), out)
+
+    def vjp(
+        self,
+        image: NDArray[Any],
+        settings: Settings | None = None,
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> tuple[Frames, Pullback]:
+        """Add bloom to an image, and return a function for the derivatives of a sum over it.
+
+        Parameters
+        ----------
+        image, settings, mask, emission
+            As for `apply`. The bloom buffers are "rgba32float", whatever `Settings.format` says.
+
+        Returns
+        -------
+        frames : Frames
+            As of `apply`.
+        pullback : callable
+            ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum
+            over all of them of (framebuffer . cotangent), it returns the derivatives of S as
+            float32: by "image", "mask" (H, W) and "emission" if they were given, by "kernel" (of
+            `Convolution`), and by each real field under its name, such as "intensity" or
+            "glare.0.intensity". Those of a uint8 image are by value / 255. At NaN and infinity of
+            the image they are 0.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
+            which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
+            has another shape, or is not finite. Its result raises ValueError for names that have no
+            derivative, such as "levels".
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed.
+
+        See Also
+        --------
+        vkbloom.reference.vjp : The same in NumPy, with the subgradients at kinks.
+        fit : Finds settings by derivatives with ``gradient=True``.
+
+        Examples
+        --------
+        >>> image = np.full((4, 4, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames, pullback = renderer.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+        ...     gradients = pullback({"final": np.ones_like(image)})
+        >>> float(gradients["intensity"])  # the sum of the bloom
+        24.0
+        >>> float(gradients["image"].sum()) / image.size  # the image and half of the bloom
+        1.5
+        """
+        from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
+
+        return vjp(self.apply, image, check_settings(settings), mask, emission)
 
     def apply_many(
         self,
@@ -903,8 +963,8 @@ class Renderer:
         >>> grid["final"].sel(preset="kino", intensity=0.5).shape
         (32, 48, 3)
         """
+        from vkbloom.grid.layout import ask  # noqa: PLC0415
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
-        from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
             source,
