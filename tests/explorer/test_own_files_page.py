@@ -76,7 +76,7 @@ def test_an_edited_file(
 
 def level(value: float) -> int:
     """Return a linear value's 8-bit level, as the page shows floats."""
-    return round(255 * (1.055 * value ** (1 / 2.4) - 0.055))
+    return int(255 * (1.055 * value ** (1 / 2.4) - 0.055) + 0.5)
 
 
 #: Whether the red level in the middle of the picture is the argument, within rounding.

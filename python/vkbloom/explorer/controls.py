@@ -185,14 +185,14 @@ def as_code(settings: Settings) -> str:
     return f"{_maker(type(settings))}({_arguments(settings, type(settings)())})"
 
 
-def _maker(kind: type[Settings]) -> str:
+def _maker(kind: Any) -> str:
     """Return Python code of the class."""
     if not METHODS.is_added(kind.method):
         return f"vkbloom.{kind.__name__}"
     from vkbloom.own.method import OwnType, own_name  # noqa: PLC0415  needed by few pages
 
     if not isinstance(kind, OwnType):
-        return kind.__name__
+        return str(kind.__name__)
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
     name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'

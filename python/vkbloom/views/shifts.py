@@ -65,11 +65,9 @@ def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
     share = _REMAINS_OF_WHOLE if _is_whole(shift) else _REMAINS
     best: float | None = None
     for moved, found, reference in _interpolations(a, b, shift):
-        pairs = (
-            (moved[inner], found[inner], reference[inner]),
-            tuple(_compressed(image[inner]) for image in (moved, found, reference)),
-        )
-        if all(_is_explained(*pair, share, step) for pair in pairs):
+        images = [image[inner] for image in (moved, found, reference)]
+        small = [_compressed(image) for image in images]
+        if all(_is_explained(*three, share=share, step=step) for three in (images, small)):
             residual = _rms((found - moved)[inner])
             best = residual if best is None else min(best, residual)
     return best
@@ -92,14 +90,15 @@ def _is_whole(shift: _Shift) -> bool:
 
 
 def _is_explained(
-    moved: _Image, found: _Image, reference: _Image, share: float, step: float
+    moved: _Image, found: _Image, reference: _Image, *, share: float, step: float
 ) -> bool:
     difference = _rms(found - reference)
     return difference > 2 * step and _rms(found - moved) <= share * difference + step / 2
 
 
 def _compressed(image: _Image) -> _Image:
-    return image / (1 + np.abs(image))
+    compressed: _Image = image / (1 + np.abs(image))
+    return compressed
 
 
 def _smoothed(image: _Image) -> _Image:
@@ -206,7 +205,7 @@ def _filtered(image: _Image, shift: _Shift, *, is_spline: bool) -> _Image:
     return moved[padding : padding + height, padding : padding + width]
 
 
-def _spline(frequency: _Image, shift: float) -> NDArray[np.complex128]:
+def _spline(frequency: NDArray[np.floating[Any]], shift: float) -> NDArray[np.complex128]:
     """Return the transfer function of a shift with interpolating cubic splines."""
     whole = int(np.floor(shift))
     part = shift - whole
@@ -222,7 +221,8 @@ def _spline(frequency: _Image, shift: float) -> NDArray[np.complex128]:
         (weight * np.exp(-1j * frequency * place) for place, weight in taps),
         np.zeros(1, np.complex128),
     )
-    return total / ((2 + np.cos(frequency)) / 3)
+    transfer: NDArray[np.complex128] = total / ((2 + np.cos(frequency)) / 3)
+    return transfer
 
 
 def _inner(shape: tuple[int, ...], shift: _Shift) -> tuple[slice, slice]:
