@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from vkbloom.gradients import Pullback
     from vkbloom.plans import Plan
     from vkbloom.scene import Scene
 
@@ -514,6 +515,63 @@ class Renderer:
         source = image_source(image, mask, emission, self._core)
         return self._run_one(source, settings, check_attachments(attachments), out, device)
 
+    def vjp(
+        self,
+        image: NDArray[Any],
+        settings: Settings | None = None,
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> tuple[Frames, Pullback]:
+        """Add bloom to an image, and return a function for the derivatives of a sum over it.
+
+        Parameters
+        ----------
+        image, settings, mask, emission
+            As for `apply`. The bloom buffers are "rgba32float", whatever `Settings.format` says.
+
+        Returns
+        -------
+        frames : Frames
+            As of `apply`.
+        pullback : callable
+            ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum
+            over all of them of (framebuffer . cotangent), it returns the derivatives of S as
+            float32: by "image", "mask" (H, W) and "emission" if they were given, by "kernel" (of
+            `Convolution`), and by each real field under its name, such as "intensity" or
+            "glare.0.intensity". Those of a uint8 image are by value / 255. At NaN and infinity of
+            the image they are 0.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
+            which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
+            has another shape, or is not finite. Its result raises ValueError for names that have no
+            derivative, such as "levels".
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed.
+
+        See Also
+        --------
+        vkbloom.reference.vjp : The same in NumPy, with the subgradients at kinks.
+        fit : Finds settings by derivatives with ``gradient=True``.
+
+        Examples
+        --------
+        >>> image = np.full((4, 4, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames, pullback = renderer.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+        ...     gradients = pullback({"final": np.ones_like(image)})
+        >>> float(gradients["intensity"])  # the sum of the bloom
+        24.0
+        >>> float(gradients["image"].sum()) / image.size  # the image and half of the bloom
+        1.5
+        """
+        from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
+
+        return vjp(self.apply, image, check_settings(settings), mask, emission)
+
     def apply_many(
         self,
         image: NDArray[Any] | Image,
@@ -944,8 +1002,8 @@ class Renderer:
         >>> grid["final"].sel(preset="kino", intensity=0.5).shape
         (32, 48, 3)
         """
+        from vkbloom.grid.layout import ask  # noqa: PLC0415
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
-        from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
             source,
