@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,35 @@ from vkbloom.kept_arrays import kept
 from vkbloom.psf.eye import spencer
 
 if TYPE_CHECKING:
-    from vkbloom.methods.blender import BlenderGlare
     from vkbloom.psf.base import PSF
 
 __all__ = ["core_kernel_of", "glare_size", "kernel_of", "kernel_sides"]
+
+
+class KernelSettings(Protocol):
+    """The settings that a kernel follows from."""
+
+    @property
+    def type(self) -> str: ...
+    @property
+    def quality(self) -> str: ...
+    @property
+    def version(self) -> str: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def kernel(self) -> Any: ...
+
+
+class _Shape(NamedTuple):
+    """The same, without the settings that a kernel does not follow from."""
+
+    type: str
+    quality: str
+    version: str
+    size: float
+    kernel: Any
+
 
 #: What the sides are divided by.
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
@@ -27,18 +52,18 @@ def glare_size(buffers: tuple[int, int], quality: str) -> tuple[int, int]:
     return width, height
 
 
-def kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> NDArray[np.float64]:
+def kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> NDArray[np.float64]:
     """Return the kernel in pixels of the glare, (h, w, 3), with its point at [h // 2, w // 2]."""
     size = glare_size(buffers, settings.quality)
     if settings.type == "kernel":
-        psf = cast("PSF | None", settings.kernel)
+        psf: PSF | None = settings.kernel
         image = np.ones((1, 1, 3)) if psf is None else psf.kernel(size)
         return _turned(_normalized(image))
     values = (_fog_glow_of_4_3 if settings.version == "4.3" else _fog_glow)(size, settings.size)
     return np.repeat(values[..., np.newaxis], 3, axis=2)
 
 
-def kernel_sides(settings: BlenderGlare, buffers: tuple[int, int]) -> tuple[int, int]:
+def kernel_sides(settings: KernelSettings, buffers: tuple[int, int]) -> tuple[int, int]:
     """Return the kernel's width and height."""
     if settings.type == "kernel":
         height, width = kernel_of(settings, buffers).shape[:2]
@@ -50,15 +75,14 @@ def kernel_sides(settings: BlenderGlare, buffers: tuple[int, int]) -> tuple[int,
     return 2 * width - 1, 2 * height - 1
 
 
-def core_kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
+def core_kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> CoreKernel:
     """Return the kernel as the core reads it."""
-    used: dict[str, Any] = {"type": settings.type, "quality": settings.quality}
-    used["version"] = settings.version
-    return _kept_kernel(type(settings)(**used, size=settings.size, kernel=settings.kernel), buffers)
+    fields = (getattr(settings, name) for name in _Shape._fields)
+    return _kept_kernel(_Shape(*fields), buffers)
 
 
 @kept
-def _kept_kernel(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
+def _kept_kernel(settings: _Shape, buffers: tuple[int, int]) -> CoreKernel:
     return core_kernel(kernel_of(settings, buffers))
 
 
