@@ -143,6 +143,12 @@ FUNCTIONS = (
 METHODS = ("apply", "apply_each", "apply_many", "capture", "grid", "plan", "render_many", "upload")
 
 
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Files of accepted arguments go into a temporary folder."""
+    monkeypatch.chdir(tmp_path)
+
+
 def accepted(annotation):
     """Return the types of values that an annotation accepts; None for one that is unknown."""
     found = set()
@@ -174,7 +180,8 @@ def check(function, arguments, name, value):
     try:
         function(**arguments | {name: value})
     except (TypeError, ValueError) as error:
-        assert re.search(rf"\b{name}\b", str(error)), f"{name}: {value!r}"
+        if not re.search(rf"\b{name}\b", str(error)):
+            pytest.fail(f"{name}: {value!r}: {error}")
 
 
 def needed(function):
