@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from vkbloom import DualKawase, PygfxBloom, Pyramid, Renderer, Scene, Separable,
 from vkbloom.reference.image import storage
 
 Array = NDArray[Any]
-FORMAT = "rgba8unorm-srgb"
+FORMAT: Final = "rgba8unorm-srgb"
 #: Half the distance of two levels at 1, where it is largest.
 STEP = 0.5 * 2.3 / 255
 
