@@ -16,7 +16,7 @@ from vkbloom.fields import fields_of
 from vkbloom.reference.derivatives import differentiable
 from vkbloom.registry import METHODS
 
-IMAGE = np.random.default_rng(0).random((12, 16, 4)) * 2
+IMAGE = np.random.default_rng(0).random((32, 40, 4)) * 2
 KERNEL = np.random.default_rng(1).random((5, 5))
 
 
@@ -29,15 +29,18 @@ def of_method(name: str) -> vkbloom.Settings:
     settings = settings.replace(**smaller.get(name, {}))
     if name == "pyramid":
         settings = settings.replace(level_weights=(1.0,) * settings.levels)
-    if settings.threshold is None and not fields_of(kind)["threshold"].fixed:
+    fields = fields_of(kind)
+    if settings.threshold is None and not fields["threshold"].fixed:
         settings = settings.replace(threshold=0.4)
-    return settings
+    return settings if fields["knee"].fixed else settings.replace(knee=0.5)
 
 
 def is_linear(settings: vkbloom.Settings, name: str) -> bool:
-    """Whether the final image is an affine function of the field."""
+    """Whether the final image is an affine function of the field, and not a constant."""
+    if name == "reference_white":  # of one encoding alone
+        settings = settings.replace(encoding="pq")
     middle = np.asarray(getattr(settings, name), np.float64)
-    step = 0.01 * np.maximum(np.abs(middle), 0.1)
+    step = 0.05 * np.maximum(np.abs(middle), 0.1)
     finals = []
     for offset in (1, 2, 3):
         value = middle + offset * step
@@ -50,7 +53,8 @@ def is_linear(settings: vkbloom.Settings, name: str) -> bool:
             changed = settings.replace(**{name: field})
         finals.append(vkbloom.reference.apply(IMAGE, changed)["final"])
     bend = finals[0] - 2 * finals[1] + finals[2]
-    return bool(np.abs(bend).max() <= 1e-12 * max(1.0, np.abs(finals[1]).max()))
+    moves = np.abs(finals[2] - finals[0]).max() > 0
+    return bool(moves and np.abs(bend).max() <= 1e-12 * max(1.0, np.abs(finals[1]).max()))
 
 
 def as_field(value: Any) -> Any:

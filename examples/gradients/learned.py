@@ -18,7 +18,7 @@ TRUTH = 0.35
 
 def main(path: str) -> None:
     """Write the picture at the start, at the end, and the true one side by side."""
-    image = torch.rand(48, 64, 3, generator=torch.Generator().manual_seed(1)) ** 12 * 3
+    image = torch.rand(48, 64, 3, generator=torch.Generator().manual_seed(1)) ** 400 * 8
     start = vkbloom.Pyramid(levels=3, intensity=0.05)
     target = vkbloom.torch.bloom(image, start.replace(intensity=TRUTH))
     module = vkbloom.torch.Bloom(start, learn=("intensity",))
