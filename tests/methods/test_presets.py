@@ -13,6 +13,7 @@ from tests.methods.cases import by_turns
 from tests.tolerance import real
 from vkbloom import (
     BevyBloom,
+    BlenderGlare,
     Convolution,
     DualKawase,
     FilamentBloom,
@@ -124,7 +125,11 @@ def test_the_share_of_a_lens() -> None:
     assert_allclose(psf.harvey_shack().energy(), presets["camera_lens"].intensity, rtol=0.01)
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+# These read beyond the border, where there is nothing.
+DARK_BORDERS = {f"blender_{type}" for type in ("ghosts", "streaks", "simple_star", "fog_glow")}
+
+
+@pytest.mark.parametrize("name", sorted({*PUBLISHED} - DARK_BORDERS))
 def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
     settings = presets[name].replace(format="rgba32float")
     gain = reference.gain(settings, (71, 45))
@@ -161,12 +166,38 @@ def test_a_scene_is_blurred_as_an_image_is(renderer: Renderer, name: str) -> Non
     format = settings.format or "rgba8unorm"
     if type(settings) not in (Pyramid, DualKawase):
         assert frames["glow"].shape == (90, 160, 4)
+    if isinstance(settings, BlenderGlare):
+        # Its glow are the highlights.
+        settings = settings.replace(threshold=None)
     expected = reference.passes(frames["glow"], settings, (160, 90), format)
     for framebuffer, values in expected.items():
         largest = tolerance(framebuffer, values, format, settings, 1)
         assert_allclose(real(frames[framebuffer]), values, rtol=0, atol=largest)
     final = reference.composite(frames["scene"], real(frames["bloom"]), settings)
     assert_allclose(real(frames["final"]), final, rtol=0, atol=1.01 / 255)
+
+
+@pytest.mark.parametrize(
+    ("settings", "inside"),
+    [
+        # 3 * (1 + 4) pixels are reached, in the middle half of a side the ghosts are.
+        (BlenderGlare(type="streaks", iterations=2), (slice(20, 60), slice(20, 70))),
+        (
+            BlenderGlare(type="streaks", streaks=1, fade=0.8, iterations=2),
+            (slice(20, 60), slice(20, 60)),
+        ),
+        (BlenderGlare(type="simple_star", fade=0.75), (slice(36, 44), slice(41, 49))),
+        (BlenderGlare(type="ghosts", quality="low"), (slice(40, 41), slice(45, 46))),
+        (BlenderGlare(type="fog_glow", size=0.0), (slice(40, 41), slice(45, 46))),
+        (BlenderGlare(type="kernel", kernel=np.ones((3, 3))), (slice(8, -8), slice(8, -8))),
+    ],
+)
+def test_blenders_gain(settings: BlenderGlare, inside: tuple[slice, ...]) -> None:
+    """In the middle of a flat image."""
+    settings = settings.replace(threshold=None, tint=(1.0, 0.5, 2.0))
+    gain = reference.gain(settings, (91, 81))
+    bloom = reference.blur(np.ones((81, 91, 3)), settings)[inside]
+    assert_allclose(bloom, np.broadcast_to(gain, bloom.shape), rtol=2e-3)
 
 
 # --- Bevy ---
