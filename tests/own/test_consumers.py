@@ -95,7 +95,7 @@ def test_sequences_and_batches(renderer: Renderer, kind: Any) -> None:
         assert np.array_equal(frames["final"], wanted)
     for frames, settings in zip(renderer.apply_many(photo(), several), several, strict=True):
         assert np.array_equal(frames["bloom"], renderer.apply(photo(), settings)["bloom"])
-    glows = {"mask": np.ones((32, 40), np.float32), "emission": photo()}
+    glows: dict[str, Any] = {"mask": np.ones((32, 40), np.float32), "emission": photo()}
     with_glows = renderer.apply(photo(), kind(), **glows)
     assert np.array_equal(with_glows["final"], renderer.apply(photo(), kind())["final"])
 
@@ -144,6 +144,7 @@ def test_fits(renderer: Renderer, kind: Any) -> None:
 
 
 def test_translations(renderer: Renderer, kind: Any) -> None:
+    found: Any
     gaussian = vkbloom.Separable(weights=vkbloom.gaussian_weights(3.0), blur_strength=1.0)
     found = vkbloom.translate(
         gaussian, kind(), size=(96, 64), vary=("spread",), renderer=renderer, max_calls=40
