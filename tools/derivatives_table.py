@@ -37,6 +37,8 @@ def of_method(name: str) -> vkbloom.Settings:
 
 def is_linear(settings: vkbloom.Settings, name: str) -> bool:
     """Whether the final image is an affine function of the field, and not a constant."""
+    if name == "threshold":  # of each pixel at another value
+        return False
     if name == "reference_white":  # of one encoding alone
         settings = settings.replace(encoding="pq")
     middle = np.asarray(getattr(settings, name), np.float64)
