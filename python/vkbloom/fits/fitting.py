@@ -7,6 +7,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Final, cast, overload
 
 import numpy as np
@@ -330,26 +331,11 @@ def _fitted(
             )
             return light(frames[framebuffer])
 
-        def pull(settings: Settings, stage: _Stage = stage) -> Any:
-            frames, pullback = renderer.vjp(
-                cast("Any", stage.pixels), _smaller(settings, stage.factor)
-            )
-
-            def back(cotangent: NDArray[np.float64]) -> Any:
-                whole = np.zeros(frames[framebuffer].shape)
-                whole[..., :3] = cotangent
-                found = pullback({framebuffer: whole})
-                if "blur_scale" in found:  # of `_smaller`
-                    found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
-                return found
-
-            return light(frames[framebuffer]), back
-
         kind: Any = Descent if gradient else Search
         search = kind(
             space,
             stage.measure,
-            pull if gradient else render,
+            partial(_pulled, renderer, stage, framebuffer) if gradient else render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
             told=told,
@@ -381,6 +367,21 @@ def _fitted(
         target=target,
         residual=light(frames[framebuffer]) - target,
     )
+
+
+def _pulled(renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings) -> Any:
+    """Return a framebuffer, and from a cotangent to the derivatives by each field."""
+    frames, pullback = renderer.vjp(cast("Any", stage.pixels), _smaller(settings, stage.factor))
+
+    def back(cotangent: NDArray[np.float64]) -> Any:
+        whole = np.zeros(frames[framebuffer].shape)
+        whole[..., :3] = cotangent
+        found = pullback({framebuffer: whole})
+        if "blur_scale" in found:  # of `_smaller`
+            found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
+        return found
+
+    return light(frames[framebuffer]), back
 
 
 def _smaller(settings: Settings, factor: int) -> Settings:
