@@ -27,6 +27,7 @@ _EXTRAS: Final = {
     "cvvdp": "the reduction ColorVideoVDP",
     "notebook": "the explorer, in notebooks and as a web page",
     "pytest": "frame_regression in tests",
+    "torch": "bloom as an operator of PyTorch",
     "window": "vkbloom view, a window with live controls",
 }
 # Address space of a render of a small image on lavapipe, with the interpreter.
@@ -82,12 +83,7 @@ def environment() -> list[Finding]:
 
 
 def extras() -> list[Finding]:
-    """Return one finding for each optional extra of the package.
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Return one finding for each optional extra of the package."""
     required = metadata.requires("vkbloom") or []
     return [_extra(name, purpose, required) for name, purpose in _EXTRAS.items()]
 
@@ -114,18 +110,7 @@ def _extra(name: str, purpose: str, required: list[str]) -> Finding:
 
 
 def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
-    """Examine the device files of GPUs, on Linux.
-
-    Parameters
-    ----------
-    has_gpu_adapter : bool
-        Whether Vulkan lists an adapter that is not a CPU.
-
-    Returns
-    -------
-    list of Finding
-        Empty if there are no device files.
-    """
+    """Examine the device files of GPUs, on Linux."""
     if not sys.platform.startswith("linux"):
         return []
     nodes = sorted([*Path("/dev/dri").glob("renderD*"), *Path("/dev").glob("nvidia[0-9]*")])

@@ -21,8 +21,8 @@ from typing import Any, Final, TypeAlias
 from vkbloom._core import DeviceLostError, Error
 from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout, lay_out, origin
 from vkbloom.grid.order import Block
-from vkbloom.grid.plan import Grid, Layout, lay_out, origin
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.running import Sink, Writer, written_behind
 from vkbloom.renderer import Renderer

@@ -11,8 +11,8 @@ import numpy as np
 from vkbloom.checks import import_extra
 from vkbloom.free_memory import memory_left
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout, Variable, attributes_of, lay_out
 from vkbloom.grid.order import blocks, default_chunk
-from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.sources import FrameRenderer
 

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from vkbloom.grid.filling import Tally
-from vkbloom.grid.plan import Grid, Layout, lay_out
+from vkbloom.grid.layout import Grid, Layout, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.running import Sink, run_here
 from vkbloom.interruptible import opened_renderer

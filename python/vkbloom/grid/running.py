@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.order import Block
-from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.progress import Progress
 
 if TYPE_CHECKING:

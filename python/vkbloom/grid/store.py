@@ -30,9 +30,9 @@ from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import DONE, Chunks
 from vkbloom.grid.identity import FORMAT, differences, fingerprint, identity, short
 from vkbloom.grid.keys import Keys
+from vkbloom.grid.layout import Grid, Layout, Variable, attributes_of
 from vkbloom.grid.order import Block, Index, blocks
 from vkbloom.grid.parts import WHOLE, Part
-from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
 from vkbloom.grid.running import Writer
 
 __all__ = [

@@ -12,10 +12,10 @@ from vkbloom.checks import import_extra
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys
+from vkbloom.grid.layout import Grid, Layout, ask
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Index
 from vkbloom.grid.parts import read_part
-from vkbloom.grid.plan import Grid, Layout, ask
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import ImageSource
 from vkbloom.grid.store import IDENTITY, METADATA, GridStore, read_json, stored_identity

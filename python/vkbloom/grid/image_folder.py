@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import differences, identity
+from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Block, Index, blocks, points
 from vkbloom.grid.parts import WHOLE, Part
-from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
 from vkbloom.io import image_writing, safe_writing
