@@ -28,19 +28,22 @@ _END: Final = 1e-3
 _MIDDLES: Final = (0.5, 0.25)
 
 
-def check_derivatives(space: Space, loss: object) -> None:
-    """Raise ValueError for fields and losses without a derivative."""
+def check_derivatives(spaces: list[Space], loss: object, pixels: object) -> None:
+    """Raise ValueError for fields and losses without a derivative, and without an array."""
+    if pixels is None:
+        raise ValueError("image: gradient=True needs the array, not the uploaded image")
     if callable(loss) or loss == "flip":
         raise ValueError(
             f"loss: {loss!r} has no derivative; give 'relative', 'l2' or 'log', or gradient=False"
         )
-    known = differentiable(space.settings(space.origin))
-    for axis in space.axes:
-        if axis.name not in known:
-            raise ValueError(
-                f"vary: {axis.name!r} of the method {space.start.method} has no derivative; give "
-                "gradient=False"
-            )
+    for space in spaces:
+        known = differentiable(space.settings(space.origin))
+        for axis in space.axes:
+            if axis.name not in known:
+                raise ValueError(
+                    f"vary: {axis.name!r} of the method {space.start.method} has no derivative; "
+                    "give gradient=False"
+                )
 
 
 class Descent(Search):

@@ -193,10 +193,7 @@ def fit(
         for one in candidates
     ]
     if gradient:
-        if pixels is None:
-            raise ValueError("image: gradient=True needs the array, not the uploaded image")
-        for space in spaces:
-            check_derivatives(space, measured)
+        check_derivatives(spaces, measured, pixels)
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
         stages = _stages(used, image, pixels, wanted, measured)
