@@ -69,7 +69,7 @@ BIT_EQUAL = {
 }
 
 # Presets with a blur into another size, and Fourier transforms, whose stages differ.
-NEARLY_EQUAL = ("unity_urp", "threejs_unreal", "iris_6")
+NEARLY_EQUAL = ("unity_urp", "threejs_unreal", "iris_6", "blender_fog_glow")
 
 
 # Convolutions have the same passes but for the kernel: one with colours stands for all.
