@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,23 +25,22 @@ def chunk(file: Path, name: bytes) -> bytes:
     return content[place + 4 : place + 4 + size]
 
 
-def stored(file: Path) -> np.ndarray:
+def stored(file: Path) -> Any:
     return oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT)
 
 
 @pytest.mark.parametrize(("encoding", "code"), [("pq", 16), ("hlg", 18)])
 @pytest.mark.parametrize(("primaries", "point"), [("rec709", 1), ("rec2020", 9), ("p3", 12)])
 def test_png_names_its_colours(
-    tmp_path: Path, encoding: str, code: int, primaries: str, point: int
+    tmp_path: Path, encoding: Any, code: int, primaries: str, point: int
 ) -> None:
     file = vkbloom.write(tmp_path / "a.png", RAMP, encoding=encoding, primaries=primaries, bits=16)
     assert chunk(file, b"cICP") == bytes([point, code, 0, 1])
     spec = oiio.ImageInput.open(str(file)).spec()
     assert tuple(spec.getattribute("CICP")) == (point, code, 0, 1)
     if primaries == "rec709":
-        expected = {"pq": lambda: tone_map._pq(RAMP.astype(float), 203.0)}.get(
-            encoding, lambda: tone_map._hlg(RAMP.astype(float))
-        )()
+        light = RAMP.astype(float)
+        expected = tone_map._pq(light, 203.0) if encoding == "pq" else tone_map._hlg(light)
         np.testing.assert_allclose(stored(file), expected, atol=0.5 / 1023)
 
 
@@ -61,7 +61,7 @@ def test_exr_has_chromaticities(tmp_path: Path, primaries: str) -> None:
     np.testing.assert_allclose(spec.getattribute("chromaticities")[:2], red, atol=1e-6)
     # White is the same in all of them; red of Rec. 709 lies inside.
     np.testing.assert_allclose(stored(file), 1, atol=1e-5)
-    vkbloom.write(file, white * np.float32([1, 0, 0, 1]), primaries=primaries)
+    vkbloom.write(file, white * np.array([1, 0, 0, 1], np.float32), primaries=primaries)
     assert (stored(file)[0, 0, :3] > 0).all()
 
 
