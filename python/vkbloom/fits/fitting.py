@@ -7,7 +7,8 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final, overload
+from functools import partial
+from typing import Any, Final, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom.argument_types import checked
 from vkbloom.checks import check_image, check_index, import_extra
+from vkbloom.fits.descent import Descent, check_derivatives
 from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
 from vkbloom.fits.search import Search
@@ -24,7 +26,10 @@ from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
 from vkbloom.sources import image_source
 
-__all__ = ["fit"]
+__all__ = ["Maker", "fit"]
+
+#: A function of an image, such as `vkbloom.testing.command` makes of a program.
+Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
 # Longer side of the image of the first search in pixels, and its share of the calls.
 _COARSE_SIDE: Final = 384
@@ -34,7 +39,7 @@ _COARSE_CALLS: Final = 0.6
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Settings,
     vary: Sequence[str],
     *,
@@ -43,12 +48,13 @@ def fit(
     bounds: Bounds | None = ...,
     renderer: Renderer | None = ...,
     max_calls: int = ...,
+    gradient: bool = ...,
     progress: bool = ...,
 ) -> FitResult: ...
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Sequence[Settings],
     vary: Sequence[str],
     *,
@@ -57,12 +63,13 @@ def fit(
     bounds: Bounds | None = ...,
     renderer: Renderer | None = ...,
     max_calls: int = ...,
+    gradient: bool = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @checked
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Settings | Sequence[Settings],
     vary: Sequence[str],
     *,
@@ -71,6 +78,7 @@ def fit(
     bounds: Bounds | None = None,
     renderer: Renderer | None = None,
     max_calls: int = 1000,
+    gradient: bool = False,
     progress: bool = False,
 ) -> FitResult | list[FitResult]:
     """Find the settings that make a given picture of an image.
@@ -79,9 +87,10 @@ def fit(
     ----------
     image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
         As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
-    target : ndarray, shape (H, W, 3) or (H, W, 4)
+    target : ndarray, shape (H, W, 3) or (H, W, 4), or callable
         The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
-        Alpha is not compared.
+        Alpha is not compared. Of a callable, such as `vkbloom.testing.command` makes of a program,
+        what it makes of the image, which is then an array.
     settings : Settings or sequence of Settings
         Where the search starts, and the fields that stay as they are. Of several, such as presets
         of several engines, each is searched by itself.
@@ -103,6 +112,9 @@ def fit(
         Default: a new one.
     max_calls : int
         The most renders of a candidate.
+    gradient : bool
+        Whether to search by the derivatives of `Renderer.vjp`: fewer renders for many fields. The
+        varied fields must have a derivative and the loss must be "relative", "l2" or "log".
     progress : bool
         Whether to show a progress bar.
 
@@ -115,7 +127,8 @@ def fit(
     ------
     ValueError
         A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
-        target has another size or is black; an argument is out of range.
+        target has another size or is black; an argument is out of range; or, with `gradient`, a
+        field or the loss has no derivative, or the image is an `Image`.
     TypeError
         An argument has the wrong type.
     ModuleNotFoundError
@@ -133,10 +146,11 @@ def fit(
     -----
     Images of more than 384 pixels are reduced first, by boxes. There, points that fill the space
     are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
-    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex.
-    Integers and choices are changed one at a time, while the numbers follow. The result is refined
-    at the image's own size. Fields that put few passes out of date are changed first. The same
-    arguments give the same result.
+    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Integers
+    and choices are changed one at a time, while the numbers follow. The result is refined at the
+    image's own size. With `gradient`, the least squares follow from pullbacks, which are no calls,
+    from the start and if needed from a few samples. Fields that put few passes out of date are
+    changed first. The same arguments give the same result.
 
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
@@ -169,13 +183,19 @@ def fit(
             raise ValueError(f"bounds: {name!r} is not among the varied fields {', '.join(names)}")
     if renderer is None and isinstance(image, Image):
         raise ValueError("renderer: an uploaded image needs the renderer that has it")
-    wanted = light(check_image(target, "target"))
     pixels = None if isinstance(image, Image) else check_image(image)
+    if callable(target):
+        if pixels is None:
+            raise TypeError("image: a callable target needs an array, not an uploaded image")
+        target = target(pixels)
+    wanted = light(check_image(target, "target"))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     spaces = [
         space_of(check_settings(one), names, bounds or {}, brightest, len(wanted))
         for one in candidates
     ]
+    if gradient:
+        check_derivatives(spaces, measured, pixels)
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
         stages = _stages(used, image, pixels, wanted, measured)
@@ -185,7 +205,14 @@ def fit(
         for space, cost in zip(spaces, costs, strict=True):
             with _bar(progress, space.start.method, max_calls) as told:
                 one = _fitted(
-                    used, stages, space, cost, framebuffer, max_calls=max_calls, told=told
+                    used,
+                    stages,
+                    space,
+                    cost,
+                    framebuffer,
+                    max_calls=max_calls,
+                    told=told,
+                    gradient=gradient,
                 )
                 found.append(one)
     found.sort(key=lambda one: one.loss)
@@ -197,6 +224,7 @@ class _Stage:
     """One size of the image, on the device, and its target."""
 
     image: Image
+    pixels: NDArray[Any] | None
     measure: Measure
     factor: int
 
@@ -224,11 +252,12 @@ def _stages(
             f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
             f"{handle.shape[1]} x {handle.shape[0]}"
         )
-    stages = [_Stage(handle, Measure(target, loss), 1)]
+    stages = [_Stage(handle, pixels, Measure(target, loss), 1)]
     factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
     if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
-        small = renderer.upload(reduced(pixels, factor))
-        stages.insert(0, _Stage(small, Measure(reduced(target, factor), loss), factor))
+        small = reduced(pixels, factor)
+        measure = Measure(reduced(target, factor), loss)
+        stages.insert(0, _Stage(renderer.upload(small), small, measure, factor))
     return stages
 
 
@@ -285,6 +314,7 @@ def _fitted(
     *,
     max_calls: int,
     told: Callable[[float], None],
+    gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
     began = time.perf_counter()
@@ -300,10 +330,11 @@ def _fitted(
             )
             return light(frames[framebuffer])
 
-        search = Search(
+        kind: Any = Descent if gradient else Search
+        search = kind(
             space,
             stage.measure,
-            render,
+            partial(_pulled, renderer, stage, framebuffer) if gradient else render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
             told=told,
@@ -335,6 +366,21 @@ def _fitted(
         target=target,
         residual=light(frames[framebuffer]) - target,
     )
+
+
+def _pulled(renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings) -> Any:
+    """Return a framebuffer, and from a cotangent to the derivatives by each field."""
+    frames, pullback = renderer.vjp(cast("Any", stage.pixels), _smaller(settings, stage.factor))
+
+    def back(cotangent: NDArray[np.float64]) -> Any:
+        whole = np.zeros(frames[framebuffer].shape)
+        whole[..., :3] = cotangent
+        found = pullback({framebuffer: whole})
+        if "blur_scale" in found:  # of `_smaller`
+            found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
+        return found
+
+    return light(frames[framebuffer]), back
 
 
 def _smaller(settings: Settings, factor: int) -> Settings:

@@ -53,6 +53,11 @@ class Axis:
         number = min(max(number, self.low), self.high)
         return round(number) if self.kind == "integer" else number
 
+    def slope(self, coordinate: float) -> float:
+        """Return the derivative of a number's value by its coordinate."""
+        place = min(max(coordinate, 0.0), 1.0) * self._length
+        return self._length * (1.0 if self.scale is None else self.scale * math.exp(place))
+
     def coordinate(self, value: Any) -> float:
         """Return the coordinate of a value, the nearest where it is out of bounds."""
         if self.kind == "choice":
@@ -123,11 +128,11 @@ def space_of(
     axes = []
     for name in vary:
         if name not in fields:
-            known = ", ".join(one for one in fields if _kind(fields[one]))
+            known = ", ".join(one for one in fields if varied_as(fields[one]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}; it can vary {known}"
             )
-        kind = _kind(fields[name])
+        kind = varied_as(fields[name])
         if kind is None:
             raise ValueError(
                 f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
@@ -155,7 +160,7 @@ def _begun(settings: Settings, name: str) -> Any:
     return 0.0 if value is None and name == "threshold" else value
 
 
-def _kind(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
+def varied_as(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
     """Return how a field varies; None if it cannot."""
     match info.kind:
         case "flag":
