@@ -79,7 +79,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     "DTypeLike": ("a dtype", _raises_nothing(np.dtype)),
     "type": ("a class", lambda value: isinstance(value, type)),
     **dict.fromkeys(
-        ("Literal", "Shading", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
+        ("Literal", "Shading", "Place", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
         ("a str", _is_str),
     ),
 }

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +18,7 @@ import vkbloom
 from vkbloom import psf, reference, testing
 
 #: Random values by their type.
-VALUES = {
+VALUES: dict[str, st.SearchStrategy[Any]] = {
     "none": st.none(),
     "bool": st.booleans(),
     "int": st.integers(),
@@ -33,7 +36,7 @@ VALUES = {
 }
 #: The types that a part of an annotation accepts, of those above. Classes accept none of them.
 NUMBERS = {"bool", "int", "float"}
-ACCEPTED = {
+ACCEPTED: dict[str, set[str]] = {
     "None": {"none"},
     "bool": {"bool"},
     "int": {"bool", "int"},
@@ -57,12 +60,12 @@ SEPARABLE = vkbloom.Separable()
 GAUSSIAN = psf.gaussian(1.0)
 
 
-def blurred(image):
+def blurred(image: Any) -> Any:
     return image
 
 
 #: Valid arguments of the public functions that need some.
-NEEDED = {
+NEEDED: dict[str, Any] = {
     "array": IMAGE,
     "image": IMAGE,
     "images": [IMAGE],
@@ -96,7 +99,7 @@ NEEDED = {
         {"axes": ["intensity"]},
     ),
 }
-OTHERS = {
+OTHERS: dict[str, dict[str, Any]] = {
     "apply_file": {"source": "a.exr", "target": "b.exr"},
     "load_method": {"source": "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(1); }\n"},
     "unreal": {"image": np.ones((3, 3))},
@@ -105,7 +108,7 @@ OTHERS = {
     "render_many": {"scene": vkbloom.Scene.ufo()},
     "samples": {"values": np.ones((3, 3))},
 }
-FUNCTIONS = (
+FUNCTIONS: tuple[Callable[..., Any], ...] = (
     vkbloom.apply_file,
     vkbloom.check_grid,
     vkbloom.contact_sheet,
@@ -144,14 +147,14 @@ METHODS = ("apply", "apply_each", "apply_many", "capture", "grid", "plan", "rend
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files of accepted arguments go into a temporary folder."""
     monkeypatch.chdir(tmp_path)
 
 
-def accepted(annotation):
+def accepted(annotation: str) -> set[str] | None:
     """Return the types of values that an annotation accepts; None for one that is unknown."""
-    found = set()
+    found: set[str] = set()
     for part in re.split(r"\s*\|\s*(?![^\[]*\])", annotation.strip("\"'")):
         name = part.partition("[")[0]
         if re.fullmatch(TEXTS, name):
@@ -165,7 +168,7 @@ def accepted(annotation):
     return found
 
 
-def wrong_arguments(function):
+def wrong_arguments(function: Callable[..., Any]) -> list[tuple[str, Any]]:
     """Return pairs of a parameter and a strategy of values of a wrong type."""
     found = []
     for name, parameter in inspect.signature(function).parameters.items():
@@ -175,7 +178,7 @@ def wrong_arguments(function):
     return found
 
 
-def check(function, arguments, name, value):
+def check(function: Callable[..., Any], arguments: dict[str, Any], name: str, value: Any) -> None:
     """Call a function with one argument of a wrong type, which it may accept."""
     try:
         function(**arguments | {name: value})
@@ -184,7 +187,7 @@ def check(function, arguments, name, value):
             pytest.fail(f"{name}: {value!r}: {error}")
 
 
-def needed(function):
+def needed(function: Callable[..., Any]) -> dict[str, Any]:
     """Return valid values of the parameters without a default."""
     parameters = inspect.signature(function).parameters.items()
     values = NEEDED | OTHERS.get(function.__name__, {})
@@ -194,21 +197,23 @@ def needed(function):
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda one: f"{one.__module__}.{one.__name__}")
-def test_a_wrong_type_is_an_error_that_names_the_argument(function):
+def test_a_wrong_type_is_an_error_that_names_the_argument(function: Callable[..., Any]) -> None:
     wrong = wrong_arguments(function)
     if not wrong:
         pytest.skip("the function's parameters accept every type")
 
     @settings(max_examples=200, deadline=None)
     @given(st.sampled_from(wrong).flatmap(lambda one: st.tuples(st.just(one[0]), one[1])))
-    def run(argument):
+    def run(argument: tuple[str, Any]) -> None:
         check(function, needed(function), *argument)
 
     run()
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_wrong_type_is_an_error_of_the_renderers_methods(renderer, method):
+def test_a_wrong_type_is_an_error_of_the_renderers_methods(
+    renderer: vkbloom.Renderer, method: str
+) -> None:
     function = getattr(renderer, method)
 
     @settings(max_examples=200, deadline=None)
@@ -217,7 +222,7 @@ def test_a_wrong_type_is_an_error_of_the_renderers_methods(renderer, method):
             lambda one: st.tuples(st.just(one[0]), one[1])
         )
     )
-    def run(argument):
+    def run(argument: tuple[str, Any]) -> None:
         check(function, needed(function), *argument)
 
     run()
