@@ -79,6 +79,17 @@ def test_the_device_is_the_engine(renderer: Renderer, name: str) -> None:
     compare(name, settings, renderer.apply(image, settings))
 
 
+def test_the_fog_glow_of_4_3(renderer: Renderer) -> None:
+    """Blender 4.3.0 drew it, with a kernel of 2^6 + 1 pixels; its threshold has no soft part."""
+    with np.load(Path(__file__).with_name("fog_glow_4_3.npz")) as arrays:
+        image, glare = arrays["image"].astype(np.float32), arrays["glare"]
+    settings = BlenderGlare(
+        type="fog_glow", version="4.3", size=64 / 70, smoothness=0.0, format="rgba32float"
+    )
+    for frames in (reference.apply(image, settings), renderer.apply(image, settings)):
+        assert np.abs(frames["bloom"][..., :3] - glare).max() < 1e-5 * glare.max()
+
+
 @pytest.mark.parametrize("variant", ["fragment", "cpu", "gpu"])
 def test_every_variant_is_the_engine(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_VARIANT", variant)
