@@ -16,8 +16,10 @@ Array = NDArray[Any]
 with np.load(Path(__file__).with_name("engine_frames.npz")) as _arrays:
     ARRAYS: Final = dict(_arrays)
 CASES: Final = [name.removesuffix("/fields") for name in ARRAYS if name.endswith("/fields")]
-#: Of the largest value of the engine's frame.
-LIMIT: Final = 1e-3
+#: Of the largest value of the engine's frame, which has single floats. 8.5e-6 was measured.
+LIMIT: Final = 2e-5
+#: Of other devices, which may have less exact functions than the two Mesas of the tests.
+DEVICE_LIMIT: Final = 1e-4
 #: Levels of 8 bits. pygfx ran on lavapipe, whose conversions to and from sRGB are off by up to a
 #: level each.
 LEVELS: Final = 2.5
@@ -45,7 +47,7 @@ def levels(light: Array) -> Array:
     return np.asarray(255 * encoded)
 
 
-def compare(name: str, settings: Settings, frames: Any) -> None:
+def compare(name: str, settings: Settings, frames: Any, limit: float = DEVICE_LIMIT) -> None:
     outputs = {"glow": frames["glow"], "final": frames["final"]}
     outputs["glare"] = settings.intensity * frames["bloom"].astype(np.float64)
     for key, array in outputs.items():
@@ -57,7 +59,7 @@ def compare(name: str, settings: Settings, frames: Any) -> None:
             assert difference <= LEVELS, key
         else:
             difference = np.abs(array[..., :3] - expected).max()
-            assert difference <= LIMIT * max(np.abs(expected).max(), 1e-6), key
+            assert difference <= limit * max(np.abs(expected).max(), 1e-6), key
 
 
 def test_all_types_and_qualities_are_there() -> None:
@@ -70,7 +72,7 @@ def test_all_types_and_qualities_are_there() -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_the_reference_is_the_engine(name: str) -> None:
     settings, image = read(name)
-    compare(name, settings, reference.apply(image.astype(np.float64), settings))
+    compare(name, settings, reference.apply(image.astype(np.float64), settings), LIMIT)
 
 
 @pytest.mark.parametrize("name", CASES)
