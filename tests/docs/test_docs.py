@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from vkbloom import Renderer, Scene, Separable
+from vkbloom import Renderer, Scene, Separable, presets
 from vkbloom.cli.program import program
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
+from vkbloom.verdicts import measuring
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [ROOT / "README.md", *sorted(ROOT.glob("*/*.md")), *sorted(ROOT.glob("python/*/*/*.md"))]
@@ -48,6 +49,8 @@ def commands() -> Iterator[Any]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the files that pages name."""
     monkeypatch.chdir(tmp_path)
+    # To find the nearest of all presets takes half a minute.
+    monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
     photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
     save(Picture.of_values(photo, "half"), "photo.exr")
     np.save("picture.npy", photo)

@@ -273,3 +273,55 @@ def test_a_command_takes_a_file(tmp_path: Path) -> None:
     result = CliRunner().invoke(program, [*words, "30"])
     assert result.exit_code == 2
     assert "spread: 30.0 is out of range, 0.5 to 6" in result.output
+
+
+LEVEL = """\
+//!HOOK MAIN
+//!BIND GLOW
+//!SAVE SMALL
+//!WIDTH GLOW.w 2 /
+//!HEIGHT GLOW.h 2 /
+#include "vkbloom/sampling.glsl"
+vec4 hook() {{ return {down}; }}
+//!HOOK MAIN
+//!BIND SMALL
+//!SAVE BLOOM
+//!WIDTH HOOKED.w
+//!HEIGHT HOOKED.h
+#include "vkbloom/sampling.glsl"
+vec4 hook() {{ return {up}; }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("down", "up", "like"),
+    [
+        (
+            "thirteen_taps(GLOW_raw, GLOW_pos)",
+            "tent(SMALL_raw, SMALL_pos, 1.5)",
+            vkbloom.Pyramid(levels=1, radius=1.5, format="rgba32float"),
+        ),
+        (
+            "kawase_down(GLOW_raw, GLOW_pos, 1.25)",
+            "kawase_up(SMALL_raw, SMALL_pos, 1.25)",
+            vkbloom.DualKawase(levels=1, offset=1.25, format="rgba32float"),
+        ),
+    ],
+    ids=["pyramid", "dual kawase"],
+)
+def test_the_filters_of_the_library(renderer: Renderer, down: str, up: str, like: Settings) -> None:
+    image = picture(40, 24)
+    wanted = reference.apply(image, like)["bloom"]
+    got = renderer.apply(image, own(LEVEL.format(down=down, up=up)))["bloom"]
+    assert difference(got[..., :3], wanted[..., :3]) < 3e-4
+
+
+def test_the_threshold_of_the_library(renderer: Renderer) -> None:
+    text = (
+        '//!HOOK MAIN\n//!BIND HOOKED\n//!SAVE BLOOM\n#include "vkbloom/light.glsl"\n'
+        "vec4 hook() {\n    vec4 c = HOOKED_texOff(0);\n"
+        "    return vec4(c.rgb * above_threshold(c.rgb, 1.0, 0.5), 1.0);\n}\n"
+    )
+    image = picture()
+    glow = renderer.apply(image, own(text, threshold=1.0, knee=0.5))
+    assert difference(glow["bloom"][..., :3], glow["glow"][..., :3]) < 1e-5

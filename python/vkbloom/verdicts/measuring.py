@@ -328,15 +328,27 @@ def nearest_preset(subject: Subject, renderer: Renderer) -> tuple[str, float]:
     if not np.linalg.norm(target) > 0:
         return "", math.nan
     found = {}
-    for name, preset in presets.items():
+    for name in presets:
         if subject.name == name:
             continue
-        light = shown(renderer, exact(preset), "bloom")(image).astype(np.float64)
+        light = preset_bloom(renderer, name).astype(np.float64)
         power = float((light * light).sum())
         factor = max(0.0, float((light * target).sum()) / power) if power > 0 else 0.0
         found[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
     best = min(found, key=lambda name: found[name])
     return best, found[best]
+
+
+#: Blooms of presets by the adapter and their name: most of the time goes into their pipelines.
+_BLOOMS: Final[dict[tuple[str, str], NDArray[Any]]] = {}
+
+
+def preset_bloom(renderer: Renderer, name: str) -> NDArray[Any]:
+    """Return the bloom that a preset gives to four lights, rendered once."""
+    key = (renderer.info.summary, name)
+    if key not in _BLOOMS:
+        _BLOOMS[key] = shown(renderer, exact(presets[name]), "bloom")(lights(VIEW))
+    return _BLOOMS[key]
 
 
 def plain(value: Any) -> Any:
