@@ -133,7 +133,7 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     for index, (name, settings) in enumerate(every.items()):
         row, column = divmod(index, columns)
         changed = settings.replace(**look)
-        # Such a bloom stands for the whole picture, not for its lights alone. Without bloom, a scene
+        # Such a bloom stands for the whole picture, not for its lights alone. Without bloom a scene
         # has no lamps, but its picture before the bloom has.
         if not settings.bloom or (settings.composite == "mix" and settings.intensity == 1):
             lit = renderer.render(scene, None, size, shading="deferred", attachments=["scene"])

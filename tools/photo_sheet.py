@@ -23,7 +23,7 @@ from vkbloom.cli.program import program
 from vkbloom.views import pictures
 
 sys.path.insert(0, str(Path(__file__).parent))
-from night_picture import city  # noqa: E402
+from night_picture import city
 
 Image = NDArray[np.uint8]
 HEIGHT, WIDTH, LABEL, GAP = 240, 360, 30, 6
