@@ -22,7 +22,7 @@ from vkbloom.methods.unreal import UnrealBloom
 from vkbloom.psf.aperture import aperture, iris
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.lens import harvey_shack
-from vkbloom.psf.renderers import fog_glow, unreal
+from vkbloom.psf.renderers import unreal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,12 +72,13 @@ class _Presets(dict[str, "Settings"]):
 #: - ``"godot_4_5"``, ``"godot_4_6"``: godotengine/godot, servers/rendering/renderer_rd/shaders/
 #:   effects: copy.glsl @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc, with the environment's defaults
 #:   up to 4.5 and from 4.6 on.
-#: - ``"blender_bloom"``: the Glare node of Blender 4.5, type Bloom, quality High, its defaults.
+#: - ``"blender_bloom"``, ``"blender_ghosts"``, ``"blender_streaks"``, ``"blender_simple_star"``,
+#:   ``"blender_sun_beams"``, ``"blender_fog_glow"``: types of the Glare node of Blender 5.0 in
+#:   quality High, with its defaults.
 #: - ``"pygfx"``: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 #: - ``"spencer_photopic"``: the glare of an eye by day, `vkbloom.psf.spencer`. The functions of
 #:   ``"spencer_photopic"``, ``"unreal_convolution"`` and ``"iris_6"`` describe all light of a
 #:   point, so that the bloom replaces the picture.
-#: - ``"blender_fog_glow"``: the Glare node of Blender 4.3, type Fog Glow, `vkbloom.psf.fog_glow`.
 #: - ``"unreal_convolution"``: convolution bloom of Unreal Engine, with its prefilter and the
 #:   energy of its centre, `vkbloom.psf.unreal`. The kernel image is that of ``"iris_6"``.
 #: - ``"camera_lens"``: the scattered light of a lens with 14 surfaces, `vkbloom.psf.harvey_shack`,
@@ -114,9 +115,13 @@ presets: Mapping[str, Settings] = MappingProxyType(
             ),
             "godot_4_6": GodotBloom(),
             "blender_bloom": BlenderGlare(),
+            "blender_ghosts": BlenderGlare(type="ghosts"),
+            "blender_streaks": BlenderGlare(type="streaks"),
+            "blender_simple_star": BlenderGlare(type="simple_star"),
+            "blender_sun_beams": BlenderGlare(type="sun_beams"),
             "pygfx": PygfxBloom(),
             "spencer_photopic": Convolution(spencer(), boundary="edge", composite="mix"),
-            "blender_fog_glow": Convolution(fog_glow(256), threshold=1.0),
+            "blender_fog_glow": BlenderGlare(type="fog_glow"),
             # Not normalized, because the sums of the channels are the kernel's tint.
             "unreal_convolution": Convolution(
                 unreal(aperture(iris(blades=6))), normalize=False, composite="mix"

@@ -24,9 +24,11 @@ COMMANDS: Final = (
     "explore",
     "grid",
     "fit",
+    "check",
     "compare",
     "adapters",
     "doctor",
+    "warm",
 )
 
 #: The status after Ctrl-C, as shells report it.

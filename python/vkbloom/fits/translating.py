@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_size
-from vkbloom.fits.fitting import fit
+from vkbloom.fields import fields_of
+from vkbloom.fits.fitting import Maker, fit
 from vkbloom.fits.losses import Loss
 from vkbloom.fits.result import FitResult
-from vkbloom.fits.space import Bounds
+from vkbloom.fits.space import Bounds, varied_as
+from vkbloom.registry import METHODS
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
 
@@ -46,7 +48,7 @@ _LEAST_SIDE: Final = 3
 
 
 def translate(
-    settings: Settings,
+    settings: Settings | Maker,
     to: Settings | type[Settings],
     *,
     size: tuple[int, int] = (1920, 1080),
@@ -65,8 +67,9 @@ def translate(
 
     Parameters
     ----------
-    settings : Settings
-        The bloom to come close to.
+    settings : Settings or callable
+        The bloom to come close to; a callable takes an image and returns it with its bloom, as
+        those do that `vkbloom.testing.command` makes of programs.
     to : Settings or a class of them
         The other method: where the search starts, and its fields that do not vary.
     size : (int, int)
@@ -109,7 +112,8 @@ def translate(
     >>> type(found.settings).__name__, found.loss < found.start_loss
     ('Pyramid', True)
     """
-    check_settings(settings)
+    if not callable(settings):
+        check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
@@ -117,10 +121,9 @@ def translate(
     names = _knobs(start) if vary is None else vary
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
-        target = used.apply(image, _plain(settings), attachments=["final"])["final"]
         found = fit(
             image,
-            target,
+            settings if callable(settings) else _applied(used, image, settings),
             _plain(start),
             names,
             framebuffer="final",
@@ -132,6 +135,15 @@ def translate(
         )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
     return dataclasses.replace(found, settings=found.settings.replace(**look))
+
+
+def _applied(
+    renderer: Renderer, image: NDArray[np.float32], settings: Settings
+) -> NDArray[np.float32]:
+    final: NDArray[np.float32] = renderer.apply(image, _plain(settings), attachments=["final"])[
+        "final"
+    ]
+    return final
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:
@@ -150,6 +162,13 @@ def lights(size: tuple[int, int]) -> NDArray[np.float32]:
 
 def _knobs(settings: Settings) -> tuple[str, ...]:
     names = _KNOBS.get(settings.method, ())
+    if METHODS.is_added(settings.method):
+        shared = fields_of(Settings)
+        names = tuple(
+            name
+            for name, info in fields_of(type(settings)).items()
+            if name not in shared and varied_as(info) is not None
+        )
     threshold = ("threshold",) if settings.threshold is not None else ()
     return tuple(dict.fromkeys((*threshold, *names, "intensity")))
 
