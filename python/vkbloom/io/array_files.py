@@ -160,6 +160,32 @@ def read(
     return pixels, facts
 
 
+def _check_conversions(
+    values: NDArray[Any],
+    encoding: str | None,
+    bits: int | None,
+    primaries: str,
+    view: str | None,
+) -> None:
+    """Raise ValueError for conversions of `write` that the values cannot have."""
+    is_float = values.dtype.kind == "f"
+    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
+        raise ValueError(
+            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
+            if is_float
+            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
+        )
+    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
+        own = 8 * values.dtype.itemsize
+        if bits != own or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    displayed.check_primaries(primaries)
+    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
+        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
+    if view is not None and (encoding is not None or primaries != "rec709"):
+        raise ValueError("view: it has its own encoding and primaries; leave them out")
+
+
 def write(
     path: str | os.PathLike[str],
     array: NDArray[Any],
@@ -248,21 +274,7 @@ def write(
         raise TypeError(f"metadata: {metadata!r} is not a mapping of names to values")
     values = _checked(array)
     is_float = values.dtype.kind == "f"
-    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
-        raise ValueError(
-            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
-            if is_float
-            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
-        )
-    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
-        own = 8 * values.dtype.itemsize
-        if bits != own or is_float:
-            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
-    displayed.check_primaries(primaries)
-    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
-        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
-    if view is not None and (encoding is not None or primaries != "rec709"):
-        raise ValueError("view: it has its own encoding and primaries; leave them out")
+    _check_conversions(values, encoding, bits, primaries, view)
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
@@ -278,15 +290,12 @@ def write(
         if view is not None:
             what, values = displayed.viewed(oiio, values, view)
         elif is_float:
-            if curve != "none":
-                values = displayed.to_primaries(oiio, values, primaries)
-            values = encoded(values, curve)
+            values = _encoded_for(oiio, values, primaries, curve)
         said: Encoding | None = None if curve == "none" or not is_float else curve
         if view is not None or primaries != "rec709" or curve in ("pq", "hlg"):
             # A profile of the source would name other colours.
-            typed = {name: value for name, value in named.items() if name != "ICCProfile"}
             kind = oiio.ImageOutput.create(str(temporary)).format_name()
-            typed.update(displayed.attributes(oiio, kind, target, what))
+            typed = _without_profile(named) | displayed.attributes(oiio, kind, target, what)
             said = None
         put(
             oiio,
@@ -297,6 +306,17 @@ def write(
             attributes={} if quality is None else {"CompressionQuality": quality},
         )
     return target
+
+
+def _encoded_for(oiio: Any, values: Any, primaries: str, curve: str) -> Any:
+    """Return linear values in other primaries and encoded; with "none" they stay."""
+    if curve != "none":
+        values = displayed.to_primaries(oiio, values, primaries)
+    return encoded(values, curve)
+
+
+def _without_profile(named: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in named.items() if name != "ICCProfile"}
 
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:
