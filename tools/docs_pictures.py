@@ -125,7 +125,7 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     """Draw the deferred saucer with each preset, and without bloom."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
     look = {"tonemap": "aces", "encoding": "srgb", "exposure": -0.5}
-    size, columns, label = (360, 202), 4, 22
+    size, columns, label = (480, 270), 2, 34
     every = {"no bloom": vkbloom.Separable(bloom=False), **vkbloom.presets}
     rows = -(-len(every) // columns)
     sheet = np.full((rows * (size[1] + label), columns * size[0], 3), 24, np.uint8)
@@ -133,8 +133,9 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     for index, (name, settings) in enumerate(every.items()):
         row, column = divmod(index, columns)
         changed = settings.replace(**look)
-        if settings.composite == "mix" and settings.intensity == 1:
-            # Such a bloom stands for the whole picture, not for its lights alone.
+        # Such a bloom stands for the whole picture, not for its lights alone. Without bloom a scene
+        # has no lamps, but its picture before the bloom has.
+        if not settings.bloom or (settings.composite == "mix" and settings.intensity == 1):
             lit = renderer.render(scene, None, size, shading="deferred", attachments=["scene"])
             final = renderer.apply(lit["scene"], changed, attachments=["final"])["final"]
             final = np.rint(255 * np.clip(final.astype(np.float32), 0, 1)).astype(np.uint8)
@@ -144,8 +145,8 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
             )["final"]
         top, left = row * (size[1] + label), column * size[0]
         sheet[top : top + size[1], left : left + size[0]] = final[:, :, :3]
-        labels.append((left + 6, top + size[1] + 16, name))
-    sheet = pictures.labelled(sheet, labels, 15)
+        labels.append((left + 8, top + size[1] + 25, name))
+    sheet = pictures.labelled(sheet, labels, 24)
     image = oiio.ImageBuf(sheet)
     image.specmod().attribute("CompressionQuality", 88)
     if not image.write(str(path)):

@@ -12,14 +12,18 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from vkbloom import Renderer, Scene, Separable, presets
+from vkbloom import Renderer, Scene, Separable, presets, write
 from vkbloom.cli.program import program
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
 from vkbloom.verdicts import measuring
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXTS = [ROOT / "README.md", *sorted(ROOT.glob("*/*.md")), *sorted(ROOT.glob("python/*/*/*.md"))]
+TEXTS = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted(ROOT.glob("*/*.md")),
+    *sorted(ROOT.glob("python/*/*/*.md")),
+]
 # test_guide.py runs the code of testing.md, which is files of tests.
 PAGES = [
     page
@@ -53,6 +57,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
     photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
     save(Picture.of_values(photo, "half"), "photo.exr")
+    write("photo.jpg", photo.astype(np.float32))
     np.save("picture.npy", photo)
     (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
     Path("grid.toml").write_text(grid)
@@ -117,6 +122,14 @@ def test_notebook(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_the_front_page_gets_to_a_picture_in_ten_lines() -> None:
     (block,) = blocks(ROOT / "docs" / "index.md", "python")
     assert len([line for line in block.splitlines() if line]) < 10
+
+
+def test_navigation() -> None:
+    """At most twelve entries in four groups; the other pages are behind them."""
+    trees = blocks(ROOT / "docs" / "index.md", "{toctree}")
+    groups = [re.findall(r"^:caption: (.*)$", tree, re.MULTILINE)[0] for tree in trees]
+    assert groups == ["Use", "Measure", "Extend", "Reference"]
+    assert sum(len(re.findall(r"^[\w-]+$", tree, re.MULTILINE)) for tree in trees) <= 12
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))

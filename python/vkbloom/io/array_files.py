@@ -291,15 +291,12 @@ def write(
         if view is not None:
             what, values = displayed.viewed(oiio, values, view)
         elif is_float:
-            if curve != "none":
-                values = displayed.to_primaries(oiio, values, primaries)
-            values = encoded(values, curve)
+            values = _encoded_for(oiio, values, primaries, curve)
         said: Encoding | None = None if curve == "none" or not is_float else curve
         if view is not None or primaries != "rec709" or curve in ("pq", "hlg"):
             # A profile of the source would name other colours.
-            typed = {name: value for name, value in named.items() if name != "ICCProfile"}
             kind = oiio.ImageOutput.create(str(temporary)).format_name()
-            typed.update(displayed.attributes(oiio, kind, target, what))
+            typed = _without_profile(named) | displayed.attributes(oiio, kind, target, what)
             said = None
         put(
             oiio,
@@ -310,6 +307,17 @@ def write(
             attributes={} if quality is None else {"CompressionQuality": quality},
         )
     return target
+
+
+def _encoded_for(oiio: Any, values: Any, primaries: str, curve: str) -> Any:
+    """Return linear values in other primaries and encoded; with "none" they stay."""
+    if curve != "none":
+        values = displayed.to_primaries(oiio, values, primaries)
+    return encoded(values, curve)
+
+
+def _without_profile(named: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in named.items() if name != "ICCProfile"}
 
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:

@@ -1,0 +1,118 @@
+"""Draw ten photographs before and after ``vkbloom apply``, for docs/presets.md and README.md.
+
+python tools/photo_sheet.py docs/pictures [Desk.exr]
+
+The photographs are scikit-image's; the HDR photograph is of the OpenEXR collection and is developed
+to 8 bits. photos.jpg has all, photo.jpg a part of the city.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from click.testing import CliRunner
+from numpy.typing import NDArray
+from skimage import data
+
+import vkbloom
+from vkbloom.cli.program import program
+from vkbloom.views import pictures
+
+sys.path.insert(0, str(Path(__file__).parent))
+from night_picture import city
+
+Image = NDArray[np.uint8]
+HEIGHT, WIDTH, LABEL, GAP = 240, 360, 30, 6
+LOOK: dict[str, Any] = {"tonemap": "aces", "encoding": "srgb", "bloom": False}
+
+
+def room() -> Image:
+    """Return bright windows in a dark wall, with a soft gradient of light."""
+    down, across = np.mgrid[:480, :720].astype(np.float32)
+    wall = 40 + 60 * np.exp(-np.hypot(across - 360, down - 200) / 250)
+    image = wall[..., None] * np.array([1, 0.9, 0.8], np.float32)
+    for left in (120, 310, 500):
+        image[90:300, left : left + 110] = 254
+        image[192:198, left : left + 110] = image[90:300, left + 52 : left + 58] = 50
+    return image.astype(np.uint8)
+
+
+def developed(image: NDArray[Any], stops: float) -> Image:
+    """Return an HDR picture as 8 bits."""
+    with vkbloom.Renderer("software") as renderer:
+        plain = vkbloom.Separable(exposure=stops, **LOOK)
+        final = renderer.apply(image, plain, attachments=["final"])["final"][..., :3]
+    return np.rint(255 * np.clip(final.astype(np.float32), 0, 1)).astype(np.uint8)
+
+
+def photographs(hdr: list[str]) -> dict[str, Image]:
+    """Return the photographs by name."""
+    with vkbloom.Renderer("software") as renderer:
+        lit = renderer.render(vkbloom.Scene.ufo(), None, (720, 480), shading="deferred")["scene"]
+    found = {
+        "rocket": data.rocket(),
+        "city (made up)": developed(city(), 0.0),
+        "room (made up)": room(),
+        "scene (rendered)": developed(lit, 1.0),
+        "galaxies": data.hubble_deep_field(),
+        "astronaut": data.astronaut(),
+        "coffee": data.coffee(),
+        "cat": data.chelsea(),
+        "moon": np.repeat(data.moon()[..., None], 3, axis=2),
+    }
+    for name in hdr:
+        found[f"{Path(name).stem} (HDR, developed)"] = developed(vkbloom.read(name), -1.0)
+    return found
+
+
+def after(image: Image, folder: Path) -> Image:
+    """Return what the command makes of a photograph without options."""
+    vkbloom.write(folder / "a.png", np.ascontiguousarray(image))
+    words = ["apply", str(folder / "a.png"), str(folder / "b.png")]
+    result = CliRunner().invoke(program, words)
+    if result.exit_code:
+        raise SystemExit(result.output)
+    final = vkbloom.read(folder / "b.png")[..., :3]
+    encoded = np.where(final <= 0.0031308, 12.92 * final, 1.055 * final ** (1 / 2.4) - 0.055)
+    return np.rint(255 * np.clip(encoded, 0, 1)).astype(np.uint8)
+
+
+def fitted(image: Image, height: int, width: int) -> NDArray[np.float32]:
+    """Return the middle of an image at a size."""
+    rows, columns = image.shape[:2]
+    scale = max(height / rows, width / columns)
+    small = pictures.resized(image.astype(np.float32), *pictures.scaled(columns, rows, scale))
+    top, left = (small.shape[0] - height) // 2, (small.shape[1] - width) // 2
+    return small[top : top + height, left : left + width]
+
+
+def main(folder: Path, hdr: list[str]) -> None:
+    """Write both pictures."""
+    images = photographs(hdr)
+    rows = -(-len(images) // 2)
+    sheet = np.full((rows * (HEIGHT + LABEL), 4 * WIDTH + 3 * GAP, 3), 24, np.uint8)
+    labels = []
+    with tempfile.TemporaryDirectory() as temporary:
+        for index, (name, image) in enumerate(images.items()):
+            pair = image, after(image, Path(temporary))
+            top, left = index // 2 * (HEIGHT + LABEL), index % 2 * 2 * (WIDTH + GAP)
+            for place, one in enumerate(pair):
+                begin = left + place * (WIDTH + GAP)
+                tile = np.rint(fitted(one, HEIGHT, WIDTH)).clip(0, 255).astype(np.uint8)
+                sheet[top : top + HEIGHT, begin : begin + WIDTH] = tile
+            labels.append((left + 8, top + HEIGHT + 22, name))
+            changes = pair[1].astype(int) - pair[0]
+            print(f"{name}: darker by {max(0, -changes.min())} at most, mean {changes.mean():+.2f}")
+            if name == "city (made up)":
+                part = [one[120:520, 320:860] for one in pair]
+                vkbloom.write(folder / "photo.jpg", np.concatenate(part, axis=1), quality=88)
+    sheet = pictures.labelled(sheet, labels, 20)
+    vkbloom.write(folder / "photos.jpg", sheet, quality=86)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
