@@ -409,14 +409,15 @@
 #define TILE_RADIUS                   16
 #define FUSED_VEC4S                   5
 
-// Of a Fourier transform: the invocations of a workgroup, and how many of them are side by side in
-// one row, where columns are transformed all; the most elements of a butterfly.
-// Brighter values than FFT_LIMIT would overflow in sums.
+// Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
+// FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
+// butterfly. Values above FFT_LIMIT are clamped, since their sums would overflow.
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
 #define FFT_MOST_RADIX  64
-// The most where the other elements are in shared memory; and the most where a length can have
-// fewer, since fewer registers let more workgroups run at a time.
+// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups run
+// at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
+// FFT_MOST_GROUP_RADIX.
 #define FFT_MOST_GROUP_RADIX  16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28

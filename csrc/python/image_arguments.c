@@ -56,10 +56,43 @@ static struct vkb_input input_of(const Py_buffer *view, enum vkb_format format)
     };
 }
 
+// (Exported, offset, shape, strides, code)
+static bool read_exported(PyObject *tuple, struct vkb_held_image *image)
+{
+    static uint64_t last_serial;
+    struct vkb_input *input = &image->input;
+    const struct vkb_exports *exports;
+    PyObject *exported;
+    Py_ssize_t offset, row, pixel, channel;
+    int code;
+
+    if (!PyArg_ParseTuple(tuple, "On(O&O&O&)(nnn)C:image", &exported, &offset, vkb_read_uint32,
+                          &input->height, vkb_read_uint32, &input->width, vkb_read_uint32,
+                          &input->channels, &row, &pixel, &channel, &code))
+        return false;
+    if (!vkb_is_exported(exported)) {
+        PyErr_SetString(PyExc_TypeError, "image: an Exported is needed");
+        return false;
+    }
+    input->exported = vkb_export_of(exported, &exports);
+    input->offset = (size_t)offset;
+    input->serial = ++last_serial;
+    input->format = vkb_pixel_format((char)code);
+    input->row_stride = row;
+    input->pixel_stride = pixel;
+    input->channel_stride = channel;
+    // Released as a view of host memory is.
+    image->view = (Py_buffer){.obj = Py_NewRef(exported)};
+    image->held = true;
+    return true;
+}
+
 bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
 {
     const Py_buffer *view = &image->view;
 
+    if (PyTuple_Check(array))
+        return read_exported(array, image);
     if (!hold_image(array, image))
         return false;
     if (!vkb_has_element(view, "Bef")) {

@@ -52,6 +52,8 @@ static PyMethodDef functions[] = {
     {"plan", vkb_any_plan, METH_VARARGS,
      "plan(source, settings, names, variants=\"fragment\") -> Plan. For no renderer: what one with "
      "those variants would do; by default it draws every pass as its method defines it."},
+    {"read_dlpack", vkb_read_dlpack, METH_O,
+     "read_dlpack(capsule) -> (address, device, dtype, shape, strides). Does not consume it."},
     {"dry_run", vkb_dry_run_names, METH_O,
      "dry_run(((source, plan), ...)) -> [[name, ...], ...]. The passes that a renderer that has "
      "run "
@@ -198,6 +200,7 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
                 && add_type(module, &vkb_shader_spec, "Shader", &state->shader_type)
                 && add_type(module, &vkb_resource_spec, "Resource", &state->resource_type)
+                && add_type(module, &vkb_exported_spec, "Exported", &state->exported_type)
                 && vkb_make_attributes(state)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
@@ -222,6 +225,7 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->pages_type);
     Py_VISIT(state->shader_type);
     Py_VISIT(state->resource_type);
+    Py_VISIT(state->exported_type);
     Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -239,6 +243,7 @@ static int clear(PyObject *module)
     Py_CLEAR(state->pages_type);
     Py_CLEAR(state->shader_type);
     Py_CLEAR(state->resource_type);
+    Py_CLEAR(state->exported_type);
     Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

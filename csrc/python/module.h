@@ -15,7 +15,7 @@
 
 struct vkb_module_state {
     PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type,
-        *resource_type;
+        *resource_type, *exported_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
     PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
@@ -36,11 +36,11 @@ void vkb_dealloc(PyObject *object);
 // Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
 
-// (name, type, driver, driver_info, api_version, driver UUID as bytes)
+// (name, type, driver, driver_info, api_version, driver UUID as bytes, bundled, UUID, PCI address)
 PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec, vkb_shader_spec, vkb_resource_spec;
+    vkb_pages_spec, vkb_shader_spec, vkb_resource_spec, vkb_exported_spec;
 
 // The data of a submission until the device has finished it. If nobody waits for it any more, it is
 // abandoned: the renderer owns it.
@@ -54,7 +54,6 @@ struct vkb_pending {
     struct vkb_timing *timings;
     uint32_t count;  // of the requests
     size_t view_count;
-    struct vkb_specials specials;
     struct vkb_pending *next;
 };
 
@@ -71,6 +70,7 @@ struct vkb_renderer {
     uint64_t serial;                  // identifies the renderer of a plan; never 0
     struct vkb_pages *pages;          // of large arrays; NULL: closed
     struct vkb_residents *residents;  // of handles; NULL: closed
+    struct vkb_exports *exports;      // of arrays that CUDA shares; NULL: none so far, or closed
     size_t pipeline_count;            // created so far; accessed with the GIL
     struct vkb_cached cached;         // accessed with the GIL
     enum vkb_variants variants;
@@ -173,12 +173,16 @@ struct vkb_held_image {
     bool held;
 };
 
-// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; `name` is the
-// argument's.
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; or (Exported, offset,
+// (H, W, C), strides, code of the element). `name` is the argument's.
 bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
 // An array (H, W) of float32, any strides.
 bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
 void vkb_release_image(struct vkb_held_image *image);
+
+// Whether the object is memory that CUDA shares; that memory, and to what it belongs.
+bool vkb_is_exported(PyObject *object);
+struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **exports);
 
 // The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
 struct vkb_held_kernel {
@@ -261,6 +265,7 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_make_shader(PyObject *module, PyObject *arguments);
 PyObject *vkb_make_resource(PyObject *module, PyObject *arguments);
+PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 
@@ -273,6 +278,10 @@ PyObject *vkb_open_screen(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_close_screen(PyObject *renderer, PyObject *screen);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
+PyObject *vkb_renderer_export(PyObject *renderer, PyObject *size);
+PyObject *vkb_renderer_cuda(PyObject *renderer, PyObject *unused);
+PyObject *vkb_renderer_cuda_name(PyObject *renderer, PyObject *ordinal);
+PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_fill(PyObject *renderer, PyObject *arguments);
 
 #ifdef VKBLOOM_FAULTS

@@ -111,8 +111,10 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     PyEval_RestoreThread(self->thread);
     vkb_pages_close(self->pages);
     vkb_residents_close(self->residents);
+    vkb_exports_close(self->exports);
     self->pages = NULL;
     self->residents = NULL;
+    self->exports = NULL;
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -154,6 +156,7 @@ static void dealloc(PyObject *object)
     vkb_renderer_release_finished(self);
     vkb_pages_close(self->pages);
     vkb_residents_close(self->residents);
+    vkb_exports_close(self->exports);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);
@@ -267,6 +270,14 @@ static PyMethodDef methods[] = {
      "`linear`: encoded as sRGB."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
+    {"cuda", vkb_renderer_cuda, METH_NOARGS,
+     "cuda() -> (ordinal, stream). Opens CUDA for the renderer's GPU, if it is one of its."},
+    {"cuda_name", vkb_renderer_cuda_name, METH_O, "cuda_name(ordinal) -> name and UUID."},
+    {"export", vkb_renderer_export, METH_O,
+     "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
+    {"snapshot", vkb_renderer_snapshot, METH_VARARGS,
+     "snapshot(what, address, size, stream) -> Exported. A copy of CUDA's memory, after the "
+     "stream's work (0: the copy need not wait)."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

@@ -87,6 +87,26 @@ struct rows {
     uint32_t first, count;
 };
 
+static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pending *pending,
+                          const struct vkb_plan *plan, uint32_t output, PyObject *array)
+{
+    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
+    const struct vkb_exports *exports;
+    struct vkb_export *exported = vkb_export_of(array, &exports);
+
+    if (exports != renderer->exports || exported->size < vkb_output_size(plan, output)) {
+        PyErr_Format(PyExc_ValueError, "%s: the memory does not fit", row->name);
+        return false;
+    }
+    pending->views[pending->view_count] = (Py_buffer){.obj = Py_NewRef(array)};
+    pending->outputs[pending->view_count++] = (struct vkb_output){
+        .row_count = row->height,
+        .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
+        .exported = exported,
+    };
+    return true;
+}
+
 // `rows` may be NULL: all of them.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
                        const struct vkb_plan *plan, uint32_t output, const struct rows *rows,
@@ -100,6 +120,8 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
         pending->outputs[pending->view_count++].row_count = row->height;
         return true;
     }
+    if (vkb_is_exported(array))
+        return hold_exported(renderer, pending, plan, output, array);
     if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
         return false;
     pending->outputs[pending->view_count++] = (struct vkb_output){
@@ -194,8 +216,6 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
              && (!show || vkb_require_screen(renderer, show->screen, error))
              && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
                                  pending->count, show, &pending->submission, error);
-    if (done)
-        pending->specials = renderer->frame.specials;
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
@@ -289,8 +309,9 @@ static PyObject *results(const struct vkb_pending *pending)
         if (!timings || PyList_SetItem(list, (Py_ssize_t)i, timings) < 0)
             Py_CLEAR(list);
     }
-    return list ? Py_BuildValue("(N(KK))", list, (unsigned long long)pending->specials.nan,
-                                (unsigned long long)pending->specials.inf)
+    const struct vkb_specials *specials = &pending->requests[0].specials;
+    return list ? Py_BuildValue("(N(KK))", list, (unsigned long long)specials->nan,
+                                (unsigned long long)specials->inf)
                 : NULL;
 }
 

@@ -123,11 +123,27 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
 
 bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_source_object *source)
 {
+    const struct vkb_exports *exports = renderer->exports;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (source->images[kind].held && source->images[kind].input.exported
+            && exports == renderer->exports)
+            vkb_export_of(source->images[kind].view.obj, &exports);
     // A closed renderer says so itself.
-    if (!source->resident || !renderer->open || source->residents == renderer->residents)
+    if (!renderer->open
+        || ((!source->resident || source->residents == renderer->residents)
+            && exports == renderer->exports))
         return true;
     PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one that "
                                       "is closed; upload it to this one");
+    return false;
+}
+
+static bool is_exported(const struct vkb_source_object *source)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (source->images[kind].held && source->images[kind].input.exported)
+            return true;
     return false;
 }
 
@@ -193,7 +209,7 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
                           vkb_read_uint32, &height))
         return NULL;
     const struct vkb_source_object *source = (struct vkb_source_object *)given;
-    if (!source->images[VKB_INPUT_IMAGE].held
+    if (!source->images[VKB_INPUT_IMAGE].held || is_exported(source)
         || (spare != Py_None && !PyObject_TypeCheck(spare, type))) {
         PyErr_SetString(PyExc_ValueError, "upload: an image in host memory is needed");
         return NULL;
@@ -227,7 +243,7 @@ static bool check_rows(const struct vkb_source_object *source, const struct vkb_
     const struct vkb_image_source *image = &source->source.image, *part = &rows->source.image;
 
     if (source->resident && source->resident->uses == 0 && rows->images[VKB_INPUT_IMAGE].held
-        && part->format == image->format && part->channels == image->channels
+        && !is_exported(rows) && part->format == image->format && part->channels == image->channels
         && part->has_emission == image->has_emission && part->has_mask == image->has_mask
         && part->size.width == image->size.width && first <= image->size.height
         && part->size.height <= image->size.height - first)
@@ -294,7 +310,26 @@ static PyObject *is_resident(PyObject *object, void *unused)
     return PyBool_FromLong(((struct vkb_source_object *)object)->resident != NULL);
 }
 
+static PyObject *get_exported(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyBool_FromLong(is_exported((struct vkb_source_object *)object));
+}
+
+static PyObject *get_kind(PyObject *object, void *unused)
+{
+    const struct vkb_image_source *image = &((struct vkb_source_object *)object)->source.image;
+
+    (void)unused;
+    return Py_BuildValue("((IIi)s)", image->size.height, image->size.width, (int)image->channels,
+                         image->format == VKB_FORMAT_RGBA8_UNORM    ? "uint8"
+                         : image->format == VKB_FORMAT_RGBA16_FLOAT ? "float16"
+                                                                    : "float32");
+}
+
 static PyGetSetDef attributes[] = {
+    {"kind", get_kind, NULL, "(shape, dtype) of an image.", NULL},
+    {"exported", get_exported, NULL, "Whether an image is in memory that CUDA shares.", NULL},
     {"resident", is_resident, NULL, "Whether it is an image that stays on a device.", NULL},
     {0},
 };

@@ -1,6 +1,6 @@
 #include "run/frame.h"
 
-#include "run/record.h"
+#include "run/exported.h"
 #include "run/sources.h"
 
 #include <string.h>
@@ -20,6 +20,7 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     vkb_buffer_destroy(device, &frame->constants);
     vkb_image_cache_destroy(device, &frame->cache);
     vkb_resources_destroy(device, &frame->resources);
+    vkb_gather_destroy(device, &frame->gather);
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         vkb_upload_destroy(device, &frame->uploads[kind]);
     vkb_scene_destroy(device, &frame->scene);
@@ -63,6 +64,42 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     return true;
 }
 
+static VkDeviceSize larger(VkDeviceSize a, VkDeviceSize b)
+{
+    return a > b ? a : b;
+}
+
+// Reserves what is between images and exported memory, if the requests use any.
+static bool reserve_exported(struct vkb_run *run, const struct vkb_request *requests,
+                             uint32_t request_count, struct vkb_error *error)
+{
+    struct vkb_readback *readback = &run->submission->readback;
+    const VkDeviceSize counts_size = (VkDeviceSize)request_count * VKB_COUNTS_SIZE;
+    VkDeviceSize scratch = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].input) {
+            scratch = larger(scratch, vkb_exported_input_scratch(run->inputs[kind].input));
+            readback->counted = true;
+        }
+    for (uint32_t i = 0; i < request_count; ++i)
+        for (uint32_t output = 0; output < requests[i].plan->output_count; ++output)
+            if (requests[i].outputs[output].exported) {
+                const struct vkb_output *one = &requests[i].outputs[output];
+                scratch = larger(scratch, vkb_exported_output_scratch(one));
+                readback->counted = true;
+            }
+    if (!readback->counted)
+        return true;
+    if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(), scratch,
+                            &readback->scratch, error)
+        || !vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                               counts_size, &readback->counts, error))
+        return false;
+    memset(readback->counts.mapped, 0, (size_t)counts_size);
+    return vkb_buffer_flush(run->device, &readback->counts, error);
+}
+
 // Reserves the memory that the requests can need.
 static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
                     struct vkb_error *error)
@@ -77,7 +114,8 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     for (uint32_t i = 0; i < request_count; ++i) {
         const struct vkb_plan *plan = requests[i].plan;
         passes += plan->graph.pass_count;
-        sets += vkb_record_sets(run->device, &plan->graph) + surfaces;
+        sets += vkb_record_sets(run->device, &plan->graph) + surfaces + VKB_INPUT_COUNT
+              + plan->output_count;
         for (uint32_t output = 0; output < plan->output_count; ++output) {
             const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
             if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
@@ -89,7 +127,8 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         && vkb_timer_reserve(run->device, passes, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &submission->uniforms, error)
-        && vkb_readback_reserve(run->device, &submission->readback, error);
+        && vkb_readback_reserve(run->device, &submission->readback, error)
+        && reserve_exported(run, requests, request_count, error);
 }
 
 static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
@@ -225,6 +264,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         struct vkb_cached_image *cached = run->images[request->plan->outputs[i]];
         vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
                             &cached->image, &request->outputs[i]);
+        if (request->outputs[i].exported
+            && !vkb_exported_record_output(run, &request->outputs[i], error))
+            return false;
         // A pass that stored to the caller's memory did not write the image.
         cached->content.valid =
             cached->content.valid && request->outputs[i].sink != VKB_SINK_STORED;
@@ -254,7 +296,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    vkb_sources_record(run);
+    if (!vkb_sources_record(run, error))
+        return false;
     record_constants(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
@@ -345,6 +388,8 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     if (done && (!show || show->acquired)) {
         run.submission->requests = requests;
         run.submission->request_count = request_count;
+        for (uint32_t i = 0; i < request_count; ++i)
+            requests[i].specials = frame->specials;
         *submission = run.submission;
         vkb_sources_end(&run, source, true);
         return !show || vkb_screen_present(device, show->screen, error);
@@ -379,6 +424,10 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
 {
     for (uint32_t i = 0; i < submission->request_count; ++i) {
         struct vkb_request *request = &submission->requests[i];
+        if (submission->readback.counted) {
+            const uint32_t *counts = submission->readback.counts.mapped;
+            vkb_add_specials(&request->specials, (struct vkb_specials){counts[0], counts[1]});
+        }
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)
             request->timings[timing].seconds =
                 vkb_timer_seconds(device, &submission->timer, request->first_span + timing);

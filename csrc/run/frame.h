@@ -4,6 +4,7 @@
 #define VKB_FRAME_H
 
 #include "graph/plan.h"
+#include "run/gather.h"
 #include "run/image_cache.h"
 #include "run/in_place.h"
 #include "run/pipeline.h"
@@ -21,6 +22,8 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
     struct vkb_in_place in_place[VKB_INPUT_COUNT];
+    uint64_t exported[VKB_INPUT_COUNT];  // the serial of what the cached image has; 0: else
+    struct vkb_gather gather;
     struct vkb_specials specials;  // of the inputs of the last submission
     struct vkb_buffer constants;   // staging memory of images that are filled once
     struct vkb_image_cache cache;
@@ -59,7 +62,8 @@ struct vkb_request {
     struct vkb_output *outputs;
     struct vkb_timing *timings;
     uint32_t timing_count;
-    uint32_t first_span;  // of its timings, in the submission's timer
+    uint32_t first_span;           // of its timings, in the submission's timer
+    struct vkb_specials specials;  // of the inputs; complete after the submission
 };
 
 // Records the passes that the requests' outputs need and that are out of date, request after

@@ -23,6 +23,8 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 {
     vkb_readback_release(device, readback);
     vkb_buffer_destroy(device, &readback->staging);
+    vkb_buffer_destroy(device, &readback->scratch);
+    vkb_buffer_destroy(device, &readback->counts);
     vkb_free(readback->imports);
     *readback = (struct vkb_readback){0};
 }
@@ -70,6 +72,8 @@ bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *rea
     output->width = width;
     output->imported = VK_NULL_HANDLE;
     output->sink = VKB_SINK_NONE;
+    if (output->exported)
+        output->sink = VKB_SINK_EXPORTED;
     if (!output->memory)
         return true;
     const size_t size = row_size(output) * output->row_count;
@@ -142,10 +146,22 @@ static void record_pages(const struct vkb_device *device, VkCommandBuffer comman
     record_copy(device, commands, image, output, output->imported, output->imported_offset);
 }
 
+// Without all channels, a dispatch follows, which leaves the others out.
+static void record_exported(const struct vkb_device *device, VkCommandBuffer commands,
+                            const struct vkb_readback *readback, struct vkb_image *image,
+                            const struct vkb_output *output)
+{
+    record_copy(device, commands, image, output,
+                vkb_readback_is_complete(output) ? output->exported->buffer.handle
+                                                 : readback->scratch.handle,
+                0);
+}
+
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
                       struct vkb_error *error)
 {
-    return readback->used == 0 || vkb_buffer_invalidate(device, &readback->staging, error);
+    return (readback->used == 0 || vkb_buffer_invalidate(device, &readback->staging, error))
+        && (!readback->counted || vkb_buffer_invalidate(device, &readback->counts, error));
 }
 
 // Copies the first three of four channels of each pixel. It is compiled once for each channel size,
@@ -188,9 +204,8 @@ static const struct sink {
                    const struct vkb_output *output);
     void (*fetch)(const struct vkb_readback *readback, const struct vkb_output *output);
 } sinks[] = {
-    [VKB_SINK_NONE] = {NULL, NULL},
-    [VKB_SINK_STAGING] = {record_staging, fetch_staging},
-    [VKB_SINK_PAGES] = {record_pages, NULL},
+    [VKB_SINK_NONE] = {NULL, NULL},          [VKB_SINK_STAGING] = {record_staging, fetch_staging},
+    [VKB_SINK_PAGES] = {record_pages, NULL}, [VKB_SINK_EXPORTED] = {record_exported, NULL},
     [VKB_SINK_STORED] = {NULL, NULL},
 };
 
@@ -213,4 +228,5 @@ void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *
     while (readback->import_count > 0)
         vkb_buffer_destroy(device, &readback->imports[--readback->import_count]);
     readback->used = 0;
+    readback->counted = false;
 }

@@ -3,6 +3,7 @@
 #ifndef VKB_READBACK_H
 #define VKB_READBACK_H
 
+#include "run/exports.h"
 #include "run/pages.h"
 
 // The device writes directly to the caller's memory if it has at least this size. On lavapipe
@@ -13,10 +14,11 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 
 // How the pixels of an output leave the device.
 enum vkb_sink {
-    VKB_SINK_NONE,     // they do not
-    VKB_SINK_STAGING,  // the device copies to staging memory, and the host from there
-    VKB_SINK_PAGES,    // the device copies to the caller's memory, which it has imported
-    VKB_SINK_STORED,   // the last pass stores to this memory; set while the passes are recorded
+    VKB_SINK_NONE,      // they do not
+    VKB_SINK_STAGING,   // the device copies to staging memory, and the host from there
+    VKB_SINK_PAGES,     // the device copies to the caller's memory, which it has imported
+    VKB_SINK_EXPORTED,  // they are copied to memory that CUDA shares (exported.h)
+    VKB_SINK_STORED,    // the last pass stores to this memory; set while the passes are recorded
 };
 
 // One requested image in host memory: tightly packed rows, top row first, with the first `channels`
@@ -25,6 +27,7 @@ struct vkb_output {
     uint32_t channels;
     uint32_t first_row, row_count;  // of the image
     void *memory;                   // NULL: it stays on the device
+    struct vkb_export *exported;    // instead of host memory; NULL: none
     struct vkb_page_run *pages;  // the run that contains the memory; NULL: none, or a small array
     // Set by vkb_readback_plan.
     enum vkb_format format;
@@ -40,6 +43,10 @@ struct vkb_readback {
     VkDeviceSize used;           // bytes of the staging memory
     struct vkb_buffer *imports;  // of the callers' memory, until vkb_readback_release
     size_t import_count, import_capacity;
+    // Between images and exported memory: of the device, for one image at a time; and of the host,
+    // the counts of NaN and infinity of each request.
+    struct vkb_buffer scratch, counts;
+    bool counted;
 };
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);

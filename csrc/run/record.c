@@ -345,7 +345,8 @@ static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *p
 {
     const struct vkb_specials *specials = &run->frame->specials;
 
-    return pass->block == VKB_BLOCK_fused_bloom && specials->nan == 0 && specials->inf == 0;
+    return pass->block == VKB_BLOCK_fused_bloom && !run->unknown_specials && specials->nan == 0
+        && specials->inf == 0;
 }
 
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,

@@ -9,8 +9,9 @@ struct vkb_staged_input {
     const struct vkb_source_way *way;
     struct vkb_cached_image *image;  // NULL: there is no such input
     struct vkb_upload *upload;
-    bool send;               // the device does not have the pixels yet
-    enum vkb_access access;  // of a resident image before the submission
+    const struct vkb_input *input;  // in memory that CUDA shares
+    bool send;                      // the device does not have the pixels yet
+    enum vkb_access access;         // of a resident image before the submission
 };
 
 // The state of one submission, and of the request that is being recorded.
@@ -29,6 +30,8 @@ struct vkb_run {
     struct vkb_cached_image *constants[2];
     size_t constant_starts[2];
     uint32_t constant_count;
+    uint32_t counts_slot;   // of the request that is being recorded
+    bool unknown_specials;  // whether the source has NaN or infinity is counted on the device
 };
 
 // The most descriptor sets that the graph's passes need, without those of surfaces.

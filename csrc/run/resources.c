@@ -119,8 +119,8 @@ static bool create_image(const struct vkb_device *device, const struct vkb_resou
                    NULL, &entry->image)))
         return false;
     vk->vkGetImageMemoryRequirements(device->handle, entry->image, &requirements);
-    return vkb_memory_allocate(device, VKB_MEMORY_DEVICE, &requirements, &entry->memory, &flags,
-                               error)
+    return vkb_memory_allocate(device, VKB_MEMORY_DEVICE, &requirements, NULL, &entry->memory,
+                               &flags, error)
         && VK(error, vk->vkBindImageMemory(device->handle, entry->image, entry->memory, 0))
         && create_view(device, resource, entry, error)
         && (resource->kind == VKB_RESOURCE_IMAGE

@@ -1,5 +1,7 @@
 #include "run/sources.h"
 
+#include "run/exported.h"
+
 void vkb_run_set_image(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached)
 {
     run->images[image] = cached;
@@ -116,6 +118,32 @@ static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, boo
     return true;
 }
 
+static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                           struct vkb_error *error)
+{
+    const struct vkb_input *input = pixels->source->inputs[pixels->kind];
+    struct vkb_staged_input *staged = &run->inputs[pixels->kind];
+    uint64_t *held = &run->frame->exported[pixels->kind];
+
+    *taken = input && input->exported;
+    if (!*taken)
+        return true;
+    if (!vkb_exported_check(run->device, input, error)
+        || !vkb_run_resolve(run, pixels->image, error))
+        return false;
+    staged->image = run->images[pixels->image];
+    staged->input = input;
+    staged->send = *held != input->serial || !staged->image->content.valid;
+    run->unknown_specials = true;
+    if (!staged->send)
+        return true;
+    // The image no longer has the pixels of the host with which the next ones would be compared.
+    vkb_upload_forget(&run->frame->uploads[pixels->kind]);
+    *held = input->serial;
+    return vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock, NULL, 0,
+                                     error);
+}
+
 // Stages the image if the device does not have it yet.
 static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool *taken,
                          struct vkb_error *error)
@@ -127,6 +155,7 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
     *taken = true;
     if (!vkb_run_resolve(run, pixels->image, error))
         return false;
+    run->frame->exported[pixels->kind] = 0;
     struct vkb_cached_image *image = run->images[pixels->image];
     // If the last write did not reach the image, there is no content to compare with.
     if (image->image.mapped && !image->content.valid)
@@ -142,14 +171,17 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }
 
-static void record_copy(struct vkb_run *run, struct vkb_staged_input *staged)
+static bool record_copy(struct vkb_run *run, struct vkb_staged_input *staged,
+                        struct vkb_error *error)
 {
+    (void)error;
     if (!staged->send)
-        return;
+        return true;
     if (!staged->image->image.mapped)
         vkb_upload_record(run->device, run->submission->commands.buffer, staged->upload,
                           &staged->image->image);
     staged->image->content.valid = true;
+    return true;
 }
 
 static const struct vkb_source_way {
@@ -157,11 +189,12 @@ static const struct vkb_source_way {
     bool (*stage)(struct vkb_run *run, const struct pixels *pixels, bool *taken,
                   struct vkb_error *error);
     // Both may be NULL.
-    void (*record)(struct vkb_run *run, struct vkb_staged_input *staged);
+    bool (*record)(struct vkb_run *run, struct vkb_staged_input *staged, struct vkb_error *error);
     void (*end)(const struct vkb_frame_source *source, struct vkb_staged_input *staged,
                 bool submitted);
 } ways[] = {
     {stage_resident, record_copy, end_resident},
+    {stage_exported, vkb_exported_record_input, NULL},
     {stage_in_place, NULL, NULL},
     {stage_upload, record_copy, NULL},
 };
@@ -187,11 +220,13 @@ bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *sourc
     return true;
 }
 
-void vkb_sources_record(struct vkb_run *run)
+bool vkb_sources_record(struct vkb_run *run, struct vkb_error *error)
 {
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (run->inputs[kind].image && run->inputs[kind].way->record)
-            run->inputs[kind].way->record(run, &run->inputs[kind]);
+        if (run->inputs[kind].image && run->inputs[kind].way->record
+            && !run->inputs[kind].way->record(run, &run->inputs[kind], error))
+            return false;
+    return true;
 }
 
 void vkb_sources_end(struct vkb_run *run, const struct vkb_frame_source *source, bool submitted)

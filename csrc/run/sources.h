@@ -5,14 +5,14 @@
 #include "run/record.h"
 
 // The ways are rows of a table, and the first one that suits an input is taken: an image that stays
-// on the device; the caller's memory, read in place; an upload. The source is read before
-// vkb_sources_stage returns, except in place.
+// on the device; memory that CUDA shares; the caller's memory, read in place; an upload. The source
+// is read before vkb_sources_stage returns, except in place.
 bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *source,
                        const struct vkb_request *requests, uint32_t request_count,
                        struct vkb_error *error);
 
 // Records the copies that the device has to make.
-void vkb_sources_record(struct vkb_run *run);
+bool vkb_sources_record(struct vkb_run *run, struct vkb_error *error);
 
 // After the submission, or the failure of one.
 void vkb_sources_end(struct vkb_run *run, const struct vkb_frame_source *source, bool submitted);

@@ -4,14 +4,19 @@
 #ifndef VKB_UPLOAD_H
 #define VKB_UPLOAD_H
 
+#include "run/exports.h"
 #include "run/specials.h"
 #include "run/submission.h"
 
 #include <stddef.h>
 
-// The caller's pixels in host memory, with any strides (in bytes).
+// The caller's pixels, with any strides (in bytes): in host memory, or in memory that CUDA shares,
+// from byte `offset` on. Then `serial` is the pixels' own.
 struct vkb_input {
     const void *memory;
+    struct vkb_export *exported;  // NULL: in host memory
+    size_t offset;
+    uint64_t serial;
     ptrdiff_t row_stride, pixel_stride, channel_stride;
     enum vkb_format format;
     uint32_t width, height, channels;

@@ -1,6 +1,5 @@
 #include "vulkan/adapter.h"
 
-#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -34,8 +33,57 @@ static uint32_t find_queue_family(const struct vkb_instance *instance, VkPhysica
     return UINT32_MAX;
 }
 
+void vkb_uuid_text(const uint8_t uuid[VK_UUID_SIZE], char text[VKB_UUID_TEXT_SIZE])
+{
+    for (uint32_t i = 0; i < VK_UUID_SIZE; ++i)
+        text += sprintf(text, "%s%02x", i >= 4 && i <= 10 && i % 2 == 0 ? "-" : "", uuid[i]);
+}
+
+bool vkb_has_extension(const struct vkb_instance *instance, VkPhysicalDevice physical,
+                       const char *name, bool *found, struct vkb_error *error)
+{
+    const struct vkb_instance_table *vk = &instance->vk;
+    VkExtensionProperties *extensions;
+    uint32_t count = 0;
+
+    *found = false;
+    if (!VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
+        || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
+        return false;
+    bool done =
+        VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
+    for (uint32_t i = 0; done && i < count; ++i)
+        *found |= strcmp(extensions[i].extensionName, name) == 0;
+    vkb_free(extensions);
+    return done;
+}
+
+static bool read_pci(const struct vkb_instance *instance, struct vkb_adapter_info *adapter,
+                     struct vkb_error *error)
+{
+    VkPhysicalDevicePCIBusInfoPropertiesEXT pci = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PCI_BUS_INFO_PROPERTIES_EXT,
+    };
+    VkPhysicalDeviceProperties2 properties = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+        .pNext = &pci,
+    };
+    bool found;
+
+    if (!vkb_has_extension(instance, adapter->physical, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME, &found,
+                           error))
+        return false;
+    if (!found)
+        return true;
+    instance->vk.vkGetPhysicalDeviceProperties2(adapter->physical, &properties);
+    snprintf(adapter->pci, sizeof adapter->pci, "%04x:%02x:%02x.%x", pci.pciDomain, pci.pciBus,
+             pci.pciDevice, pci.pciFunction);
+    return true;
+}
+
+// *usable: whether the adapter can run vkbloom.
 static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physical,
-                     struct vkb_adapter_info *adapter)
+                     struct vkb_adapter_info *adapter, bool *usable, struct vkb_error *error)
 {
     VkPhysicalDeviceDriverProperties driver = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES,
@@ -50,8 +98,9 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     VkPhysicalDeviceProperties plain;
 
     instance->vk.vkGetPhysicalDeviceProperties(physical, &plain);
-    if (plain.apiVersion < VK_API_VERSION_1_1)
-        return false;
+    *usable = plain.apiVersion >= VK_API_VERSION_1_1;
+    if (!*usable)
+        return true;
     // Driver properties are core since Vulkan 1.2.
     if (plain.apiVersion >= VK_API_VERSION_1_2)
         id.pNext = &driver;
@@ -64,13 +113,16 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
         .api_version = plain.apiVersion,
         .driver_version = plain.driverVersion,
         .queue_family = find_queue_family(instance, physical),
+        .vendor = plain.vendorID,
         .bundled = instance->driver[0] != 0,
     };
     memcpy(adapter->name, plain.deviceName, sizeof adapter->name);
     memcpy(adapter->driver, driver.driverName, sizeof adapter->driver);
     memcpy(adapter->driver_info, driver.driverInfo, sizeof adapter->driver_info);
     memcpy(adapter->driver_uuid, id.driverUUID, sizeof adapter->driver_uuid);
-    return adapter->queue_family != UINT32_MAX;
+    memcpy(adapter->uuid, id.deviceUUID, sizeof adapter->uuid);
+    *usable = adapter->queue_family != UINT32_MAX;
+    return !*usable || read_pci(instance, adapter, error);
 }
 
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
@@ -87,136 +139,11 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
         return true;
     if (result != VK_INCOMPLETE && !vkb_check(error, result, "vkEnumeratePhysicalDevices"))
         return false;
-    for (uint32_t i = 0; i < device_count; ++i)
-        *count += describe(instance, devices[i], &adapters[*count]);
-    return true;
-}
-
-// The rank of an adapter for "auto"; lower is better.
-static int preference(const struct vkb_adapter_info *adapter)
-{
-    switch (adapter->device_type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-        return 0;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-        return 1;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-        return 2;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-        return 3;
-    default:
-        return 4;
-    }
-}
-
-static bool contains(const char *text, const char *part)
-{
-    for (; *text; ++text) {
-        size_t i = 0;
-        while (part[i] && tolower((unsigned char)text[i]) == tolower((unsigned char)part[i]))
-            ++i;
-        if (!part[i])
-            return true;
-    }
-    return false;
-}
-
-static bool fits(const struct vkb_adapter_info *adapter, const char *choice)
-{
-    bool cpu = adapter->device_type == VK_PHYSICAL_DEVICE_TYPE_CPU;
-
-    if (strcmp(choice, "auto") == 0)
-        return true;
-    if (strcmp(choice, "software") == 0)
-        return cpu;
-    if (strcmp(choice, "hardware") == 0)
-        return !cpu;
-    return contains(adapter->name, choice);
-}
-
-// The best adapter of one source: the system's loader, or a driver without it.
-struct source {
-    struct vkb_instance *instance;
-    struct vkb_adapter_info best;
-    bool found;
-};
-
-// Opens the source, and finds the best adapter that fits; adds the names of all to the text.
-static bool open_source(struct source *source, const char *choice, const char *driver,
-                        bool validation, char (*names)[1024], struct vkb_error *error)
-{
-    struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
-    uint32_t count;
-
-    *source = (struct source){.instance = vkb_instance_open(driver, validation, error)};
-    if (!source->instance || !vkb_adapters_list(source->instance, adapters, &count, error))
-        return false;
-    for (uint32_t i = 0; i < count; ++i) {
-        const size_t length = strlen(*names);
-        snprintf(*names + length, sizeof *names - length, "%s%s (%s%s)", length ? ", " : "",
-                 adapters[i].name, vkb_adapter_type(&adapters[i]),
-                 adapters[i].bundled ? ", bundled" : "");
-        if (fits(&adapters[i], choice)
-            && (!source->found || preference(&adapters[i]) < preference(&source->best))) {
-            source->best = adapters[i];
-            source->found = true;
-        }
-    }
-    return true;
-}
-
-static void close_source(struct source *source)
-{
-    if (source->instance)
-        vkb_instance_close(source->instance);
-    *source = (struct source){0};
-}
-
-// Whether an adapter of the bundled driver, which is a CPU, would come before that one.
-static bool is_last_resort(const struct source *source)
-{
-    return !source->found
-        || preference(&source->best) >= preference(&(struct vkb_adapter_info){
-               .device_type = VK_PHYSICAL_DEVICE_TYPE_CPU,
-           });
-}
-
-// The system's adapters, then the driver's where it could be better. No system's adapter is no
-// failure where there is a driver.
-static bool open_sources(struct source *system, struct source *bundled, const char *choice,
-                         const char *driver, bool validation, char (*names)[1024],
-                         struct vkb_error *error)
-{
-    if (!driver[0] || strcmp(choice, "software") != 0) {
-        if (!open_source(system, choice, "", validation, names, error)
-            && (!driver[0] || error->kind != VKB_ERROR_ADAPTER_NOT_FOUND))
+    for (uint32_t i = 0; i < device_count; ++i) {
+        bool usable;
+        if (!describe(instance, devices[i], &adapters[*count], &usable, error))
             return false;
-        if (!driver[0] || !is_last_resort(system))
-            return true;
+        *count += usable;
     }
-    *error = (struct vkb_error){0};
-    return open_source(bundled, choice, driver, validation, names, error);
-}
-
-bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
-                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
-                      struct vkb_error *error)
-{
-    struct source system = {0}, bundled = {0};
-    char names[1024] = "";
-    bool done = open_sources(&system, &bundled, choice, driver, validation, &names, error);
-    struct source *best = bundled.found ? &bundled : &system;
-
-    if (done && !best->found)
-        done = vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
-                        "no Vulkan adapter for \"%s\"; found: %s. %s", choice,
-                        names[0] ? names : "none", vkb_install_hint);
-    if (done) {
-        *instance = best->instance;
-        *chosen = best->best;
-        best->instance = NULL;
-    }
-    close_source(&system);
-    close_source(&bundled);
-    return done;
+    return true;
 }

@@ -6,6 +6,11 @@
 
 #include <stdint.h>
 
+enum {
+    VKB_PCI_SIZE = 24,
+    VKB_UUID_TEXT_SIZE = 37,
+};
+
 struct vkb_adapter_info {
     VkPhysicalDevice physical;
     char name[VK_MAX_PHYSICAL_DEVICE_NAME_SIZE];
@@ -16,8 +21,11 @@ struct vkb_adapter_info {
     uint32_t api_version;
     uint32_t driver_version;
     uint8_t driver_uuid[VK_UUID_SIZE];
-    uint32_t queue_family;  // one with graphics and compute
-    bool bundled;           // of a driver that the loader did not find
+    uint8_t uuid[VK_UUID_SIZE];  // of the device
+    uint32_t vendor;
+    char pci[VKB_PCI_SIZE];  // "0000:3b:00.0"; "": unknown
+    uint32_t queue_family;   // one with graphics and compute
+    bool bundled;            // of a driver that the loader did not find
 };
 
 enum { VKB_MAX_ADAPTERS = 32 };
@@ -25,16 +33,15 @@ enum { VKB_MAX_ADAPTERS = 32 };
 // "cpu", "integrated", "discrete", "virtual" or "other".
 const char *vkb_adapter_type(const struct vkb_adapter_info *adapter);
 
+// The text of a UUID, in five groups of hexadecimal digits.
+void vkb_uuid_text(const uint8_t uuid[VK_UUID_SIZE], char text[VKB_UUID_TEXT_SIZE]);
+
+// Whether the device has the extension.
+bool vkb_has_extension(const struct vkb_instance *instance, VkPhysicalDevice physical,
+                       const char *name, bool *found, struct vkb_error *error);
+
 // The adapters that can run vkbloom, in the system's order.
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
                        uint32_t *count, struct vkb_error *error);
-
-// Opens the instance of the adapter that `choice` selects: "auto", "software", "hardware", or a
-// part of a name. `driver` is the path of a bundled driver; "" means none. The bundled software
-// adapter takes precedence over the system's; for "software" the system's drivers are then not
-// opened. On failure no instance is left open.
-bool vkb_adapter_open(const char *choice, const char *driver, bool validation,
-                      struct vkb_instance **instance, struct vkb_adapter_info *chosen,
-                      struct vkb_error *error);
 
 #endif

@@ -169,6 +169,45 @@ void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuff
                           VK_ACCESS_HOST_READ_BIT);
 }
 
+// Another owner is outside of Vulkan.
+static void record_owner(const struct vkb_device *device, VkCommandBuffer commands,
+                         VkPipelineStageFlags from, VkPipelineStageFlags to,
+                         const VkBufferMemoryBarrier *given)
+{
+    VkBufferMemoryBarrier barrier = *given;
+
+    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
+    barrier.size = VK_WHOLE_SIZE;
+    device->vk.vkCmdPipelineBarrier(commands, from, to, 0, 0, NULL, 1, &barrier, 0, NULL);
+}
+
+void vkb_barrier_record_acquire(const struct vkb_device *device, VkCommandBuffer commands,
+                                VkBuffer buffer)
+{
+    const struct access_info *copy = &accesses[VKB_ACCESS_COPY_SOURCE],
+                             *loaded = &accesses[VKB_ACCESS_DISPATCH_LOADED];
+
+    record_owner(device, commands, accesses[VKB_ACCESS_NONE].stages, copy->stages | loaded->stages,
+                 &(VkBufferMemoryBarrier){
+                     .dstAccessMask = copy->reads | loaded->reads,
+                     .srcQueueFamilyIndex = VK_QUEUE_FAMILY_EXTERNAL,
+                     .dstQueueFamilyIndex = device->adapter.queue_family,
+                     .buffer = buffer,
+                 });
+}
+
+void vkb_barrier_record_release(const struct vkb_device *device, VkCommandBuffer commands,
+                                VkBuffer buffer, enum vkb_access from)
+{
+    record_owner(device, commands, accesses[from].stages, accesses[VKB_ACCESS_PRESENTED].stages,
+                 &(VkBufferMemoryBarrier){
+                     .srcAccessMask = accesses[from].writes,
+                     .srcQueueFamilyIndex = device->adapter.queue_family,
+                     .dstQueueFamilyIndex = VK_QUEUE_FAMILY_EXTERNAL,
+                     .buffer = buffer,
+                 });
+}
+
 void vkb_barrier_record_upload(const struct vkb_device *device, VkCommandBuffer commands)
 {
     record_buffer_barrier(device, commands, VKB_ACCESS_COPY_TARGET,

@@ -39,6 +39,13 @@ void vkb_barrier_record_host_read(const struct vkb_device *device, VkCommandBuff
 // Makes copies to buffers visible to vertex input.
 void vkb_barrier_record_upload(const struct vkb_device *device, VkCommandBuffer commands);
 
+// Takes over a buffer that CUDA has written, for dispatches and copies; hands one over to CUDA
+// after `from`.
+void vkb_barrier_record_acquire(const struct vkb_device *device, VkCommandBuffer commands,
+                                VkBuffer buffer);
+void vkb_barrier_record_release(const struct vkb_device *device, VkCommandBuffer commands,
+                                VkBuffer buffer, enum vkb_access from);
+
 // The accesses to one attachment before, during and after a render pass. NONE after it: the next
 // user of the image records a barrier.
 struct vkb_target_use {

@@ -10,21 +10,7 @@
 static bool has_extension(const struct vkb_device *device, const char *name, bool *found,
                           struct vkb_error *error)
 {
-    const struct vkb_instance_table *vk = &device->instance->vk;
-    const VkPhysicalDevice physical = device->adapter.physical;
-    VkExtensionProperties *extensions;
-    uint32_t count = 0;
-
-    *found = false;
-    if (!VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
-        || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
-        return false;
-    bool done =
-        VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
-    for (uint32_t i = 0; done && i < count; ++i)
-        *found |= strcmp(extensions[i].extensionName, name) == 0;
-    vkb_free(extensions);
-    return done;
+    return vkb_has_extension(device->instance, device->adapter.physical, name, found, error);
 }
 
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
@@ -35,8 +21,16 @@ VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
              : VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 }
 
-// Whether the device can import host memory for that usage.
-static bool imports_buffers(const struct vkb_device *device)
+VkBufferUsageFlags vkb_device_export_usage(void)
+{
+    return VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
+         | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+}
+
+// What the device can do with buffers over that kind of memory.
+static VkExternalMemoryFeatureFlags external_features(const struct vkb_device *device,
+                                                      VkBufferUsageFlags usage,
+                                                      VkExternalMemoryHandleTypeFlagBits type)
 {
     VkExternalBufferProperties properties = {
         .sType = VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES,
@@ -46,12 +40,19 @@ static bool imports_buffers(const struct vkb_device *device)
         device->adapter.physical,
         &(VkPhysicalDeviceExternalBufferInfo){
             .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO,
-            .usage = vkb_device_import_usage(device),
-            .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+            .usage = usage,
+            .handleType = type,
         },
         &properties);
+    return properties.externalMemoryProperties.externalMemoryFeatures;
+}
+
+// Whether the device can import host memory.
+static bool imports_buffers(const struct vkb_device *device)
+{
     const VkExternalMemoryFeatureFlags features =
-        properties.externalMemoryProperties.externalMemoryFeatures;
+        external_features(device, vkb_device_import_usage(device),
+                          VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT);
     return (features & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT)
         && !(features & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
 }
@@ -96,7 +97,7 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &device->instance->vk;
     const VkPhysicalDeviceFeatures available = available_features(device);
-    const char *extensions[3];
+    const char *extensions[4];
     uint32_t extension_count = 0;
     VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
@@ -106,6 +107,7 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 
     if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
         || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
+        || !has_extension(device, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME, &device->exports, error)
         || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
                           error))
         return false;
@@ -113,6 +115,12 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
         device->import_alignment = import_alignment(device);
         extensions[extension_count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
     }
+    device->exports = device->exports
+                   && (external_features(device, vkb_device_export_usage(),
+                                         VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT)
+                       & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT);
+    if (device->exports)
+        extensions[extension_count++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
     // It depends on the instance's extension.
     device->presents = device->presents && device->instance->surfaces;
     if (device->presents)

@@ -2,7 +2,7 @@
 #ifndef VKB_DEVICE_H
 #define VKB_DEVICE_H
 
-#include "vulkan/adapter.h"
+#include "vulkan/choice.h"
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
@@ -30,6 +30,7 @@ struct vkb_device {
     bool presents;            // VK_KHR_swapchain is there
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
+    bool exports;      // buffers can be exported as descriptors
     atomic_bool lost;  // other threads read it while the device is in use
     bool timed_out;    // lost because a wait took too long; it may still be busy
     VkFence idle;      // of vkb_device_wait_idle; null: not needed so far
@@ -53,6 +54,9 @@ bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format
 
 // How the device uses host memory of the caller that it imports as a buffer.
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device);
+
+// How the device uses buffers that it exports.
+VkBufferUsageFlags vkb_device_export_usage(void);
 
 // Submits the recorded commands. The unsignalled `fence` is signalled when the device has run them
 // and all earlier submissions. With `rendered`, which is signalled, too, the commands wait for

@@ -55,8 +55,9 @@ static uint32_t find_memory_type(const struct vkb_device *device, enum vkb_memor
 }
 
 bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
-                         const VkMemoryRequirements *requirements, VkDeviceMemory *memory,
-                         VkMemoryPropertyFlags *flags, struct vkb_error *error)
+                         const VkMemoryRequirements *requirements, const void *next,
+                         VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
+                         struct vkb_error *error)
 {
     uint32_t type = find_memory_type(device, kind, requirements->memoryTypeBits);
 
@@ -67,6 +68,7 @@ bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind k
         VK(error, device->vk.vkAllocateMemory(device->handle,
                                               &(VkMemoryAllocateInfo){
                                                   .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                                  .pNext = next,
                                                   .allocationSize = requirements->size,
                                                   .memoryTypeIndex = type,
                                               },
@@ -105,7 +107,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
                                       NULL, &buffer->handle)))
         return false;
     vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
-    if (!vkb_memory_allocate(device, kind, &requirements, &buffer->memory, &flags, error)
+    if (!vkb_memory_allocate(device, kind, &requirements, NULL, &buffer->memory, &flags, error)
         || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
         || (kind != VKB_MEMORY_DEVICE
             && !VK(error, vk->vkMapMemory(device->handle, buffer->memory, 0, VK_WHOLE_SIZE, 0,
@@ -449,7 +451,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
     if ((spec->mapped && !create_buffer(device, image, &requirements, error))
         || !vkb_memory_allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
-                                &requirements, &image->memory, &flags, error)
+                                &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
         || (spec->layers == 1 && !create_view(device, image, spec->levels, &image->view, error))) {

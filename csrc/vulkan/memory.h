@@ -51,10 +51,12 @@ struct vkb_image_spec {
 // Advises the system to use large pages for memory that has not been written yet.
 void vkb_advise_large(void *memory, size_t size);
 
-// Memory of a kind that fits the requirements; *flags gets the properties of its type.
+// Memory of a kind that fits the requirements; *flags gets the properties of its type. `next`:
+// what extends VkMemoryAllocateInfo; NULL: nothing.
 bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
-                         const VkMemoryRequirements *requirements, VkDeviceMemory *memory,
-                         VkMemoryPropertyFlags *flags, struct vkb_error *error);
+                         const VkMemoryRequirements *requirements, const void *next,
+                         VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
+                         struct vkb_error *error);
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,

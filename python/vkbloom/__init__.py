@@ -29,6 +29,7 @@ from vkbloom._core import (
     ValidationError,
 )
 from vkbloom.adapter import AdapterInfo, adapters
+from vkbloom.device_arrays import DeviceArray
 from vkbloom.frames import Frames
 from vkbloom.image import Image
 from vkbloom.methods.mip_chain import DualKawase, Pyramid
@@ -116,6 +117,7 @@ __all__ = [
     "BlenderGlare",
     "Camera",
     "Convolution",
+    "DeviceArray",
     "DeviceLostError",
     "Dirt",
     "DualKawase",

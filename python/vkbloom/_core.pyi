@@ -12,8 +12,9 @@ MAX_LAYERS: int
 MAX_STAGES: int
 MOST_GHOSTS: int
 
-AdapterTuple = tuple[str, str, str, str, str, bytes, bool]
+AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
 _Array = NDArray[Any]
+_ExportedImage = tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str]
 _Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
 _Texture = tuple[tuple[_Array, ...], str, str, str, str, str]
 _Mesh = tuple[
@@ -39,8 +40,8 @@ class ShaderError(Error): ...
 
 def adapters(driver: str, /) -> list[AdapterTuple]: ...
 def image_source(
-    image: _Array,
-    emission: _Array | None = None,
+    image: _Array | _ExportedImage,
+    emission: _Array | _ExportedImage | None = None,
     mask: NDArray[np.float32] | None = None,
     levels: tuple[_Array, ...] = (),
     /,
@@ -69,6 +70,9 @@ def resource(
     data: bytes | None,
     /,
 ) -> Resource: ...
+def read_dlpack(
+    capsule: object, /
+) -> tuple[int, tuple[int, int], tuple[int, int, int], tuple[int, ...], tuple[int, ...] | None]: ...
 def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 
 class Renderer:
@@ -107,7 +111,7 @@ class Renderer:
         self,
         source: Source,
         plans: tuple[Plan, ...],
-        arrays: tuple[tuple[_Array | None, ...], ...],
+        arrays: tuple[tuple[_Array | Exported | None, ...], ...],
         in_place: bool = False,
         first: int = ...,
         count: int = ...,
@@ -132,10 +136,18 @@ class Renderer:
         /,
     ) -> Submission | None: ...
     def pages(self, size: int, /) -> Pages: ...
+    def cuda(self) -> tuple[int, int]: ...
+    def cuda_name(self, ordinal: int, /) -> str: ...
+    def export(self, size: int, /) -> Exported: ...
+    def snapshot(self, what: str, address: int, size: int, stream: int, /) -> Exported: ...
 
 class Source:
     @property
+    def kind(self) -> tuple[tuple[int, int, int], str]: ...
+    @property
     def resident(self) -> bool: ...
+    @property
+    def exported(self) -> bool: ...
 
 class Plan:
     @property
@@ -159,6 +171,16 @@ class Shader:
 
 class Submission:
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, int]]: ...
+
+class Exported:
+    @property
+    def address(self) -> int: ...
+    @property
+    def ordinal(self) -> int: ...
+    def capsule(self, shape: tuple[int, ...], code: int, bits: int, versioned: bool, /) -> Any: ...
+    def clone(self, size: int, /) -> Exported: ...
+    def read(self, array: _Array, offset: int, /) -> None: ...
+    def copy_to(self, address: int, size: int, stream: int, /) -> None: ...
 
 class Pages:
     def __len__(self) -> int: ...

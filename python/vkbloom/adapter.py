@@ -28,8 +28,12 @@ class AdapterInfo:
     bundled : bool
         Whether the driver comes from the package ``vkbloom-lavapipe`` or from VKBLOOM_DRIVER;
         otherwise the system's Vulkan loader found it.
+    uuid : str
+        The device's UUID, in lower case. NVIDIA's tools print it after "GPU-".
+    pci : str
+        The device's address on the PCI bus, such as "0000:3b:00.0"; "" if it is not on one.
     summary : str
-        All of these on one line.
+        Name, type, driver and Vulkan version on one line.
 
     See Also
     --------
@@ -49,6 +53,8 @@ class AdapterInfo:
     driver_info: str
     api_version: str
     bundled: bool = False
+    uuid: str = ""
+    pci: str = ""
 
     @property
     def summary(self) -> str:
@@ -136,5 +142,5 @@ def adapters() -> tuple[AdapterInfo, ...]:
 
 def from_core(adapter: _core.AdapterTuple) -> AdapterInfo:
     """Make an AdapterInfo from the core's description of an adapter."""
-    name, kind, driver, driver_info, api_version, _, bundled = adapter
-    return AdapterInfo(name, kind, driver, driver_info, api_version, bundled)
+    name, kind, driver, driver_info, api_version, _, bundled, uuid, pci = adapter
+    return AdapterInfo(name, kind, driver, driver_info, api_version, bundled, uuid, pci)

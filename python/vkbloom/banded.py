@@ -20,7 +20,7 @@ __all__ = ["Band", "BloomByBands", "ImageByBands"]
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Rows of an image, and of what belongs to it.
+    """Rows of an image, of its emission and of its mask.
 
     - `image`: ndarray, shape (N, W, 3) or (N, W, 4); As for `vkbloom.Renderer.apply`.
     - `emission`: Of the image's shape and dtype.
@@ -57,14 +57,13 @@ class Band:
 
 
 class BloomByBands:
-    """Bloom of an image of which host and device have a band at a time.
+    """Bloom of an image that is processed band by band, with the same bits as in one call.
 
-    Only smaller images of the bloom are held as a whole: the first, which bands of the image are
-    reduced to, and those that the result is made of. The result is the same as that of the image
-    given at once, bit by bit.
+    Only smaller images of the bloom are complete in memory: the largest one, which is computed
+    band by band, and those from which `final` is computed.
 
-    - `sample`: Rows of the image, any.
-    - `height`: Rows in all.
+    - `sample`: Any rows of the image.
+    - `height`: Height of the image in rows.
     """
 
     def __init__(
@@ -86,11 +85,11 @@ class BloomByBands:
     def of(
         cls, core: _core.Renderer, settings: Settings, sample: Band, height: int, rows: int
     ) -> Self | None:
-        """Make one; None where the bloom needs the whole image.
+        """Return an object for these settings; None if the bloom needs the complete image.
 
-        That is where the bloom reaches too far, for dithering, which depends on a pixel's place,
-        and for passes that need rows at the same place in all images (Godot's, and `Separable`'s
-        with buffers of another size) where the heights have no small common divisor.
+        Reasons: a bloom that reaches too far; dithering, which depends on the position; and heights
+        without a small common divisor, for passes that need a row at the same position in all
+        images (Godot's, and `Separable` with buffers of another size).
         """
         found = core.bands(sample.source(), settings, height)
         if found is None:
@@ -103,7 +102,7 @@ class BloomByBands:
         return cls(core, settings, sample, height, parts)
 
     def reduce(self, bands: Iterable[Band]) -> Iterator[int]:
-        """Take the image from the top to the bottom; yield how many rows were taken."""
+        """Read the image from top to bottom; yield each band's number of rows."""
         head, head_height, names, _, _ = self._parts
         if head is None:
             for band in bands:
@@ -133,7 +132,7 @@ class BloomByBands:
         return bool(self._levels) and not any(level[:, :, :3].any() for level in self._levels)
 
     def finals(self, bands: Iterable[Band]) -> Iterator[NDArray[Any]]:
-        """Take the image once more, and yield the rows of `final`; after `reduce`."""
+        """Read the image again and yield the rows of `final`; after `reduce`."""
         for window in self._windows(bands):
             first, end = window.top, window.top + len(window.rows.image)
             levels = tuple(
@@ -156,9 +155,9 @@ class BloomByBands:
         return tuple(arrays[name] for name in names)
 
     def _windows(self, bands: Iterable[Band]) -> Iterator[_Window]:
-        """Yield the image in bands with what is beyond them."""
+        """Yield the bands of the image, each with the rows around it that it depends on."""
         held: Band | None = None
-        top = first = 0  # of what is held; of the next band
+        top = first = 0  # the first row that is held, and that of the next band
         for band in bands:
             held = band if held is None else held.joined(band)
             end = top + len(held.image)
@@ -175,12 +174,12 @@ class BloomByBands:
 
 
 class _Parts(NamedTuple):
-    """How an image is taken by bands: see graph/bands.h of the core.
+    """How an image is divided: see graph/bands.h of the core.
 
-    - `head`: The smaller image that bands are reduced to.
-    - `levels`: Those that the result is made of.
-    - `rows`: Of the image to take at a time.
-    - `halo`: Rows beyond a band that it depends on.
+    - `head`: The smaller image that is computed band by band.
+    - `levels`: The smaller images from which `final` is computed.
+    - `rows`: Rows of a band.
+    - `halo`: Rows above and below a band that it depends on.
     """
 
     head: str | None
@@ -191,10 +190,10 @@ class _Parts(NamedTuple):
 
 
 class _Window(NamedTuple):
-    """A band with what is beyond it.
+    """A band with the rows around it.
 
-    - `top`: The place of its first row in the image.
-    - `first`, `end`: The band's own rows.
+    - `top`: Position of the first row in the image.
+    - `first`, `end`: The rows of the band itself.
     """
 
     rows: Band
@@ -204,10 +203,7 @@ class _Window(NamedTuple):
 
 
 class ImageByBands:
-    """An image on the device, of which the host has only one band at a time.
-
-    The device has the complete image and the complete result. The bloom is the same as for the
-    image in one array.
+    """An image of which the device has all rows, and the host only one band at a time.
 
     - `rows`: The first rows.
     - `height`: Height of the image in rows.

@@ -64,35 +64,14 @@ _KINDS: Final[Mapping[object, Kind]] = {
 class FieldInfo:
     """The description of a field.
 
-    Attributes
-    ----------
-    name : str
-    kind : Kind
-    default : object
-        `dataclasses.MISSING` if there is none.
-    owner : type
-        The class that has the field.
-    optional : bool
-        Whether the value may be None.
-    choices : tuple
-        The values of a choice.
-    range : (float, float) or None
-        The least and the largest value of a number. An infinite one stands for finite numbers
-        above the least.
-    slider : (float, float) or None
-        The ends of a slider; an empty tuple for no slider. None: those of the range.
-    unit : str
-        "1" for numbers without a unit, "" for others.
-    option : str
-        The field's name on the command line.
-    fixed : str
-        Why the method takes only the default; "" for other fields.
-    narrowed : bool
-        Whether the class has fewer choices than the annotation.
-    read : callable or None
-        Checks a value of another kind and returns the value to store.
-    text : str
-        The help of a class without a docstring.
+    - `range`: Least and largest value of a number; an infinite one stands for finite numbers
+      above the least.
+    - `slider`: The ends of a slider; an empty tuple for no slider; None: those of the range.
+    - `unit`: "1" for numbers without a unit, "" for others.
+    - `fixed`: Why the method takes only the default; "" for other fields.
+    - `narrowed`: Whether the class has fewer choices than the annotation.
+    - `read`: Checks a value of another kind and returns the value to store.
+    - `text`: The help of a class without a docstring.
     """
 
     name: str
@@ -179,18 +158,7 @@ def number_field(
     table: Mapping[str, tuple[float, float, float]] = _core.VALUES,
     **declared: Any,
 ) -> Any:
-    """Declare a field that is a number.
-
-    Parameters
-    ----------
-    name : str
-        The row of the core's table that gives the default and the range, unless they are declared.
-    default : float or None
-    table : mapping
-        One of the core's tables.
-    **declared
-        Values of a `FieldInfo`: range, unit, slider, option, fixed, text.
-    """
+    """Declare a field that is a number."""
     if name:
         initial, low, high = table[name]
         default = initial if default is dataclasses.MISSING else default

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.device_arrays import DeviceArray, on_host
 from vkbloom.framebuffers import dimensions
 from vkbloom.suggestions import unknown
 
@@ -31,8 +32,9 @@ class Frames(Mapping[str, NDArray[Any]]):
     """Framebuffers by name, in the order of the data flow, with timings, settings and adapter.
 
     A read-only mapping: framebuffers cannot be added, replaced or removed. The arrays are plain
-    `numpy.ndarray` and belong to the caller. Two Frames are equal only if they are the same
-    object; compare their arrays with `numpy.array_equal`.
+    `numpy.ndarray`, or `DeviceArray` where they stay on the device, and belong to the caller. Two
+    Frames are equal only if they are the same object; compare their arrays with
+    `numpy.array_equal`.
 
     Parameters
     ----------
@@ -90,6 +92,13 @@ class Frames(Mapping[str, NDArray[Any]]):
         """Add what is known when the device has finished."""
         self._timings = timings
         self._info |= {"nan": nan, "inf": inf}
+
+    def _on_host(self) -> Frames:
+        """Return the same with arrays of NumPy: this object, if it has no others."""
+        if not any(isinstance(array, DeviceArray) for array in self._arrays.values()):
+            return self
+        arrays = {name: on_host(array) for name, array in self._arrays.items()}
+        return Frames(arrays, timings=self._timings, settings=self._settings, info=self._info)
 
     @property
     def timings(self) -> Mapping[str, float]:
@@ -174,13 +183,14 @@ class Frames(Mapping[str, NDArray[Any]]):
 
         xr = import_extra("xarray", "grid", "Frames.to_xarray")
         dims = dimensions(self)
+        host = self._on_host()
         channels = {
             dims[name][2]: list(_CHANNELS[: array.shape[2]])
             for name, array in self.items()
             if array.ndim == 3
         }
         dataset: xarray.Dataset = xr.Dataset(
-            {name: (dims[name], array) for name, array in self.items()},
+            {name: (dims[name], array) for name, array in host.items()},
             coords=channels,
             attrs={
                 **{k: v if isinstance(v, int | float) else str(v) for k, v in self._info.items()},
@@ -253,7 +263,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         """
         from vkbloom.io import files  # noqa: PLC0415  costs start-up time
 
-        return files.save(self, path)
+        return files.save(self._on_host(), path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -311,13 +321,13 @@ class Frames(Mapping[str, NDArray[Any]]):
         """Return the picture of `pictures.leading_png`; None without framebuffers."""
         from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
 
-        return pictures.leading_png(self) if self else None
+        return pictures.leading_png(self._on_host()) if self else None
 
     def _repr_html_(self) -> str:
         """Return the page of `pictures.contact_sheet_html`."""
         from vkbloom.views import pictures  # noqa: PLC0415  costs start-up time
 
-        return pictures.contact_sheet_html(self)
+        return pictures.contact_sheet_html(self._on_host())
 
 
 def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -325,6 +335,8 @@ def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
         raise TypeError(f"arrays: {name!r} is not a name; use a str")
     if not name.isidentifier():
         raise ValueError(f"arrays: {name!r} is not an identifier, as names of framebuffers must be")
+    if isinstance(array, DeviceArray):
+        return array
     if not isinstance(array, np.ndarray):
         raise TypeError(f"arrays[{name!r}]: {type(array).__name__} is not a NumPy array")
     is_image = array.ndim == 3 and array.shape[2] in (3, 4) and array.dtype in _IMAGE_DTYPES

@@ -29,12 +29,7 @@ class Reference(Protocol):
 class Registry(Mapping[str, type[Any]]):
     """Classes by name. Those of the package are imported on first use, since some import much.
 
-    Parameters
-    ----------
-    package : str
-        The package of the classes' modules.
-    places : dict
-        "module:Class" in this package, by name.
+    `places`: "module:Class" in `package`, by name.
     """
 
     def __init__(self, package: str, places: Mapping[str, str]) -> None:
@@ -81,13 +76,7 @@ class Methods(Registry):
         self._references = {}
 
     def register(self, kind: type[Any], reference: Reference | None = None) -> None:
-        """Add a class under its `method`, or replace one that was added.
-
-        Raises
-        ------
-        ValueError
-            The name is that of a method of the package.
-        """
+        """Add a class under its `method`, or replace one that was added."""
         name = kind.method
         if isinstance(self._sources.get(name), str):
             raise ValueError(f"method: {name!r} is a method of vkbloom; give another name")

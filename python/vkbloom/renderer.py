@@ -15,11 +15,12 @@ import numpy as np
 from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.checks import check_attachments, check_size
+from vkbloom.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
 from vkbloom.frames import Frames
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
-from vkbloom.sources import image_kind, image_source, is_image, scene_source
+from vkbloom.sources import batch_sources, image_kind, image_source, is_image, scene_source
 from vkbloom.suggestions import unknown
 from vkbloom.version import installed_version
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from vkbloom.gradients import Pullback
     from vkbloom.plans import Plan
     from vkbloom.scene import Scene
 
@@ -76,11 +78,17 @@ def _check_out(array: object, name: str, shape: tuple[int, ...], dtype: str) -> 
 
 
 def _arrays_for(
-    core: _core.Renderer, plan: _core.Plan, out: Mapping[str, NDArray[Any]] | None
-) -> tuple[NDArray[Any], ...]:
-    """Return the arrays to fill: those of `out`, and new ones."""
+    core: _core.Renderer,
+    plan: _core.Plan,
+    out: Mapping[str, Any] | None,
+    place: requests.Place,
+) -> tuple[NDArray[Any] | _core.Exported, ...]:
+    """Return the arrays to fill: those of `out`, and new ones.
+
+    Arrays of `out` that are on the device are filled later, from new ones that are there.
+    """
     if out is None:
-        return requests.new_arrays(core, plan)
+        return requests.new_arrays(core, plan, place)
     if not isinstance(out, abc.Mapping):
         raise TypeError(f"out: {type(out).__name__} is not a mapping of names to arrays")
     names = [name for name, _, _ in plan.outputs]
@@ -89,7 +97,7 @@ def _arrays_for(
             raise ValueError(f"out: {name!r} is not among the framebuffers: {', '.join(names)}")
     given: dict[str, NDArray[Any]] = {}
     for name, shape, dtype in plan.outputs:
-        if name not in out:
+        if name not in out or on_cuda(out[name]):
             continue
         array = _check_out(out[name], name, shape, dtype)
         for other, taken in given.items():
@@ -98,27 +106,41 @@ def _arrays_for(
                 raise ValueError(f"out: {other} and {name} must not share memory")
         given[name] = array
     return tuple(
-        given[name] if name in given else requests.new_array(core, shape, dtype)
+        given[name]
+        if name in given
+        else requests.new_memory(core, shape, dtype, "cuda" if name in out else place)
         for name, shape, dtype in plan.outputs
     )
 
 
+def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Source]:
+    """Yield the Source of each image; a batch on the device is copied at once."""
+    if on_cuda(images):
+        yield from batch_sources(images, core)
+        return
+    for image in images:
+        source = image_source(image, core=core)
+        # The iterable may overwrite the array when it yields the next image.
+        del image
+        yield source
+        del source
+
+
 def _paired(
-    images: Iterable[NDArray[Any] | Image], settings: Settings | Sequence[Settings]
+    sources: Iterable[_core.Source], settings: Settings | Sequence[Settings]
 ) -> Iterator[requests.Work]:
-    """Yield each image with its settings. Errors are raised in order."""
+    """Yield each source with its settings. Errors are raised in order."""
     count = 0
     state: dict[Any, Any] = {}
-    for image in images:
+    for source in sources:
         if isinstance(settings, Settings):
             one = settings
         elif count < len(settings):
             one = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Work(image_source(image), one._in_sequence(count, state))
-        # The iterable may overwrite the array when it yields the next image.
-        del image
+        work = requests.Work(source, one._in_sequence(count, state))
+        del source
         yield work
         del work
         count += 1
@@ -132,11 +154,13 @@ class Renderer:
     Parameters
     ----------
     adapter : str
-        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", or a
-        part of an adapter's name, in any case. The environment variable VKBLOOM_ADAPTER replaces
-        "auto". "software" is the driver of the package ``vkbloom-lavapipe`` if it is installed,
-        otherwise the system's. VKBLOOM_DRIVER selects another driver by the path of its library or
-        manifest, or "system".
+        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", a part
+        of an adapter's name in any case, "uuid:" with a device's UUID or its beginning, or "pci:"
+        with its address ("pci:0000:3b:00.0"). The environment variable VKBLOOM_ADAPTER replaces
+        "auto". Where CUDA_VISIBLE_DEVICES is set, of NVIDIA's GPUs only the first one that it names
+        is taken, unless `adapter` is a UUID or an address. "software" is the driver of the package
+        ``vkbloom-lavapipe`` if it is installed, otherwise the system's. VKBLOOM_DRIVER selects
+        another driver by the path of its library or manifest, or "system".
     validation : bool
         Enables the Khronos validation layer with synchronization validation. A call that causes
         messages raises `ValidationError` with the first one.
@@ -154,8 +178,8 @@ class Renderer:
     Error
         The device cannot be set up, or the validation layer is not installed.
     ValueError
-        `adapter` is empty, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is out of range, or VKBLOOM_VARIANT
-        names variants that the adapter cannot run.
+        `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
+        out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
 
     See Also
     --------
@@ -328,7 +352,8 @@ class Renderer:
         shading: Shading = "forward",
         time: float = 0.0,
         attachments: Literal["all"] | str | Sequence[str] = "all",
-        out: Mapping[str, NDArray[Any]] | None = None,
+        out: Mapping[str, Any] | None = None,
+        device: Device | None = None,
     ) -> Frames:
         """Render a scene with its bloom.
 
@@ -400,7 +425,7 @@ class Renderer:
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
-        return self._run_one(source, settings, check_attachments(attachments), out)
+        return self._run_one(source, settings, check_attachments(attachments), out, device)
 
     def apply(
         self,
@@ -410,7 +435,8 @@ class Renderer:
         mask: NDArray[Any] | None = None,
         emission: NDArray[Any] | None = None,
         attachments: Literal["all"] | str | Sequence[str] = "all",
-        out: Mapping[str, NDArray[Any]] | None = None,
+        out: Mapping[str, Any] | None = None,
+        device: Device | None = None,
     ) -> Frames:
         """Add bloom to an image.
 
@@ -487,8 +513,65 @@ class Renderer:
         (10.0, 0.0)
         """
         settings = check_settings(settings, of_image=True)
-        source = image_source(image, mask, emission)
-        return self._run_one(source, settings, check_attachments(attachments), out)
+        source = image_source(image, mask, emission, self._core)
+        return self._run_one(source, settings, check_attachments(attachments), out, device)
+
+    def vjp(
+        self,
+        image: NDArray[Any],
+        settings: Settings | None = None,
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> tuple[Frames, Pullback]:
+        """Add bloom to an image, and return a function for the derivatives of a sum over it.
+
+        Parameters
+        ----------
+        image, settings, mask, emission
+            As for `apply`. The bloom buffers are "rgba32float", whatever `Settings.format` says.
+
+        Returns
+        -------
+        frames : Frames
+            As of `apply`.
+        pullback : callable
+            ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum
+            over all of them of (framebuffer . cotangent), it returns the derivatives of S as
+            float32: by "image", "mask" (H, W) and "emission" if they were given, by "kernel" (of
+            `Convolution`), and by each real field under its name, such as "intensity" or
+            "glare.0.intensity". Those of a uint8 image are by value / 255. At NaN and infinity of
+            the image they are 0.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
+            which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
+            has another shape, or is not finite. Its result raises ValueError for names that have no
+            derivative, such as "levels".
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed.
+
+        See Also
+        --------
+        vkbloom.reference.vjp : The same in NumPy, with the subgradients at kinks.
+        fit : Finds settings by derivatives with ``gradient=True``.
+
+        Examples
+        --------
+        >>> image = np.full((4, 4, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames, pullback = renderer.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+        ...     gradients = pullback({"final": np.ones_like(image)})
+        >>> float(gradients["intensity"])  # the sum of the bloom
+        24.0
+        >>> float(gradients["image"].sum()) / image.size  # the image and half of the bloom
+        1.5
+        """
+        from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
+
+        return vjp(self.apply, image, check_settings(settings, of_image=True), mask, emission)
 
     def apply_many(
         self,
@@ -496,6 +579,7 @@ class Renderer:
         settings_seq: Iterable[Settings],
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
+        device: Device | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to an image with many settings.
 
@@ -533,7 +617,8 @@ class Renderer:
         ...     [frames["final"].max().item() for frames in renderer.apply_many(image, settings)]
         [0.5, 1.0]
         """
-        return self._run_many(image_source(image), settings_seq, check_attachments(attachments))
+        source = image_source(image, core=self._core)
+        return self._run_many(source, settings_seq, check_attachments(attachments), device)
 
     def apply_each(
         self,
@@ -541,6 +626,7 @@ class Renderer:
         settings: Settings | Sequence[Settings] | None = None,
         *,
         attachments: Literal["all"] | str | Sequence[str] = "all",
+        device: Device | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
 
@@ -590,7 +676,10 @@ class Renderer:
         2.0
         """
         names = check_attachments(attachments)
-        if not isinstance(images, abc.Iterable) or isinstance(images, str | bytes | np.ndarray):
+        is_one = isinstance(images, str | bytes) or (
+            isinstance(images, np.ndarray) and images.ndim != 4
+        )
+        if (not isinstance(images, abc.Iterable) and not on_cuda(images)) or is_one:
             raise TypeError(
                 f"images: {type(images).__name__} is not an iterable of images; for one image, "
                 "call apply or pass a list"
@@ -607,8 +696,9 @@ class Renderer:
             raise ValueError("the renderer is closed")
         chosen = settings or check_settings(None, of_image=True)
         self._check_names(image_source(_ANY_IMAGE), chosen, names)
-        work = requests.uploaded(self._core, _paired(images, chosen))
-        results = requests.run(work, self._core, names, alone=True)
+        sources = _sources(images, self._core)
+        work = requests.uploaded(self._core, _paired(sources, chosen))
+        results = requests.run(work, self._core, names, alone=True, place=self._placed(device))
         return (self._frames_of(one, result) for one, result in results)
 
     def upload(
@@ -659,13 +749,20 @@ class Renderer:
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
-        shape, dtype = image_kind(image)
-        height, width, channels = shape
-        source = self._core.upload(image_source(image, mask, emission), None, False)
+        source = image_source(image, mask, emission, self._core)
+        shape, dtype = source.kind
+        if source.exported:
+            # It is a copy already, but for what is on the host.
+            mask, emission = (
+                one if one is None or on_cuda(one) else np.array(one) for one in (mask, emission)
+            )
+            source = image_source(image, mask, emission, self._core)
+        else:
+            source = self._core.upload(source, None, False)
         return Image(
             source,
-            (height, width, channels),
-            dtype,
+            shape,
+            np.dtype(dtype),
             mask=mask is not None,
             emission=emission is not None,
         )
@@ -679,6 +776,7 @@ class Renderer:
         shading: Shading = "forward",
         time: float = 0.0,
         attachments: Literal["all"] | str | Sequence[str] = "all",
+        device: Device | None = None,
     ) -> Iterator[Frames]:
         """Render a scene with many settings.
 
@@ -714,7 +812,8 @@ class Renderer:
         ['final']
         """
         names = check_attachments(attachments)
-        return self._run_many(scene_source(scene, size, shading, time), settings_seq, names)
+        source = scene_source(scene, size, shading, time)
+        return self._run_many(source, settings_seq, names, device)
 
     def plan(
         self,
@@ -785,7 +884,7 @@ class Renderer:
                     raise ValueError(f"{name}: the source is not a scene; leave the argument out")
             kind, (shape, dtype) = "image", image_kind(source)
             height, width, channels = shape
-            planned = image_source(source)
+            planned = image_source(likeness(source) if on_cuda(source) else source)
         else:
             width, height = check_size("size", _SCENE_SIZE if size is None else size)
             planned = scene_source(cast("Scene", source), (width, height), shading, 0.0)
@@ -904,8 +1003,8 @@ class Renderer:
         >>> grid["final"].sel(preset="kino", intensity=0.5).shape
         (32, 48, 3)
         """
+        from vkbloom.grid.layout import ask  # noqa: PLC0415
         from vkbloom.grid.memory import in_memory  # noqa: PLC0415  grids cost start-up time
-        from vkbloom.grid.plan import ask  # noqa: PLC0415
 
         asked = ask(
             source,
@@ -926,15 +1025,33 @@ class Renderer:
         source: _core.Source,
         settings: Settings,
         names: tuple[str, ...] | None,
-        out: Mapping[str, NDArray[Any]] | None,
+        out: Mapping[str, Any] | None,
+        device: Device | None,
     ) -> Frames:
+        place = self._placed(device)(source)
         plan = self._plan_of(source, settings, names)
-        arrays = _arrays_for(self._core, plan, out)
+        arrays = _arrays_for(self._core, plan, out, place)
         submission = self._core.run(source, (plan,), (arrays,), True)
         # While the device works.
-        frames = self._frames(settings, requests.named(plan, arrays))
+        frames = self._frames(settings, requests.named(plan, arrays, place))
         (timings,), counts = submission.wait()
+        for name, target in (out or {}).items():
+            if on_cuda(target):
+                fill(target, f"out: {name}", cast("DeviceArray", frames[name]), self._core)
         return self._finished(frames, timings, counts)
+
+    def _placed(self, device: Device | None) -> Callable[[_core.Source], requests.Place]:
+        """Return where the framebuffers of a source go."""
+        if device not in (None, "host", "device"):
+            raise ValueError(f"device: {device!r} is not 'host' or 'device'")
+
+        def place(source: _core.Source) -> requests.Place:
+            if device == "host" or (device is None and not source.exported):
+                return "host"
+            # The memory of a CPU adapter is the host's.
+            return "cuda" if source.exported or self.info.type != "cpu" else "viewed"
+
+        return place
 
     def _plan_of(
         self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
@@ -956,7 +1073,9 @@ class Renderer:
         source: _core.Source,
         settings_seq: Iterable[Settings],
         names: tuple[str, ...] | None,
+        device: Device | None = None,
     ) -> Iterator[Frames]:
+        place = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings_seq, abc.Iterable) or isinstance(settings_seq, str):
             raise TypeError(f"settings_seq: {settings_seq!r} is not an iterable of Settings")
@@ -967,7 +1086,7 @@ class Renderer:
             if names:
                 self._check_names(source, settings_seq, names)
         return self._run_work(
-            (requests.Work(source, check_settings(one)) for one in settings_seq), names
+            (requests.Work(source, check_settings(one)) for one in settings_seq), names, place
         )
 
     def _check_names(
@@ -989,9 +1108,12 @@ class Renderer:
                 raise ValueError(unknown("attachments: unknown framebuffer", name, found))
 
     def _run_work(
-        self, sequence: Iterable[requests.Work], names: tuple[str, ...] | None
+        self,
+        sequence: Iterable[requests.Work],
+        names: tuple[str, ...] | None,
+        place: Callable[[_core.Source], requests.Place] = lambda _: "host",
     ) -> Iterator[Frames]:
-        results = requests.run(sequence, self._core, names)
+        results = requests.run(sequence, self._core, names, place=place)
         return (self._frames_of(settings, result) for settings, result in results)
 
     def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:

@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
 from vkbloom import _core
+from vkbloom.device_arrays import DeviceArray
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
     from vkbloom.settings import Settings
 
-__all__ = ["Result", "Work", "named", "new_array", "new_arrays", "run", "uploaded"]
+__all__ = ["Result", "Work", "named", "new_array", "new_arrays", "new_memory", "run", "uploaded"]
 
 #: The most requests in one submission.
 REQUESTS = 32
@@ -35,6 +36,10 @@ IMAGES_AHEAD = 3
 #: Arrays of this size or more are in a renderer's pages, to which the device writes directly. For
 #: smaller arrays NumPy recycles some memory.
 LARGE_BYTES = 1 << 20
+
+
+#: Where framebuffers go: arrays of NumPy; the same as a `DeviceArray`; memory that CUDA shares.
+Place = Literal["host", "viewed", "cuda"]
 
 
 class Result(NamedTuple):
@@ -60,13 +65,24 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
     return np.ndarray(shape, dtype, buffer=core.pages(size))  # type: ignore[arg-type]
 
 
-def new_arrays(core: _core.Renderer, plan: _core.Plan) -> tuple[NDArray[Any], ...]:
-    """Return an array for each of a plan's outputs."""
-    arrays = []
+def new_memory(
+    core: _core.Renderer, shape: tuple[int, ...], dtype: str, place: Place
+) -> NDArray[Any] | _core.Exported:
+    """Return an array for a framebuffer, or memory on the device."""
+    if place == "cuda":
+        return core.export(math.prod(shape) * np.dtype(dtype).itemsize)
+    return new_array(core, shape, dtype)
+
+
+def new_arrays(
+    core: _core.Renderer, plan: _core.Plan, place: Place = "host"
+) -> tuple[NDArray[Any] | _core.Exported, ...]:
+    """Return an array, or memory on the device, for each of a plan's outputs."""
+    arrays: list[NDArray[Any] | _core.Exported] = []
     # Not a generator expression, for which `core` would be a cell. CPython 3.11 leaks all arguments
     # of a call if it cannot allocate a cell.
     for _, shape, dtype in plan.outputs:
-        arrays.append(new_array(core, shape, dtype))
+        arrays.append(new_memory(core, shape, dtype, place))
     return tuple(arrays)
 
 
@@ -77,7 +93,7 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
     """
     kept: deque[_core.Source] = deque()
     for work in sequence:
-        if work.source.resident:
+        if work.source.resident or work.source.exported:
             yield work
             continue
         spare = kept.popleft() if len(kept) == IMAGES_AHEAD else None
@@ -88,9 +104,17 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Work]) -> Iterator[Work]:
         yield Work(kept[-1], settings)
 
 
-def named(plan: _core.Plan, arrays: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
+def named(
+    plan: _core.Plan, arrays: tuple[NDArray[Any] | _core.Exported, ...], place: Place = "host"
+) -> dict[str, NDArray[Any]]:
     """Return the arrays of a plan's outputs by name."""
-    return {name: array for (name, _, _), array in zip(plan.outputs, arrays, strict=True)}
+    return {
+        # Annotated as arrays of NumPy, which they are unless the caller asked for others.
+        name: cast("NDArray[Any]", DeviceArray(array, shape, dtype))
+        if place == "viewed" or isinstance(array, _core.Exported)
+        else array
+        for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True)
+    }
 
 
 class Work(NamedTuple):
@@ -103,13 +127,16 @@ class Work(NamedTuple):
 class _Request(NamedTuple):
     work: Work
     plan: _core.Plan
-    arrays: tuple[NDArray[Any], ...]
+    arrays: tuple[NDArray[Any] | _core.Exported, ...]
+    place: Place
 
 
 def _taken(
     request: _Request, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
-    return request.work.settings, Result(named(request.plan, request.arrays), timings, counts)
+    return request.work.settings, Result(
+        named(request.plan, request.arrays, request.place), timings, counts
+    )
 
 
 class _Submitted(NamedTuple):
@@ -131,11 +158,13 @@ class _Requests:
         core: _core.Renderer,
         names: tuple[str, ...] | None,
         most: int,
+        place: Callable[[_core.Source], Place],
     ) -> None:
         self._sequence = iter(sequence)
         self._core = core
         self._names = names
         self._ever = most
+        self._place = place
         self._waiting: deque[Work] = deque()  # taken from the sequence, not submitted yet
         self._alone = 0  # how many of these are submitted one by one
         self._limit = 1
@@ -191,7 +220,9 @@ class _Requests:
                 ):
                     self._waiting.appendleft(work)
                     break
-                requests.append(_Request(work, plan, new_arrays(self._core, plan)))
+                place = self._place(work.source)
+                arrays = new_arrays(self._core, plan, place)
+                requests.append(_Request(work, plan, arrays, place))
             except Exception as error:
                 self._fail(error)
                 break
@@ -231,6 +262,7 @@ def run(
     names: tuple[str, ...] | None,
     *,
     alone: bool = False,
+    place: Callable[[_core.Source], Place] = lambda _: "host",
 ) -> Iterator[tuple[Settings, Result]]:
     """Yield the result of each request, in their order.
 
@@ -239,7 +271,7 @@ def run(
 
     `names`: The requested framebuffers; None: all.
     """
-    waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS)
+    waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS, place)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission ended

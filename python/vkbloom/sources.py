@@ -7,23 +7,39 @@ from typing import TYPE_CHECKING, Any
 
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_size, check_time
+from vkbloom.device_arrays import Taken, likeness, on_cuda, take
 from vkbloom.image import Image
 from vkbloom.settings import check_shading
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
 
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
     from vkbloom.settings import Shading
 
-__all__ = ["image_kind", "image_source", "is_image", "scene_arguments", "scene_source"]
+__all__ = [
+    "batch_sources",
+    "image_kind",
+    "image_source",
+    "is_image",
+    "scene_arguments",
+    "scene_source",
+]
 
 
 def image_source(
-    image: object, mask: object | None = None, emission: object | None = None
+    image: object,
+    mask: object | None = None,
+    emission: object | None = None,
+    core: _core.Renderer | None = None,
 ) -> _core.Source:
-    """Return the core's Source of an image. Its arrays must not change while it is used."""
+    """Return the core's Source of an image. Its arrays must not change while it is used.
+
+    With a renderer, arrays may be on its device; these are copied.
+    """
     if isinstance(image, Image):
         for name, given in (("mask", mask), ("emission", emission)):
             if given is not None:
@@ -31,6 +47,8 @@ def image_source(
                     f"{name}: the image was uploaded already; upload it together with its {name}"
                 )
         return image._source
+    if core is not None and any(map(on_cuda, (image, mask, emission))):
+        return _device_source(image, mask, emission, core)
     checked = check_image(image)
     height, width, _ = checked.shape
     return _core.image_source(
@@ -40,15 +58,43 @@ def image_source(
     )
 
 
+def _device_source(
+    image: object, mask: Any, emission: object | None, core: _core.Renderer
+) -> _core.Source:
+    """Return the Source of arrays of which some are on the device."""
+    checked: Any = take(image, "image", core) if on_cuda(image) else check_image(image)
+    glowing: Any = None
+    if emission is not None:
+        glowing = take(emission, "emission", core) if on_cuda(emission) else emission
+        if not isinstance(glowing, Taken):
+            glowing = check_emission(glowing, checked)
+    if mask is not None:
+        # Its values are checked on the host; it has one channel of the image's three or four.
+        host = take(mask, "mask", core, (2,)).numpy() if on_cuda(mask) else mask
+        mask = check_mask(host, (checked.shape[0], checked.shape[1]))
+    arrays = [one.image() if isinstance(one, Taken) else one for one in (checked, glowing)]
+    return _core.image_source(arrays[0], arrays[1], mask)
+
+
+def batch_sources(images: Any, core: _core.Renderer) -> Iterator[_core.Source]:
+    """Yield the Source of each image of a batch on the device, which is copied at once."""
+    batch = take(images, "images", core, (4,))
+    for index in range(batch.shape[0]):
+        yield _core.image_source(batch.image(index))
+
+
 def is_image(source: object) -> bool:
     """Return whether a source is an image, or an object that NumPy can view."""
     return isinstance(source, Image | memoryview) or any(
-        hasattr(source, name) for name in ("__array__", "__array_interface__", "__dlpack__")
+        hasattr(source, name)
+        for name in ("__array__", "__array_interface__", "__dlpack__", "__cuda_array_interface__")
     )
 
 
 def image_kind(image: object) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Return shape and dtype of an image, which may be on the device."""
+    if on_cuda(image):
+        image = likeness(image)
     checked = image if isinstance(image, Image) else check_image(image)
     return checked.shape, checked.dtype
 

@@ -36,7 +36,7 @@ vec2 turn(int k, int n)
     return vec2(octant >= 2 && octant <= 5 ? -c : c, octant >= 4 ? s : -s);
 }
 
-// -i times both numbers, or i times them on the way back.
+// Multiplies both numbers by -i, or by i in the inverse transform.
 vec4 quarter(vec4 value, bool inverse)
 {
     return inverse ? vec4(-value.y, value.x, -value.w, value.z)
@@ -103,7 +103,7 @@ void transform_8(inout vec4 v[8], bool inverse)
 
 vec4 held[FFT_HELD];
 
-// Of `count` elements, `step` apart.
+// Transforms `count` elements that are `step` apart.
 void transform_few(int count, int first, int step, bool inverse)
 {
     vec4 v[8];
@@ -125,7 +125,7 @@ void transform_few(int count, int first, int step, bool inverse)
             held[first + i * step] = v[i];
 }
 
-// Of the first a * b elements, both constants; the result's element q is held[place_of(q, a, b)].
+// The transform of the first a * b elements (constants) leaves element q at held[place_of(q, a, b)].
 int place_of(int q, int a, int b)
 {
     return b * (q % a) + q / a;
@@ -137,7 +137,7 @@ void transform_held(int a, int b, bool inverse)
         transform_few(a, j, b, inverse);
     [[unroll]] for (int q = 1; q < a; ++q) {
         [[unroll]] for (int j = 1; j < b; ++j) {
-            // Of constants: compilers compute it.
+            // All operands are constants, so that the compiler computes the angle.
             float angle = 6.2831853071795865 * float(q * j) / float(a * b);
             vec2 turned = vec2(cos(angle), inverse ? sin(angle) : -sin(angle));
             held[b * q + j] = rotated(held[b * q + j], turned);

@@ -141,19 +141,20 @@ int place_at(int frequency, ivec4 radices)
     return frequency_at(frequency, radices.wzyx);
 }
 
-// The place of the frequency of the other sign.
+// The place of the frequency with the opposite sign.
 int mirrored(int place, ivec4 radices, int length)
 {
     int frequency = frequency_at(place, radices);
     return frequency == 0 ? 0 : place_at(length - frequency, radices);
 }
 
-// Of two real channels, in one complex number: their product with two real kernels.
+// `value` is the spectrum of two real channels, the second one times i; so is `kernel`. Returns the
+// spectrum of both products. The mirrors are the values at the frequency with the opposite sign.
 vec2 channels(vec2 value, vec2 mirror, vec2 kernel, vec2 kernel_mirror)
 {
     vec2 a = conjugate(mirror), b = conjugate(kernel_mirror);
     vec2 first = product(0.5 * (value + a), 0.5 * (kernel + b));
-    // Both are i times the second channel's: i x i y = i (i x y).
+    // Both factors are i times the spectrum of the second channel: i x i y = i (i x y).
     vec2 second = product(0.5 * (value - a), 0.5 * (kernel - b));
     return first + vec2(second.y, -second.x);
 }
@@ -164,13 +165,13 @@ vec4 channels(vec4 value, vec4 mirror, vec4 kernel, vec4 kernel_mirror)
                 channels(value.zw, mirror.zw, kernel.zw, kernel_mirror.zw));
 }
 
-// By a kernel with colours. The product at a frequency needs the spectra at the frequency of the other
-// sign, so that an invocation has the lines of both. The dispatch has no invocations for most of those
-// lines; the rest of them do nothing.
+// Multiplies by a kernel with colours. The product at a frequency needs the spectra at the frequency
+// with the opposite sign, so that an invocation computes the lines of both. The dispatch leaves most of
+// the second lines out; invocations for the others return at once.
 void multiply_colours(int number, int index)
 {
     ivec4 rows = ivec4(params.row_a, params.row_b, params.row_c, params.row_d);
-    // The blocks before this last stage are places, too, in lines of their own length.
+    // The numbers of the blocks before this last stage have reversed digits, too.
     ivec4 blocks =
         ivec4(params.block_a, params.block_b, params.block_c, 1);
     int run = params.row_last / 2 + 1;
@@ -189,7 +190,7 @@ void multiply_colours(int number, int index)
         values[i] = held[place_of(i)];
     load_line(other_number * RADIX, other_across);
     transform_held(false);
-    // In the block of frequency 0 the sign turns within it.
+    // In the block of frequency 0, the opposite frequency is in the same block.
     [[unroll]] for (int i = 0; i < RADIX; ++i) {
         int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
         vec4 mirror = own ? held[place_of(own_j)] : held[place_of(j)];

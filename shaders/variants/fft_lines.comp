@@ -26,13 +26,13 @@ layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D factor;
 layout(set = 0, binding = 3) uniform writeonly image2D target;
 
 const int LENGTH = RADIX_1 * RADIX_2 * RADIX_3 * RADIX_4;
-// A float more after each 32, so that invocations use different banks of the shared memory.
+// One float of padding after each 32, so that invocations use different banks of the shared memory.
 const int PITCH = LENGTH + (LENGTH >> 5);
 const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
 const bool MULTIPLIES = STAGE == STAGE_GREY || STAGE == STAGE_COLOURS;
 
-// One float of each element: of more, fewer workgroups would run at a time. Invocations without a
-// butterfly read beyond the line.
+// One component of each element at a time, since more shared memory would let fewer workgroups run at
+// a time. Invocations without a butterfly read beyond the line.
 shared float exchanged[GROUP_WIDTH * PITCH + GROUP_HEIGHT + 1];
 
 // A radix is the product of two that transform_held has.
@@ -69,7 +69,8 @@ int slot(int place)
     return int(gl_LocalInvocationID.x) * PITCH + place + (place >> 5);
 }
 
-// Those without one do all but store: a condition about many values costs more than it saves.
+// Invocations without a butterfly compute, too, but do not store: a branch around many values costs
+// more than it saves.
 bool has_butterfly(int radix)
 {
     return GROUP_HEIGHT * radix == LENGTH || number < LENGTH / radix;
@@ -88,7 +89,7 @@ int first_result(int radix, int before)
     return number / before * before * radix + number % before;
 }
 
-// Leaves a component of the last butterfly's results for other invocations.
+// Writes a component of the last butterfly's results to shared memory.
 void leave(int component, int radix, int before)
 {
     int first = first_result(radix, before);
@@ -100,7 +101,7 @@ void leave(int component, int radix, int before)
     barrier();
 }
 
-// From the results of a butterfly to the elements of the next.
+// Replaces the results of a butterfly by the elements of the next one.
 void exchange(int radix, int before, int next)
 {
     [[unroll]] for (int component = 0; component < 4; ++component) {
@@ -110,7 +111,7 @@ void exchange(int radix, int before, int next)
     }
 }
 
-// Times exp(-2 pi i k q / n) for element q, or its inverse; k is the invocation's.
+// Multiplies element q by exp(-2 pi i k q / n), or its inverse; k depends on the invocation.
 void rotate(int radix, int before, bool inverse)
 {
     vec2 one = turn(number % before, before * radix);
@@ -144,7 +145,7 @@ void go_on(int radix, int before, int next, bool inverse)
     transform(next, before * radix, inverse);
 }
 
-// Radices of 1 are the last ones forth, and the first ones back.
+// Radices of 1 come last in the forward transform and first in the inverse.
 const int LAST_RADIX = RADIX_4 > 1   ? RADIX_4
                      : RADIX_3 > 1 ? RADIX_3
                      : RADIX_2 > 1 ? RADIX_2

@@ -17,20 +17,8 @@ UNIFORM_BLOCK(KAWASE_BLOCK);
 
 const int COLUMNS = GRID_COLUMNS, LOADED = 2 * COLUMNS + 4, AXIS = 3;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-WRITE_IMAGE(2);
-
-#define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM -2
-#define LOAD_COUNT LOADED
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#define LOADED_FROM -2
+#include "variants/runs.glsl"
 
 #include "variants/thresholded.glsl"
 

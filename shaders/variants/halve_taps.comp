@@ -16,20 +16,8 @@ const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
 const int LOADED = 2 * COLUMNS + 4;
 const int OUTER = COLUMNS + 2, INNER = COLUMNS + 1;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-WRITE_IMAGE(2);
-
-#define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM -2
-#define LOAD_COUNT LOADED
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#define LOADED_FROM -2
+#include "variants/runs.glsl"
 
 vec4 middle(vec4 a, vec4 b)
 {

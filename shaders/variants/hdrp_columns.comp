@@ -12,21 +12,10 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "variants/pixels.glsl"
 
 const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = HDRP_OUTPUTS;  // COLUMNS: of a word
+const int LOADED = COLUMNS;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-WRITE_IMAGE(2);
-
-#define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#define LOADED_FROM 0
+#include "variants/runs.glsl"
 
 void take_sample(int x, int y, out vec4 taken[COLUMNS])
 {

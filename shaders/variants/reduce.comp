@@ -18,20 +18,8 @@ const int LOADED = 2 * COLUMNS + 2;
 // A pixel of the target has the texels BEFORE before twice its own position to 2 after it.
 const int BEFORE = 1, SIDE = 4;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-WRITE_IMAGE(2);
-
-#define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM (-BEFORE)
-#define LOAD_COUNT LOADED
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
+#define LOADED_FROM (-BEFORE)
+#include "variants/runs.glsl"
 
 vec4 texels[SIDE][LOADED];
 

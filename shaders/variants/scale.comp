@@ -8,37 +8,9 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES);
-
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, image);
-WRITE_IMAGE(2);
-
-#define LOAD load_run
-#define LOAD_IMAGE image
-#define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
-#include "variants/load.glsl"
-
-#define STORE_COUNT COLUMNS
-#include "variants/store.glsl"
-
-void main()
+vec4 made(vec4 value)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, TEXEL_ROWS));
-    int end = min(first.y + TEXEL_ROWS, size.y);
-    uvec4 raw[COLUMNS];
-
-    if (first.x >= size.x)
-        return;
-    for (int y = first.y; y < end; ++y) {
-        load_run(first.x, y, raw);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            raw[i] = buffer_of(params.coarse * value_of(raw[i]));
-        store(first.x, y, raw);
-    }
+    return params.coarse * value;
 }
+
+#include "variants/same_size.glsl"

@@ -108,8 +108,37 @@ static void lower_limits(VkPhysicalDeviceLimits *limits)
     raise_to(&limits->nonCoherentAtomSize, 256);
 }
 
+// Equal GPUs of NVIDIA; the first one that is asked for has the last address.
+static uint32_t gpu_number(VkPhysicalDevice physical)
+{
+    static VkPhysicalDevice known[8];
+    uint32_t i = 0;
+
+    while (i < 7 && known[i] && known[i] != physical)
+        ++i;
+    known[i] = physical;
+    return i;
+}
+
+static void change_id(VkPhysicalDevice physical, VkBaseOutStructure *next)
+{
+    const uint32_t number = gpu_number(physical);
+
+    for (; next; next = next->pNext) {
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES)
+            memset(((VkPhysicalDeviceIDProperties *)next)->deviceUUID, 0xa0 + (int)number,
+                   VK_UUID_SIZE);
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PCI_BUS_INFO_PROPERTIES_EXT)
+            ((VkPhysicalDevicePCIBusInfoPropertiesEXT *)next)->pciBus = 0x3f - number;
+    }
+}
+
 static void change_properties(VkPhysicalDeviceProperties *properties)
 {
+    if (lacks("gpus")) {
+        properties->vendorID = 0x10de;
+        properties->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    }
     if (lacks("limits"))
         lower_limits(&properties->limits);
     // Less than any device may have: to the first the validation layer must object, the second is
@@ -141,6 +170,8 @@ static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
 {
     below.vkGetPhysicalDeviceProperties2(physical, properties);
     change_properties(&properties->properties);
+    if (lacks("gpus"))
+        change_id(physical, properties->pNext);
     for (VkBaseOutStructure *next = properties->pNext; next; next = next->pNext)
         if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT
             && lacks("limits"))
@@ -228,6 +259,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, 
     VkResult result =
         below.vkEnumerateDeviceExtensionProperties(physical, layer, count, extensions);
 
+    if (lacks("gpus") && extensions && *count > 0)
+        strcpy(extensions[0].extensionName, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME);
     for (uint32_t i = 0; extensions && i < *count && lacks("import"); ++i)
         if (strcmp(extensions[i].extensionName, "VK_EXT_external_memory_host") == 0)
             strcpy(extensions[i].extensionName, "VK_EXT_another");

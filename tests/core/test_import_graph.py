@@ -1,4 +1,4 @@
-"""The package's modules import in one direction, and none imports private names of another."""
+"""How the package is built: imports go one way, private names stay private, functions are short."""
 
 from __future__ import annotations
 
@@ -138,3 +138,23 @@ def test_private_uses_are_found(text: str, found: list[str], tmp_path: Path) -> 
     file = tmp_path / "second.py"
     file.write_text(text)
     assert list(private_uses("package.second", file)) == found
+
+
+def code_lines(function: ast.FunctionDef | ast.AsyncFunctionDef, lines: list[str]) -> int:
+    """Return the lines of a function without blank lines, comments and its docstring."""
+    first, begin = function.body[0], function.lineno - 1
+    head_end = first.lineno - 1
+    documented = (first.end_lineno or 0) if ast.get_docstring(function) is not None else head_end
+    kept = [*lines[begin:head_end], *lines[documented : function.end_lineno]]
+    return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in kept)
+
+
+def test_functions_have_at_most_60_lines_of_code() -> None:
+    long = []
+    for name, file in module_files(PACKAGE).items():
+        text = file.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                count = code_lines(node, text.splitlines())
+                long += [f"{name}.{node.name}: {count} lines"] if count > 60 else []
+    assert not long

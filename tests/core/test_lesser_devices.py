@@ -339,3 +339,70 @@ def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     done = run(layer, name, "bindings")
     assert "ValidationError" in done.stderr
     assert "maxPerStageDescriptorStorageImages limit (0)" in done.stderr
+
+
+# Prints which of several equal GPUs each choice opens, or its error.
+CHOICES = """
+import json, os, vkbloom
+def opened(choice):
+    try:
+        with vkbloom.Renderer(choice) as renderer:
+            return renderer.info.uuid[:2] + " " + renderer.info.pci
+    except (ValueError, vkbloom.AdapterNotFoundError) as error:
+        return type(error).__name__ + ": " + str(error)
+print(json.dumps([opened(choice) for choice in json.loads(os.environ["CHOICES"])]))
+"""
+FIRST, SECOND = "a0 0000:3f:00.0", "a1 0000:3e:00.0"
+
+
+@pytest.mark.parametrize(
+    ("visible", "choices"),
+    [
+        (
+            None,
+            {
+                "auto": FIRST,
+                "hardware": FIRST,
+                "uuid:GPU-A1a1a1a1-a1a1-a1a1": SECOND,
+                "uuid:a0": FIRST,
+                "pci:00000000:3E:00.0": SECOND,
+                "pci:3f:00.0": FIRST,
+                "uuid:ff": "AdapterNotFoundError: .*uuid:a1a1a1a1-a1a1-a1a1-a1a1-a1a1a1a1a1a1, ",
+                "pci:3f:00": "AdapterNotFoundError: .*0000:3e:00.0",
+                "uuid:": "AdapterNotFoundError: ",
+                "llvmpipe": 'ValueError: adapter: "llvmpipe" fits several .*a0a0.*a1a1.*"uuid:a0a0',
+            },
+        ),
+        # By address, since the GPUs have one name.
+        ("0", {"auto": SECOND, "hardware": SECOND, "llvmpipe": SECOND, "uuid:a0": FIRST}),
+        ("1,0", {"auto": FIRST, "llvmpipe": FIRST}),
+        ("GPU-a1a1a1", {"auto": SECOND, "hardware": SECOND}),
+        ("7", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES names; found: .*a1a1"}),
+        ("", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES"}),
+        ("-1", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES"}),
+    ],
+)
+def test_equal_gpus(
+    layer: Path, tmp_path: Path, visible: str | None, choices: dict[str, str]
+) -> None:
+    """The software adapter twice, as two GPUs."""
+    manifests = list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
+    if not manifests:
+        pytest.skip("lavapipe is not installed")
+    twin = tmp_path / "twin.json"
+    twin.write_text(manifests[0].read_text())
+    drivers = os.pathsep.join((str(manifests[0]), str(twin)))
+    variables = {
+        "VK_DRIVER_FILES": drivers,
+        "VK_ICD_FILENAMES": drivers,
+        "VKBLOOM_DRIVER": "system",
+        "VKBLOOM_ADAPTER": "",
+        "CHOICES": json.dumps(list(choices)),
+        "VK_INSTANCE_LAYERS": "VK_LAYER_VKBLOOM_lesser_device",
+    }
+    if visible is not None:
+        variables["CUDA_VISIBLE_DEVICES"] = visible
+    done = run(layer, "", "gpus", ("-c", CHOICES), **variables)
+    assert done.returncode == 0, done.stderr
+    for expected, found in zip(choices.values(), json.loads(done.stdout), strict=True):
+        assert re.match(expected, found), (expected, found)

@@ -8,6 +8,7 @@ import os
 import queue
 import re
 import secrets
+import shutil
 import subprocess
 import sys
 import threading
@@ -20,6 +21,7 @@ import vkbloom
 from vkbloom.explorer.server import Server
 from vkbloom.explorer.viewer import Viewer
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PATIENCE = 60.0  # seconds: waiting costs nothing where a busy machine answers at last
 
 

@@ -74,7 +74,10 @@ class TestControls:
                 "unreal": {"knee"},
             }
             assert without == {"method", "bloom_size"} | refused.get(name, set())
-            assert method["fields"][0]["name"] == "bloom"
+            first = [field["name"] for field in method["fields"] if field["first"]]
+            assert first[:2] == ["bloom", "intensity"]
+            assert first[-2:] == ["exposure", "tonemap"]
+            assert len(first) <= 11
             for field in fields.values():
                 value = defaults[field["name"]]
                 if field["kind"] == "number":
@@ -279,12 +282,36 @@ class TestViewer:
         assert (answer["kind"], answer["name"]) == ("open", "photo.png")
         assert (answer["own_size"], answer["shadings"]) == ((34, 21), [])
         # A scene's settings turn photographs white.
-        assert settings_from(answer["sides"]["a"]) == presets["bevy_natural"]
+        assert settings_from(answer["sides"]["a"]) == presets["photo"]
+        assert answer["note"] == "highlights expanded up to 4"
         frame(viewer, Separable(bloom=False))
-        assert np.array_equal(viewer.frames["a"]["final"], vkbloom.read(path))
+        assert np.array_equal(viewer.frames["a"]["final"], vkbloom.read(path, expand=4))
         # Of the next image, the settings stay.
         answer, _ = viewer.answer({"kind": "open", "name": "b.png"}, [path.read_bytes()])
         assert settings_from(answer["sides"]["a"]) == Separable(bloom=False)
+
+    def test_files_of_floats_begin_as_arrays_do(self, viewer: Viewer, tmp_path: Path) -> None:
+        pixels = np.random.default_rng(1).random((21, 34, 3), np.float32) * 3
+        path = vkbloom.write(tmp_path / "a.exr", pixels)
+        answer, _ = viewer.answer({"kind": "open", "name": "a.exr"}, [path.read_bytes()])
+        assert settings_from(answer["sides"]["a"]) == presets["bevy_natural"]
+        assert answer["note"] == ""
+        # A photograph after it begins as one, as nothing was changed.
+        photo = vkbloom.write(tmp_path / "a.png", pixels).read_bytes()
+        answer, _ = viewer.answer({"kind": "open", "name": "a.png"}, [photo])
+        assert settings_from(answer["sides"]["a"]) == presets["photo"]
+
+    @pytest.mark.parametrize("method", list(METHODS))
+    def test_every_method_glows_by_its_own_defaults(self, method: str, renderer: Renderer) -> None:
+        viewer = Viewer(renderer=renderer, size=(64, 36))
+        pictures = []
+        for bloom in (False, True):
+            settings = METHODS[method](bloom=bloom, tonemap="aces", encoding="srgb")
+            frame(viewer, settings)
+            pictures.append(viewer.frames["a"]["final"][..., :3].astype(int))
+        brighter = pictures[1] - pictures[0]
+        # Two levels are rounding.
+        assert (brighter.max(axis=2) > 10).mean() > 0.05
 
     def test_a_mask_and_an_emission_are_opened(
         self, viewer: Viewer, renderer: Renderer, tmp_path: Path
@@ -302,7 +329,7 @@ class TestViewer:
 
         assert "the source is a scene" in opened("mask", "mask.png", mask)["error"]
         assert opened("image", "a.png", file)["glows"] == {}
-        image = vkbloom.read(tmp_path / "a.png")
+        image = vkbloom.read(tmp_path / "a.png", expand=4)
         given: dict[str, Any] = {"mask": levels[..., 0]}
         assert opened("mask", "mask.png", mask)["glows"] == {"mask": "mask.png"}
         for _ in range(2):

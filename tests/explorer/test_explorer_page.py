@@ -9,10 +9,9 @@ from __future__ import annotations
 import base64
 import dataclasses
 import re
-import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,16 +20,14 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.explorer.explorer_hosts import PATIENCE, jupyterlab, served
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, jupyterlab
 from tests.framebuffers import decode
-from vkbloom import BevyBloom, KinoBloom, Pyramid, Renderer, Scene, Separable, presets
+from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom.explorer.shown import picture_of
 from vkbloom.explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
@@ -38,26 +35,6 @@ ASPECT = (1280, 720)
 NOTEBOOK = (
     'import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo(), shading="forward")\nexplorer'
 )
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        # Without a sandbox, which root has not; nothing but our own pages is opened. Without the
-        # screen's colours, so that a screenshot holds what was drawn.
-        arguments = ["--no-sandbox", "--force-color-profile=srgb"]
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture(scope="module")
-def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
-    """Serves viewers from a thread, and returns where."""
-    with ExitStack() as stack:
-        yield lambda new_viewer: stack.enter_context(served(new_viewer))
 
 
 @pytest.fixture(scope="module")
@@ -226,11 +203,30 @@ def test_stages_of_glare(page: Page) -> None:
 
 
 def test_refused_value_is_shown_with_the_reason(page: Page) -> None:
+    """It stands below its field, which says so to screen readers, too."""
     field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
-    page.get_by_role("alert").get_by_text("intensity: -1").wait_for()
+    message = page.locator(".vkb-field:has([data-field=intensity]) + .vkb-error")
+    message.get_by_text("intensity: -1").wait_for()
+    assert message.get_attribute("role") == "alert"
+    invalid = page.locator("[aria-invalid=true]")
+    assert invalid.count() == 2
+    assert invalid.first.get_attribute("aria-describedby") == message.get_attribute("id")
+    assert page.locator(".vkb-foot .vkb-error").inner_text() == ""
     field(page, "intensity").fill("2")
     wait_for_code(page, "vkbloom.Separable(intensity=2.0)")
-    assert page.get_by_role("alert").inner_text() == ""
+    assert message.count() == invalid.count() == 0
+
+
+def test_an_error_opens_what_hides_its_field(page: Page) -> None:
+    page.get_by_text("More", exact=True).click()
+    number = field(page, "bloom_scale").locator("xpath=following-sibling::input")
+    number.fill("0")
+    message = page.locator(".vkb-field:has([data-field=bloom_scale]) + .vkb-error")
+    message.get_by_text("bloom_scale: 0").wait_for()
+    page.get_by_text("More", exact=True).click()
+    number.evaluate("input => input.dispatchEvent(new Event('input'))")
+    message.wait_for()
+    assert page.locator(".vkb-fields details").get_attribute("open") is not None
 
 
 def test_every_framebuffer(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
@@ -488,7 +484,8 @@ def test_files(page: Page, tmp_path: Path) -> None:
     path = vkbloom.write(tmp_path / "photo.png", pixels)
     page.get_by_label("image or settings").set_input_files(path)
     page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
-    wait_for_code(page, "vkbloom.BevyBloom()")
+    wait_for_code(page, 'vkbloom.presets["photo"]')
+    page.locator(".vkb-status", has_text="highlights expanded up to 4").wait_for()
     assert page.get_by_label("shading").count() == 0
     black = vkbloom.write(tmp_path / "mask.png", np.zeros((30, 50, 3), np.uint8))
     with page.expect_file_chooser() as chooser:
@@ -498,17 +495,20 @@ def test_files(page: Page, tmp_path: Path) -> None:
     page.get_by_role("button", name="Open mask").wait_for()
     page.get_by_role("button", name="Open emission").wait_for()
     field(page, "bloom").uncheck()
-    wait_for_code(page, "vkbloom.BevyBloom(bloom=False)")
+    wait_for_code(page, 'vkbloom.presets["photo"].replace(bloom=False)')
     with page.expect_download() as download:
         page.get_by_role("button", name="Save picture").click()
     assert download.value.suggested_filename == "final.png"
     saved = decode(download.value.path().read_bytes(), tmp_path)
-    # Encoded again, by way of half floats.
-    assert np.abs(saved.astype(int) - pixels).max() <= 1
+    # Encoded again, by way of half floats. Highlights are expanded.
+    plain = (pixels <= 231).all(axis=2)
+    assert np.abs(saved.astype(int) - pixels)[plain].max() <= 1
+    assert (saved[~plain].astype(int) >= pixels[~plain].astype(int) - 1).all()
     with page.expect_download() as download:
         page.get_by_role("button", name="Save settings").click()
     settings = download.value.path()
-    assert vkbloom.Settings.from_json(settings.read_text()) == BevyBloom(bloom=False)
+    expected = presets["photo"].replace(bloom=False)
+    assert vkbloom.Settings.from_json(settings.read_text()) == expected
     # Dropped, not chosen.
     text = KinoBloom(radius=3).to_json()
     page.evaluate(
@@ -533,6 +533,12 @@ def test_narrow_screens(browser: Browser, scene_url: str) -> None:
         page.set_viewport_size({"width": 390, "height": 844})
         page.locator(".vkb-status", has_text="358 × 201").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        # The title, then the picture, then the controls.
+        title, picture = page.locator(".vkb-title"), page.locator(".vkb-stage")
+        tops = [one.bounding_box() for one in (title, picture, page.locator(".vkb-head"))]
+        order = [box["y"] for box in tops if box is not None]
+        assert order == sorted(order)
+        assert order[1] < 80
         field(page, "blur_strength").scroll_into_view_if_needed()
         page.evaluate("window.scrollTo(0, document.documentElement.scrollHeight)")
         assert page.evaluate("window.scrollY") > 100
@@ -550,6 +556,9 @@ def test_no_rule_of_accessibility_is_broken(browser: Browser, scene_url: str, th
         page.get_by_label("wipe A | B").check()
         page.get_by_text("More", exact=True).click()
         page.get_by_text("Plan", exact=True).click()
+        # An error beside its field is shown, too.
+        field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
+        page.locator(".vkb-fields .vkb-error").wait_for()
         for width in (980, 390):
             page.set_viewport_size({"width": width, "height": 844})
             page.wait_for_timeout(300)

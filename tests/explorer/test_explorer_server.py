@@ -8,8 +8,10 @@ import socket
 import struct
 import threading
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -265,6 +267,42 @@ class TestCommand:
         result = self.run()
         assert result.exit_code == 1
         assert "pip install vkbloom[notebook]" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "preset", "largest"),
+    [
+        (["photo.png"], "photo", 4),
+        (["photo.png", "--expand", "8"], "photo", 8),
+        (["photo.png", "--preset", "kino"], "kino", 1),
+        (["photo.exr"], "bevy_natural", 2),
+    ],
+)
+def test_an_image_begins_as_in_apply(
+    words: list[str],
+    preset: str,
+    largest: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("OpenImageIO")
+    monkeypatch.chdir(tmp_path)
+    vkbloom.write("photo.png", np.full((8, 8, 3), 255, np.uint8))
+    vkbloom.write("photo.exr", np.full((8, 8, 3), 2, np.float32))
+    begun: list[tuple[Any, ...]] = []
+
+    class Recorded:
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            begun.append(arguments)
+            # Nothing is to be served.
+            raise ValueError("recorded")
+
+    monkeypatch.setattr("vkbloom.cli.explore.Viewer", Recorded)
+    result = CliRunner().invoke(program, ["explore", "--no-open", *words])
+    assert "recorded" in result.stderr
+    ((image, settings),) = begun
+    assert settings == vkbloom.presets[preset]
+    assert image.max() == pytest.approx(largest, rel=1e-5)
 
 
 def test_explore_is_public() -> None:

@@ -28,8 +28,8 @@ from vkbloom import (
     reductions,
 )
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, PassCounter, ask, lay_out
 from vkbloom.grid.order import blocks
-from vkbloom.grid.plan import Grid, PassCounter, ask, lay_out
 from vkbloom.grid.progress import Progress
 
 xr = pytest.importorskip("xarray")

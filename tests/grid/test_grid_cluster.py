@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -195,6 +196,27 @@ def test_a_worker_without_the_adapter(
     with pytest.raises(vkbloom.AdapterNotFoundError):
         make(tmp_path / "a.zarr", client, adapter="no such")
     assert not (tmp_path / "a.zarr").exists()
+
+
+@pytest.mark.parametrize(
+    ("what", "other"),
+    [("adapter", "Radeon"), ("driver", "Mesa 1.2.3"), ("version", "0.0.1")],
+)
+def test_a_worker_with_another_driver_or_version_is_refused(
+    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, other: str
+) -> None:
+    """As if the grid were laid out on another machine than the workers."""
+    lay_out = cluster.lay_out_there
+    changes: Any = {what: other}
+
+    def laid_out_elsewhere(*arguments: Any) -> Any:
+        return replace(lay_out(*arguments), **changes)
+
+    monkeypatch.setattr(cluster, "lay_out_there", laid_out_elsewhere)
+    own = {"adapter": "llvmpipe", "driver": "Mesa", "version": vkbloom.__version__}[what]
+    with pytest.raises(ValueError, match=f"{what}: the worker's {own}.* is not the grid's {other}"):
+        make(tmp_path / "a.zarr", client)
+    assert check_grid(tmp_path / "a.zarr").done == 0
 
 
 def test_asynchronous_client_and_memory_store_are_refused(client: Any) -> None:

@@ -357,7 +357,7 @@ class TestRefused:
         assert contents(copy) == before
 
     def test_another_version_is_refused(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(vkbloom.grid.plan, "installed_version", lambda: "9.9")
+        monkeypatch.setattr(vkbloom.grid.layout, "installed_version", lambda: "9.9")
         with pytest.raises(ValueError, match=r'version: "0.1.0" in the store, "9.9" requested'):
             make(copy)
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.framebuffers import noise
 from vkbloom import Renderer, contact_sheet, reductions, response_curves
-from vkbloom.grid.views import select
+from vkbloom.grid.selection import select
 
 xr = pytest.importorskip("xarray")
 pytest.importorskip("matplotlib")

@@ -118,7 +118,8 @@ class TestPlanted:
         expected, actual = planted(cause)
         (verdict,) = judge({"bloom": expected}, {"bloom": actual}, Tolerances(atol=0.0))
         text = PLANTED[cause][2]
-        if cause == "equal":
+        assert (verdict.diagnosis is None) == (cause == "equal")
+        if verdict.diagnosis is None:
             assert verdict.passed
             return
         assert str(figures(verdict, {"bloom": actual})["cause"]).startswith(text)
@@ -128,6 +129,7 @@ class TestPlanted:
         with pytest.raises(AssertionError) as caught:
             regression.compare(actual, expected)
         assert f"\n  image: cause: {text}" in str(caught.value)
+        assert f"; residual {verdict.diagnosis.residual:.3g}\n" in str(caught.value)
 
     def test_on_the_command_line(self, cause: str, tmp_path: Path) -> None:
         pytest.importorskip("OpenImageIO")
@@ -177,6 +179,39 @@ class TestFigures:
         found = diagnose(image, moved)
         assert found.cause == "shift"
         assert found.value == pytest.approx(shift, abs=0.02)
+
+    @pytest.mark.parametrize("order", ["linear", "spline", "Catmull-Rom", "sinc"])
+    @pytest.mark.parametrize("kind", ["noise", "lights"])
+    def test_half_a_pixel_by_each_interpolation(self, kind: str, order: str) -> None:
+        ndimage = pytest.importorskip("scipy.ndimage")
+        image = np.random.default_rng(3).random((48, 64, 3)) if kind == "noise" else picture()
+        if order == "sinc":
+            spectrum = np.fft.fft(image, axis=1)
+            frequency = 2j * np.pi * np.fft.fftfreq(64)[:, np.newaxis]
+            moved = np.fft.ifft(spectrum * np.exp(-0.5 * frequency), axis=1).real
+        elif order == "Catmull-Rom":
+            taps = {-1: -1 / 16, 0: 9 / 16, 1: 9 / 16, 2: -1 / 16}
+            moved = sum((tap * np.roll(image, x, 1) for x, tap in taps.items()), np.zeros(1))
+        else:
+            degree = {"linear": 1, "spline": 3}[order]
+            moved = ndimage.shift(image, (0, 0.5, 0), order=degree, mode="nearest")
+        found = diagnose(image, moved)
+        assert (found.cause, found.value) == ("shift", (0.5, 0.0))
+        if order == "linear":
+            # Also if the first image is the interpolated one.
+            assert diagnose(moved, image).value == (-0.5, 0.0)
+
+    def test_noise_below_the_steps_is_no_rounding(self) -> None:
+        a = levels(picture() / 3) / 255
+        noise = np.random.default_rng(0).random(a.shape)
+        assert diagnose(a, a + 1e-3 * noise).cause is None
+        assert diagnose(np.clip(picture() / 3, 0, 1), a).value == "8-bit"
+
+    def test_small_halves(self) -> None:
+        """Their steps are larger than the relative tolerance of a cause."""
+        a = picture() ** 8 * np.float32(1e-4)
+        found = diagnose(a, (a * np.float32(0.97)).astype(np.float16))
+        assert (found.cause, found.value) == ("gain", pytest.approx(0.97, abs=1e-3))
 
     def test_one_level_is_rounding(self) -> None:
         a = levels(picture() / 3)

@@ -26,8 +26,8 @@ from numcodecs.zstd import Zstd
 from vkbloom import check_grid, grid_to_zarr
 from vkbloom.grid import keys, store, zarr_grid
 from vkbloom.grid.filling import Tally
-from vkbloom.grid.image_files import GridFiles
-from vkbloom.grid.plan import Grid, Layout, Variable, ask
+from vkbloom.grid.image_folder import GridFiles
+from vkbloom.grid.layout import Grid, Layout, Variable, ask
 from vkbloom.grid.running import empty_arrays
 from vkbloom.grid.store import GridStore
 

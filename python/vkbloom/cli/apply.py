@@ -27,6 +27,7 @@ from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
 from vkbloom.cli.image_files import (
     COLOURS,
     check_input_colour,
+    expand_option,
     input_colour_option,
     layer_option,
     note,
@@ -42,7 +43,6 @@ from vkbloom.cli.settings_options import settings_options
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import premultiplied
-from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.large_files import finished, is_large
 
@@ -94,13 +94,7 @@ from vkbloom.large_files import finished, is_large
     "of at least 64 million pixels]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
-@click.option(
-    "--expand",
-    metavar="X",
-    type=click.FloatRange(1, 1024),
-    help="What the highlights of a file of integers are expanded up to, so that they can glow; 1: "
-    f"they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
-)
+@expand_option
 @subimage_option
 @layer_option
 @glow_options

@@ -245,7 +245,7 @@ def _lines(
     lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
     if found.percent_over is not None:
         lines += _figures(found, a.channels)
-    lines.append(f"  cause      {cause}; residual {cause.residual:.3g}")
+    lines.append(f"  cause      {cause.summary}")
     for reason in failed:
         lines.append(f"FAILED: {reason}")
     if not failed:

@@ -13,6 +13,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, Final
@@ -37,8 +38,9 @@ from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import default_preset, settings_options
-from vkbloom.grid.image_files import FileForm, GridFiles
-from vkbloom.grid.plan import Grid, Layout, ask
+from vkbloom.grid.image_folder import FileForm, GridFiles
+from vkbloom.grid.layout import Grid, Layout, ask
+from vkbloom.grid.parts import WHOLE, Part, read_part
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import visit
 from vkbloom.grid.zarr_grid import check_chunks
@@ -47,6 +49,11 @@ from vkbloom.io.images import Colour, Picture
 from vkbloom.settings import SHADINGS, Shading
 
 _STORE: Final = ".zarr"
+
+
+def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | None:
+    with as_wrong_use():
+        return None if value is None else read_part(value)
 
 
 @click.command(cls=CommandWithFile)
@@ -116,6 +123,14 @@ _STORE: Final = ".zarr"
     "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
 )
 @click.option(
+    "--part",
+    metavar="I/N",
+    callback=_part,
+    help="Render part I of N, from 1, of the same grid; implies --resume. Other processes may "
+    "render other parts at the same time. auto/N takes I, and auto also N, from the environment of "
+    "a job array, such as SLURM_ARRAY_TASK_ID.",
+)
+@click.option(
     "--workers",
     metavar="N",
     type=click.IntRange(min=1),
@@ -153,6 +168,7 @@ def command(
     chunk_words: tuple[str, ...],
     suffix: str,
     resume: bool,
+    part: Part | None,
     workers: int | None,
     scheduler: str | None,
     sheet: str | None,
@@ -174,31 +190,15 @@ def command(
     are rendered in the order that runs the fewest passes. A store can be opened while it is
     written. --resume continues a grid that was killed, and gives the same result.
     """
-    is_store = out.endswith(_STORE) or "://" in out
-    _check_combination(workers, scheduler, is_store, bool(reduce_words or chunk_words))
-    if not is_store:
-        if sheet or curves:
-            raise click.UsageError(f"--sheet and --curves need a store; use --out NAME{_STORE}")
-        _check_image_files(out, suffix)
-    if sheet and attachments == "none":
-        raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
-    _check_drawing("--sheet", sheet, (".png",))
-    _check_drawing("--curves", curves, (".png", ".svg", ".pdf"))
+    if workers and scheduler:
+        raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
+    output = _Output(out, suffix, resume or part is not None, part, sheet, curves)
+    output.check(needs_store=bool(reduce_words or chunk_words), has_frames=attachments != "none")
     chunks = axis_options.chunk_counts(chunk_words)
-    if not axis_words and len(images) < 2:
-        raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
-    axes = axis_options.axis_values(axis_words, settings)
-    begun = None if "preset" in axes else settings
-    if begun is None and settings != vkbloom.presets[default_preset(bool(images))]:
-        raise click.UsageError(
-            "--axis preset sets all settings; leave out options of settings, and vary fields by "
-            "further axes"
-        )
+    begun, axes = _begun_and_axes(axis_words, settings, len(images))
     reduce = axis_options.named_reductions(reduce_words, settings)
-    pictures = [
-        read_picture(image, subimage, input_colour, layer=layer, raw=raw) for image in images
-    ]
-    source = _source(images, pictures, scene)
+    pictures = [read_picture(one, subimage, input_colour, layer=layer, raw=raw) for one in images]
+    requested = _source(images, pictures, scene), begun, axes
     shared: dict[str, Any] = {
         "size": size,
         "shading": shading,
@@ -208,47 +208,108 @@ def command(
         **_glows(pictures, mask, emission, input_colour, raw=raw),
     }
     with as_wrong_use():
-        grid = ask(source, begun, axes, **shared)
+        grid = ask(*requested, **shared)
         check_chunks(grid, chunks)
-    if curves and max(grid.shape, default=1) < 2:
-        raise click.UsageError("--curves needs an --axis of more than one value")
+    output.check_shape(grid.shape)
     if not workers and not scheduler:
         _note_no_bloom(grid, adapter, validation)
     with _client(workers, scheduler) as client:
         device = {"client": client, "adapter": adapter, "validation": validation}
-        if is_store:
-            dataset = vkbloom.grid_to_zarr(
-                source,
-                begun,
-                axes,
-                out,
-                chunks=chunks,
-                resume=resume,
-                on_mended=note,
-                progress=True,
-                **shared,
-                **device,
-            )
-            ran, saved = dataset.attrs["passes_run"], dataset.attrs["passes_saved"]
+        if output.is_store:
+            output.store(math.prod(grid.shape), requested, chunks=chunks, **shared, **device)
         else:
-            forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
+            output.write_images(grid, pictures, **device)
 
-            def prepared(layout: Layout) -> GridFiles:
-                files = GridFiles(Path(out), f".{suffix.lstrip('.')}", grid, layout, forms)
-                files.prepare(resume=resume)
-                return files
 
-            tally = render_grid(grid, prepared, progress=True, **device)
-            ran, saved = tally.ran, tally.saved
-    click.echo(f"wrote {out}, {math.prod(grid.shape)} points; passes run {ran}, saved {saved}")
-    if sheet:
-        safe_writing.write_file(Path(sheet), vkbloom.contact_sheet(dataset))
-        click.echo(f"wrote {sheet}")
-    if curves:
-        drawn = io.BytesIO()
-        vkbloom.response_curves(dataset).savefig(drawn, format=Path(curves).suffix[1:].lower())
-        safe_writing.write_file(Path(curves), drawn.getvalue())
-        click.echo(f"wrote {curves}")
+@dataclass(frozen=True)
+class _Output:
+    """What the options say of the files to write."""
+
+    name: str
+    suffix: str
+    resume: bool
+    part: Part | None
+    sheet: str | None
+    curves: str | None
+
+    @property
+    def is_store(self) -> bool:
+        return self.name.endswith(_STORE) or "://" in self.name
+
+    def check(self, *, needs_store: bool, has_frames: bool) -> None:
+        """Raise click.UsageError for options that do not go together."""
+        if not self.is_store:
+            if needs_store:
+                raise click.UsageError(f"--reduce and --chunk need a store; use --out NAME{_STORE}")
+            if self.sheet or self.curves:
+                raise click.UsageError(f"--sheet and --curves need a store; use --out NAME{_STORE}")
+            _check_image_files(self.name, self.suffix)
+        if self.sheet and not has_frames:
+            raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
+        _check_drawing("--sheet", self.sheet, (".png",))
+        _check_drawing("--curves", self.curves, (".png", ".svg", ".pdf"))
+
+    def check_shape(self, shape: tuple[int, ...]) -> None:
+        """Raise click.UsageError if there is no axis along which to plot."""
+        if self.curves and max(shape, default=1) < 2:
+            raise click.UsageError("--curves needs an --axis of more than one value")
+
+    def store(self, points: int, requested: tuple[Any, Any, Any], **options: Any) -> None:
+        """Render into a store, and draw the sheet and the curves from it."""
+        dataset = vkbloom.grid_to_zarr(
+            *requested,
+            self.name,
+            resume=self.resume,
+            part=self.part,
+            on_mended=note,
+            progress=True,
+            **options,
+        )
+        self._tell(points, dataset.attrs["passes_run"], dataset.attrs["passes_saved"])
+        if self.sheet:
+            safe_writing.write_file(Path(self.sheet), vkbloom.contact_sheet(dataset))
+            click.echo(f"wrote {self.sheet}")
+        if self.curves:
+            kind = Path(self.curves).suffix[1:].lower()
+            drawn = io.BytesIO()
+            vkbloom.response_curves(dataset).savefig(drawn, format=kind)
+            safe_writing.write_file(Path(self.curves), drawn.getvalue())
+            click.echo(f"wrote {self.curves}")
+
+    def write_images(self, grid: Grid, pictures: Sequence[Picture], **device: Any) -> None:
+        """Render into image files."""
+        forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
+
+        def prepared(layout: Layout) -> GridFiles:
+            suffix = f".{self.suffix.lstrip('.')}"
+            part = self.part or WHOLE
+            files = GridFiles(Path(self.name), suffix, grid, layout, forms, part=part)
+            files.prepare(resume=self.resume)
+            return files
+
+        tally = render_grid(grid, prepared, progress=True, **device)
+        self._tell(math.prod(grid.shape), tally.ran, tally.saved)
+
+    def _tell(self, points: int, ran: int, saved: int) -> None:
+        which = f"part {self.part[0]}/{self.part[1]} of " if self.part else ""
+        click.echo(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
+
+
+def _begun_and_axes(
+    words: Sequence[str], settings: vkbloom.Settings, image_count: int
+) -> tuple[vkbloom.Settings | None, dict[str, Any]]:
+    """Return the settings that the axes vary, None where an axis has presets; and the axes."""
+    if not words and image_count < 2:
+        raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
+    axes = axis_options.axis_values(words, settings)
+    if "preset" not in axes:
+        return settings, axes
+    if settings != vkbloom.presets[default_preset(image_count > 0)]:
+        raise click.UsageError(
+            "--axis preset sets all settings; leave out options of settings, and vary fields by "
+            "further axes"
+        )
+    return None, axes
 
 
 def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
@@ -262,16 +323,6 @@ def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
         ]
     if points and all(zero):
         note(f"at the first and the last point, {no_bloom.reason(points[-1].settings)}")
-
-
-def _check_combination(
-    workers: int | None, scheduler: str | None, is_store: bool, needs_store: bool
-) -> None:
-    """Raise click.UsageError for options that do not go together."""
-    if workers and scheduler:
-        raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
-    if needs_store and not is_store:
-        raise click.UsageError(f"--reduce and --chunk need a store; use --out NAME{_STORE}")
 
 
 def _check_image_files(out: str, image_format: str) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from vkbloom.cli.program import given
 from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
+from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
 
 #: Encodings of a written file.
@@ -44,6 +45,17 @@ def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
         metavar="NAME",
         help="The layer to read from an OpenEXR file with several layers, such as "
         "ViewLayer.Combined.",
+    )(command)
+
+
+def expand_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--expand``, the argument of `vkbloom.read`."""
+    return click.option(
+        "--expand",
+        metavar="X",
+        type=click.FloatRange(1, 1024),
+        help="What the highlights of a file of integers are expanded up to, so that they can glow; "
+        f"1: they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
     )(command)
 
 

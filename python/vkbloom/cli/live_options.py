@@ -9,7 +9,7 @@ from typing import Any, Final
 import click
 
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.image_files import layer_option, read_picture, subimage_option
+from vkbloom.cli.image_files import expand_option, layer_option, read_picture, subimage_option
 from vkbloom.cli.program import given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
@@ -31,6 +31,7 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
         @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
         @subimage_option
         @layer_option
+        @expand_option
         @device_options
         @scene_options
         @settings_options
@@ -40,16 +41,19 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
             source: str | None,
             subimage: int,
             layer: str | None,
+            expand: float | None,
             **arguments: Any,
         ) -> Any:
             if source is None:
+                if given("expand"):
+                    raise click.UsageError("--expand is only for an IMAGE")
                 return command(image=None, **arguments)
             for name, option in _OF_SCENE.items():
                 if given(name) and not (name == "size" and image_has_size):
                     raise click.UsageError(
                         f"{option} is only for scenes; leave it out with an IMAGE"
                     )
-            image = read_picture(source, subimage, None, layer=layer).pixels
+            image = read_picture(source, subimage, None, layer=layer, expand=expand).pixels
             return command(image=image, **arguments)
 
         return run

@@ -96,9 +96,9 @@ def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _first_of(rest: dict[str, Any]) -> str:
-    """Return the first of a command's image files."""
-    names = next(value for name in _IMAGES if (value := rest.get(name)))
-    return str(names if isinstance(names, str) else names[0])
+    """Return the first of a command's image files; "" if it has none."""
+    names = next((value for name in _IMAGES if (value := rest.get(name))), "")
+    return names if isinstance(names, str) else str(names[0])
 
 
 def default_preset(is_image: bool) -> str:

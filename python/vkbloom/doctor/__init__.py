@@ -39,14 +39,7 @@ _INSTALL_LAYER: Final = (
 
 @dataclass(frozen=True)
 class Report:
-    """The findings of one examination.
-
-    Attributes
-    ----------
-    findings : tuple of Finding
-    can_render : bool
-        Whether the test render was correct on at least one adapter.
-    """
+    """The findings of one examination; at least one adapter rendered correctly if `can_render`."""
 
     findings: tuple[Finding, ...]
     can_render: bool
@@ -55,12 +48,6 @@ class Report:
 def examine() -> Report:
     """Examine everything that rendering needs, and make a test render on each adapter.
 
-    Returns
-    -------
-    Report
-
-    Notes
-    -----
     Takes some seconds. The test render adds to the pipeline cache, as every render does.
     """
     loader = child.ask("loader")

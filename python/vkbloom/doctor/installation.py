@@ -100,17 +100,7 @@ def _why_not_writable(folder: Path) -> str:
 
 
 def cache(driver_uuids: Collection[str]) -> Finding:
-    """Examine the pipeline cache.
-
-    Parameters
-    ----------
-    driver_uuids : collection of str
-        UUIDs of the installed drivers, in hexadecimal.
-
-    Returns
-    -------
-    Finding
-    """
+    """Examine the pipeline cache."""
     topic = "pipeline cache"
     try:
         folder = pipeline_cache.folder()
@@ -159,12 +149,7 @@ def _cache_file(file: Path, driver_uuids: Collection[str]) -> str:
 
 
 def extras() -> list[Finding]:
-    """Return one finding for each optional extra of the package.
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Return one finding for each optional extra of the package."""
     required = metadata.requires("vkbloom") or []
     return [_extra(name, purpose, required) for name, purpose in _EXTRAS.items()]
 
@@ -191,18 +176,7 @@ def _extra(name: str, purpose: str, required: list[str]) -> Finding:
 
 
 def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
-    """Examine the device files of GPUs, on Linux.
-
-    Parameters
-    ----------
-    has_gpu_adapter : bool
-        Whether Vulkan lists an adapter that is not a CPU.
-
-    Returns
-    -------
-    list of Finding
-        Empty if there are no device files.
-    """
+    """Examine the device files of GPUs, on Linux."""
     if not sys.platform.startswith("linux"):
         return []
     nodes = sorted([*Path("/dev/dri").glob("renderD*"), *Path("/dev").glob("nvidia[0-9]*")])

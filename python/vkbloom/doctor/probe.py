@@ -119,7 +119,7 @@ def adapters() -> dict[str, Any]:
                 "driver_uuid": uuid.hex(),
                 "bundled": bundled,
             }
-            for name, kind, _, driver_info, _, uuid, bundled in listed
+            for name, kind, _, driver_info, _, uuid, bundled, *_ in listed
         ]
     if not found and reasons:
         return {"failure": "; ".join(reasons)}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+from pathlib import Path
 from typing import Any, Final
 
 from vkbloom import psf
@@ -14,10 +16,22 @@ from vkbloom.psf.base import PSF, functions
 from vkbloom.registry import METHODS, STAGES
 from vkbloom.settings import Settings
 
-__all__ = ["as_code", "controls", "settings_from"]
+__all__ = ["as_code", "as_fields", "controls", "described", "settings_from"]
 
-# Fields that come first, in addition to the numbers that only this method has.
-_FIRST: Final = ("bloom", "threshold", "intensity", "exposure", "tonemap")
+# Fields of everyday use: these, in this order, with the numbers that only this method has between
+# them.
+_FIRST: Final = ("bloom", "intensity", "threshold")
+_LAST: Final = ("exposure", "tonemap")
+# Numbers of methods that are rarely changed.
+_RARE: Final = (
+    "clamp_max",
+    "low_frequency_boost_curvature",
+    "luminance_cap",
+    "max_mip_dimension",
+    "scale_x",
+    "scale_y",
+    "white",
+)
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
@@ -42,10 +56,7 @@ def controls() -> dict[str, Any]:
     selected.
     """
     return {
-        "methods": {
-            name: {"defaults": kind().to_dict(), "fields": _fields_of_method(kind)}
-            for name, kind in METHODS.items()
-        },
+        "methods": {name: described(kind) for name, kind in METHODS.items()},
         "functions": {
             type(one).__name__: {"defaults": one.to_dict(), "fields": _fields_of_function(one)}
             for one in _functions()
@@ -60,6 +71,18 @@ def controls() -> dict[str, Any]:
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
         "look": _LOOK,
     }
+
+
+def described(kind: type[Settings]) -> dict[str, Any]:
+    """Describe a method: its defaults and its fields."""
+    return {"defaults": as_fields(kind()), "fields": _fields_of_method(kind)}
+
+
+def as_fields(settings: Settings) -> dict[str, Any]:
+    """Return settings as `settings_from` reads them, also after an own method's file changed."""
+    fields = settings.to_dict()
+    fields.pop("sha256", None)
+    return fields
 
 
 def _functions() -> list[PSF]:
@@ -78,10 +101,16 @@ def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
     for control in found:
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-        is_own = control["name"] not in shared
-        control["first"] = control["name"] in _FIRST or (is_own and slides)
-    # The fields of the method come first, after `bloom`: they are the reason to select it.
-    return sorted(found, key=lambda one: (one["name"] != "bloom", one["name"] in shared))
+        is_own = control["name"] not in shared and control["name"] not in _RARE
+        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_own and slides)
+
+    def place(control: dict[str, Any]) -> tuple[int, ...]:
+        name = control["name"]
+        if name in _FIRST:
+            return 0, _FIRST.index(name)
+        return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
+
+    return sorted(found, key=place)
 
 
 def _fields_of_function(one: PSF) -> list[dict[str, Any]]:
@@ -153,7 +182,21 @@ def as_code(settings: Settings) -> str:
                 return f'vkbloom.presets["{name}"]'
             if settings == preset.replace(**look):
                 return f'vkbloom.presets["{name}"].replace({_arguments(settings, preset)})'
-    return f"vkbloom.{type(settings).__name__}({_arguments(settings, type(settings)())})"
+    return f"{_maker(type(settings))}({_arguments(settings, type(settings)())})"
+
+
+def _maker(kind: Any) -> str:
+    """Return Python code of the class."""
+    if not METHODS.is_added(kind.method):
+        return f"vkbloom.{kind.__name__}"
+    from vkbloom.own.method import OwnType, own_name  # noqa: PLC0415  needed by few pages
+
+    if not isinstance(kind, OwnType):
+        return str(kind.__name__)
+    path = kind.file.source.name
+    source = "text" if path == "<text>" else json.dumps(path)
+    name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'
+    return f"vkbloom.load_method({source}{name})"
 
 
 def _arguments(settings: Settings, begun: Settings) -> str:

@@ -7,6 +7,7 @@ const TURNS_PER_SECOND = 0.25; // of the forward system's animation
 const HIGHEST = 0.72; // the largest part of the window's height for the picture
 const HIGHEST_NARROW = 0.45; // the same if the controls are below the picture
 const NARROW = 720; // CSS pixels, as in page.css
+const WATCH = 200; // milliseconds between two looks at the files of own methods
 const LARGEST_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
 
@@ -129,6 +130,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   let ownSize = false;
   let shading = null; // of a scene
   let glow = null;
+  let touched = null; // the control that was changed last
   let zoom = 1; // 1: the picture fits
   let centre = [0.5, 0.5]; // of the visible part of the picture, 0..1 from left and top
   let pointer = null; // its position, 0..1 from left and top
@@ -180,6 +182,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   const head = make("div", { className: "vkb-head" });
   const fields = make("div", { className: "vkb-fields" });
   const complaint = make("div", { className: "vkb-error", role: "alert" });
+  // The errors of own methods' files stay until the files are mended.
+  const fileError = make("pre", { className: "vkb-error vkb-file-error", role: "status" });
   const code = make("code");
   const button = (text, listener, properties = {}) =>
     make("button", { type: "button", textContent: text, ...properties, on: { click: listener } });
@@ -239,8 +243,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     make("div", { className: "vkb-bar" }, copying),
   );
   const title = make(heading, { className: "vkb-title", textContent: "vkbloom explorer" });
-  const panel = make("div", { className: "vkb-panel" }, title, head, files, fields, foot);
-  layout.append(seen, below, panel);
+  const panel = make("div", { className: "vkb-panel" }, head, fileError, files, fields, foot);
+  layout.append(title, seen, below, panel);
 
   const visible = () => (comparing ? SIDES : ["a"]);
 
@@ -293,6 +297,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       if (!setup) build(message);
     } else if (message.kind === "open") {
       opened(message);
+    } else if (message.kind === "methods") {
+      methodsChanged(message);
     } else if (message.kind === "save") {
       download(new Blob([buffers[0]], { type: "image/png" }), `${message.framebuffer}.png`);
     } else if (message.kind === "settings") {
@@ -439,13 +445,39 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
         ? `${passes.map(([name]) => name).join(", ")}: ${device.toFixed(1)} ms`
         : "nothing had to run";
       status.textContent =
-        `${setup.adapter} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
+        `${setup.note ? `${setup.note} · ` : ""}${setup.adapter} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
         `${roundTrip.toFixed(0)} ms until shown`;
     }
-    complaint.textContent = errors[editing] ?? "";
+    showError();
     code.textContent = shown[editing]?.code ?? "";
     showReadout();
     showPlan();
+  }
+
+  // An error that begins with a field's name is shown below that field, any other one below all.
+  function showError() {
+    const text = errors[editing] ?? "";
+    fields.querySelector(".vkb-error")?.remove();
+    for (const input of fields.querySelectorAll("[aria-invalid]")) {
+      input.removeAttribute("aria-invalid");
+      input.removeAttribute("aria-describedby");
+    }
+    const name = /^(\w+):/.exec(text)?.[1];
+    const named = [...fields.querySelectorAll("[data-field]")].filter(
+      ({ dataset }) => dataset.field.split(".").at(-1) === name,
+    );
+    const first = named.includes(touched) ? touched : named[0];
+    complaint.textContent = first ? "" : text;
+    if (!first) return;
+    const row = first.closest(".vkb-field");
+    const id = `vkb-${view}-error`;
+    row.after(make("div", { className: "vkb-error", role: "alert", id, textContent: text }));
+    for (const input of row.querySelectorAll("input, select")) {
+      input.setAttribute("aria-invalid", "true");
+      input.setAttribute("aria-describedby", id);
+    }
+    const hidden = first.closest("details");
+    if (hidden) hidden.open = true;
   }
 
   // The passes of the settings that are edited, each with its time. Passes with the same name have
@@ -623,6 +655,40 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     flush();
   }
 
+  // Own methods are files, which are edited elsewhere: the page asks whether they changed.
+  let watching = 0;
+  const watchFiles = () => {
+    watching = setTimeout(() => send({ kind: "methods", view }), WATCH);
+  };
+
+  // The values of fields that the new method has are kept, as far as it accepts them.
+  function carried(own, { defaults, fields }) {
+    const kept = Object.entries(defaults).map(([name, value]) => [name, own[name] ?? value]);
+    const next = { ...Object.fromEntries(kept), method: defaults.method };
+    for (const { name, kind, low, high, choices } of fields) {
+      if (kind === "number" && next[name] !== null) next[name] = clamp(next[name], low, high);
+      if (kind === "choice" && typeof next[name] === "string" && !choices.includes(next[name])) {
+        next[name] = defaults[name];
+      }
+    }
+    return next;
+  }
+
+  function methodsChanged(message) {
+    fileError.textContent = Object.values(message.errors).join("\n");
+    for (const [name, method] of Object.entries(message.methods)) {
+      setup.methods[name] = method;
+      for (const own of [settings, setup.sides]) {
+        for (const side of SIDES) {
+          if (own[side].method === name) own[side] = carried(own[side], method);
+        }
+      }
+      if (settings[editing].method === name) buildFields({ keepPreset: true });
+      request(...SIDES.filter((side) => settings[side].method === name));
+    }
+    watchFiles();
+  }
+
   function showGlows() {
     for (const one of glowButtons) one.show();
   }
@@ -765,6 +831,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     restore(store?.read());
     store?.watch(restore);
     measure();
+    if (setup.has_files) watchFiles();
   }
 
   // The controls of the picture, which depend on the source.
@@ -892,7 +959,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   function edit(side) {
     editing = sideSelect.value = side;
     buildFields();
-    complaint.textContent = errors[side] ?? "";
+    showError();
     code.textContent = shown[side]?.code ?? "";
     showPlan();
   }
@@ -901,6 +968,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   function fieldRow(field, value, change) {
     const [parts, show, first] = control(field, (next) => {
       change(next);
+      touched = first;
       presetSelect.value = "";
       request(editing);
     });
@@ -1031,6 +1099,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     fail,
     unmount() {
       pause();
+      clearTimeout(watching);
       observer.disconnect();
       root.remove();
     },

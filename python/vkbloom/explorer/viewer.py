@@ -17,6 +17,8 @@ open     name; the content of a file as a buffer;      source, and the settings 
          as: "image", "mask" or "emission"; without a
          file the mask or the emission is removed
 save     settings; all else as of frame                a picture of the source's own size
+methods                                                the own methods whose files changed, as in
+                                                       setup, and the errors of their files
 ======== ============================================= =========================================
 
 ``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
@@ -38,8 +40,10 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.core_access import core_of
-from vkbloom.explorer.controls import as_code, controls, settings_from
+from vkbloom.explorer.controls import as_code, as_fields, controls, described, settings_from
+from vkbloom.explorer.own_files import OwnFiles, current
 from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.named_settings import presets
 from vkbloom.plans import Pass
@@ -113,9 +117,10 @@ class Viewer:
         if source is None:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
-        self._name = ""
+        self._name = self._note = ""
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
+        self._files = OwnFiles()
         self._begin(settings)
         if against is not None:
             self.settings["b"] = check_settings(against)
@@ -138,13 +143,16 @@ class Viewer:
         if self._owned:
             self.renderer.close()
 
-    def _begin(self, settings: Settings | None) -> None:
+    def _begin(self, settings: Settings | None, *, is_photo: bool = False) -> None:
         """Set A to the settings or to the source's default, and B to the same without bloom."""
+        is_default = settings is None
         if settings is None:
-            settings = presets["bevy_natural" if self._scene is None else "tutorial"]
+            of_image = "photo" if is_photo else "bevy_natural"
+            settings = presets[of_image if self._scene is None else "tutorial"]
             if self._scene is not None and self._shading == "deferred":
                 settings = settings.replace(**_DEVELOPED)
         begun = check_settings(settings)
+        self._default = begun if is_default else None
         self.settings = {"a": begun, "b": begun.replace(bloom=False)}
 
     def _show_image(
@@ -188,6 +196,7 @@ class Viewer:
             "probe": self._probe,
             "open": lambda message: self._open(message, files),
             "save": self._save,
+            "methods": self._methods,
         }
         kind = message.get("kind") if isinstance(message, Mapping) else None
         if not isinstance(message, Mapping) or not isinstance(kind, str) or kind not in kinds:
@@ -199,14 +208,28 @@ class Viewer:
         return {"kind": kind, "view": message.get("view"), "id": message.get("id"), **body}, buffers
 
     def _setup(self, message: Mapping[str, Any]) -> Answer:
-        return {**controls(), **self._source(), "adapter": self.renderer.info.summary}, []
+        self._files = OwnFiles()
+        return {
+            **controls(),
+            **self._source(),
+            "adapter": self.renderer.info.summary,
+            "has_files": bool(self._files),
+        }, []
+
+    def _methods(self, message: Mapping[str, Any]) -> Answer:
+        new, errors = self._files.changes()
+        return {
+            "methods": {name: described(kind) for name, kind in new.items()},
+            "errors": errors,
+        }, []
 
     def _source(self) -> dict[str, Any]:
         """Return a description of the source, and the initial settings."""
         scene = self._scene
         return {
-            "sides": {side: settings.to_dict() for side, settings in self.settings.items()},
+            "sides": {side: as_fields(current(one)) for side, one in self.settings.items()},
             "name": self._name,
+            "note": self._note,
             "animated": scene is not None,
             "own_size": self._own_size,
             "shadings": [] if scene is None else list(SHADINGS),
@@ -222,14 +245,15 @@ class Viewer:
         if kind in _GLOWS:
             self._open_glow(kind, name, files)
             return {"as": kind, **self._source()}, []
-        image = _read(name, files)
+        image, is_photo = _read(name, files, expand=PHOTO_EXPANSION)
         was_scene = self._scene is not None
         self._show_image(image)
         self._name = name
+        self._note = f"highlights expanded up to {PHOTO_EXPANSION:g}" if is_photo else ""
         self._shown.clear()
-        if was_scene:
-            # With a scene's settings a photograph would be white.
-            self._begin(None)
+        # With a scene's settings a photograph would be white.
+        if was_scene or self.settings["a"] == self._default:
+            self._begin(None, is_photo=is_photo)
         return {"as": "image", **self._source()}, []
 
     def _open_glow(self, kind: str, name: str, files: Sequence[bytes]) -> None:
@@ -242,9 +266,11 @@ class Viewer:
         if files:
             glows[kind] = name
             given[kind] = (
-                check_emission(alike(_read(name, files), image), image)
+                check_emission(alike(_read(name, files)[0], image), image)
                 if kind == "emission"
-                else check_mask(_read(name, files, is_mask=True), image.shape[:2])[..., np.newaxis]
+                else check_mask(_read(name, files, is_mask=True)[0], image.shape[:2])[
+                    ..., np.newaxis
+                ]
             )
         self._image, self._glows = given, glows
         self._reduced = (self._own_size, given)
@@ -375,8 +401,10 @@ class Viewer:
         return arrays
 
 
-def _read(name: str, files: Sequence[bytes], *, is_mask: bool = False) -> NDArray[Any]:
-    """Return the image of a file's content; its errors name the file."""
+def _read(
+    name: str, files: Sequence[bytes], *, is_mask: bool = False, expand: float | None = None
+) -> tuple[NDArray[Any], bool]:
+    """Return the image of a file's content, and whether it has integers; errors name the file."""
     from vkbloom.io import image_reading  # noqa: PLC0415  needs OpenImageIO
     from vkbloom.io.array_files import read  # noqa: PLC0415
 
@@ -388,10 +416,10 @@ def _read(name: str, files: Sequence[bytes], *, is_mask: bool = False) -> NDArra
         path.write_bytes(files[0])
         try:
             if is_mask:
-                return grey_mask(
-                    image_reading.decode(image_reading.load(path), "linear").pixels, name
-                )
-            return read(path)
+                picture = image_reading.decode(image_reading.load(path), "linear")
+                return grey_mask(picture.pixels, name), True
+            image, facts = read(path, expand=expand, metadata=True)
+            return image, facts["numbers"].startswith("uint")
         except (OSError, ValueError) as error:
             text = str(error).replace(str(path), name)
             raise ValueError(text if name in text else f"{name}: {text}") from error

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import anywidget
 
+from vkbloom.explorer.controls import as_fields
 from vkbloom.settings import check_settings
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Explorer(anywidget.AnyWidget):
 
     def _set(self, side: str, settings: Settings) -> None:
         self._viewer.settings[side] = check_settings(settings)
-        self.send({"kind": "settings", "sides": {side: settings.to_dict()}}, [])
+        self.send({"kind": "settings", "sides": {side: as_fields(settings)}}, [])
 
     @property
     def frames(self) -> Frames | None:

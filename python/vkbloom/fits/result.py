@@ -199,18 +199,7 @@ def likely_cause(found: FitResult) -> str:
 def radial_profiles(
     images: Sequence[NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Return the mean of images in rings around the brightest pixel of the last one.
-
-    Parameters
-    ----------
-    images : sequence of ndarray, shape (H, W, 3)
-
-    Returns
-    -------
-    radii : ndarray, shape (N,)
-        Middle of each ring in pixels; the rings grow by a quarter.
-    profiles : list of ndarray, shape (N,)
-    """
+    """Return the mean of images in rings around the brightest pixel of the last one."""
     planes = [image.mean(axis=2) for image in images]
     height, width = planes[-1].shape
     y, x = np.unravel_index(int(planes[-1].argmax()), planes[-1].shape)

@@ -18,26 +18,26 @@ from vkbloom.fits.space import Point, Space
 
 __all__ = ["Search"]
 
-# Of the coordinates, 0 to 1: differences for derivatives, first large against rounding to half
-# floats, then small; and how far samples are from the start, where an axis is logarithmic.
+# Coordinates are from 0 to 1.
+# Steps of finite differences: first large compared with the rounding of half floats, then small.
 _STEPS: Final = (1e-2, 1e-3)
+# A logarithmic axis wider than _ENDLESS times its scale is sampled within _REACH of the start.
 _REACH: Final = 0.25
-# Samples for each varied field.
+_ENDLESS: Final = 100.0
+# Samples for each varied field. Least squares start from _STARTS points, one of them given.
 _SAMPLES: Final = 6
-# The best of them that least squares start from, with the start itself.
 _STARTS: Final = 5
-# A loss that is good enough: what half floats round by; and one that is near.
+# The search ends at _ENOUGH, the loss of rounding to half floats. Below _CLOSE it only polishes.
 _ENOUGH: Final = 2e-5
 _CLOSE: Final = 5e-4
-# Of other integers and choices, the best that numbers follow before they are given up.
+# After a change of integers, choices or one number, numbers are optimized for the best _FOLLOWED.
 _FOLLOWED: Final = 3
+# Distant values to try of each number.
 _LEAPS: Final = 8
-# A logarithmic axis that is this many times as wide as its scale is sampled near the start.
-_ENDLESS: Final = 100.0
 
 
 class _Spent(Exception):
-    """All calls are made."""
+    """The search has made `max_calls` calls."""
 
 
 class Search:
@@ -83,7 +83,7 @@ class Search:
             return
 
     def _halve(self, starts: list[Point], losses: list[float]) -> None:
-        """Go a few steps from the best starts, and to the end from the best of these."""
+        """Take a few steps from the best starts, and continue from the two best results."""
         order = [0, *np.argsort(losses, kind="stable")]
         # Of one combination of integers and choices, only the best start.
         discrete = {tuple(starts[number][~self._space.is_number]): number for number in order[::-1]}
@@ -108,14 +108,14 @@ class Search:
             return
 
     def _polish(self) -> None:
-        """Walk over integers and choices, and along single fields, while that helps."""
+        """Vary integers, choices and single numbers, while the loss improves by one percent."""
         before = np.inf
         while _ENOUGH < self.loss < 0.99 * before:
             before = self.loss
             self._walk()
             self._descend(self.best, _STEPS[1])
             if self.loss > _CLOSE:
-                # Least squares stand still where pixels cross a hard threshold one by one.
+                # Where pixels cross a hard threshold one by one, the derivative is 0.
                 self._along_lines()
                 self._descend(self.best, _STEPS[0])
             if self.loss > _CLOSE:
@@ -155,10 +155,12 @@ class Search:
         qmc = import_extra("scipy.stats", "fit", "Fitting").qmc
         count = len(self._space.axes)
         units = qmc.Halton(count, scramble=False).random(_SAMPLES * count + 1)[1:]
-        dear = self._costs > self._costs.min()
-        # Each value of the dear fields with two of the cheap ones.
-        if dear.any() and not dear.all():
-            units[:, dear] = np.repeat(units[: -(-len(units) // 2), dear], 2, axis=0)[: len(units)]
+        is_expensive = self._costs > self._costs.min()
+        # Each value of the expensive fields occurs with two of the cheap ones.
+        if is_expensive.any() and not is_expensive.all():
+            units[:, is_expensive] = np.repeat(
+                units[: -(-len(units) // 2), is_expensive], 2, axis=0
+            )[: len(units)]
         low, high = self._ends
         return list(low + (high - low) * units)
 
@@ -170,7 +172,7 @@ class Search:
         optimize = import_extra("scipy.optimize", "fit", "Fitting")
         if not self._measure.is_sum:
             return self._simplex(optimize, point, free, step, most)
-        # Cheap fields first: the next one's render puts the field before it back.
+        # Cheap fields first: the render for the next field also resets the field before it.
         order = free[np.argsort(self._costs[free], kind="stable")]
 
         def at(part: Point) -> Point:
@@ -273,7 +275,7 @@ class Search:
                     return
 
     def _walk(self) -> None:
-        """Try other integers and choices, and let the numbers follow."""
+        """Try other integers and choices, and optimize the numbers for the best of them."""
         for index, axis in enumerate(self._space.axes):
             is_moving = axis.kind != "number"
             while is_moving:

@@ -138,7 +138,6 @@ def lights(size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the picture of four lights.
 
     - `size`: Width and height in pixels.
-    - Returns: ndarray of float32, shape (H, W, 3).
     """
     width, height = size
     image = np.zeros((height, width, 3), np.float32)

@@ -4,19 +4,19 @@
 module                     job
 ========================== ========================================================================
 axes, sources              the axes, and the scene or images
-order                      the order of the points, and blocks of points
+order, parts               the order of the points, and blocks of points
 passes                     the number of passes of a step, and of a point rendered alone
-plan                       the requested grid, and its layout: variables, shapes, dtypes
+layout                     the requested grid, and its layout: variables, shapes, dtypes
 filling, reductions        render blocks of points into arrays; figures of frames
 memory                     the grid as one Dataset
 zarr_grid                  the grid as a Zarr store
 store, chunks, keys        the store's metadata, its chunks, and its keys as bytes
 identity                   what determines the contents of a stored grid
-image_files                the grid as image files
+image_folder               the grid as image files
 checking                   check a store for missing and damaged data
 rendering                  render a grid into a store or a folder
 running, cluster           render blocks in this process, or on the workers of a Dask cluster
-sheet, curves, views       contact sheets and curves of a Dataset
+sheet, curves, selection   contact sheets and curves of a Dataset
 progress                   the progress bar
 ========================== ========================================================================
 """

@@ -29,20 +29,11 @@ _TIME_DESCRIPTION = "Time of the animation; its period is 1"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a grid.
+    """One axis of a grid: a settings field, "time", "image", "preset" or "settings".
 
-    Parameters
-    ----------
-    name : str
-        A settings field, "time", "image", "preset" or "settings".
-    values : tuple
-        The values as the settings store them; floats for "time", labels for "image", names for
-        "preset", Settings for "settings".
-    kind : {"settings", "time", "image", "preset"}
-        The axis "settings" also has the kind "preset": its values are settings of any methods.
-    unit : str
-        "1" for a number without a unit.
-    description : str
+    - `values`: As the settings store them; labels of images, names of presets.
+    - `kind`: The axis "settings" has the kind "preset": its values are settings of any methods.
+    - `unit`: "1" for a number without a unit.
     """
 
     name: str
@@ -79,13 +70,7 @@ class Axis:
         return np.array([_text(value) for value in self.values])
 
     def find(self, value: Any) -> int:
-        """Return the index of a value on the axis.
-
-        Raises
-        ------
-        ValueError
-            The axis does not have the value.
-        """
+        """Return the index of a value on the axis."""
         known = tuple(value) if isinstance(value, list) else value
         if known not in self.values:
             held = ", ".join(map(_text, self.values[:8])) + ", ..." * (len(self.values) > 8)
@@ -134,27 +119,7 @@ def _sequence(name: str, values: object) -> list[Any]:
 def read_axes(
     settings: Settings | None, axes: Mapping[str, Any], *, has_time: bool
 ) -> tuple[Axis, ...]:
-    """Check the requested axes.
-
-    Parameters
-    ----------
-    settings : Settings or None
-        The settings that the axes vary; None: the default.
-    axes : mapping of str to sequence
-        Values by settings field or "time", names by "preset", or Settings by "settings".
-    has_time : bool
-        Whether the source is animated.
-
-    Returns
-    -------
-    tuple of Axis
-        In the mapping's order.
-
-    Raises
-    ------
-    TypeError, ValueError
-        A name is not a field of these settings, or a value is out of the field's range.
-    """
+    """Check the requested axes."""
     if not isinstance(axes, Mapping):
         raise TypeError(f"axes: {axes!r} is not a mapping of field names to values")
     for name in axes:

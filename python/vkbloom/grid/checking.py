@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +13,10 @@ from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import DONE, Chunks
 from vkbloom.grid.identity import fingerprint
 from vkbloom.grid.keys import Keys, open_keys
-from vkbloom.grid.order import Block, blocks
+from vkbloom.grid.order import Block, Index, blocks
 from vkbloom.grid.store import (
     METADATA,
+    PARTS,
     checked_identity,
     describe,
     mark_of,
@@ -38,6 +39,8 @@ class GridReport:
         Number of points that are marked as done, including damaged ones.
     problems : tuple of str
         Each damaged or missing key, with the points that it contains.
+    missing_parts : tuple of str
+        If the grid is rendered in parts: those that are not complete, such as "3/16".
 
     See Also
     --------
@@ -55,6 +58,7 @@ class GridReport:
     points: int
     done: int
     problems: tuple[str, ...]
+    missing_parts: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -62,7 +66,8 @@ class GridReport:
         return self.points == self.done and not self.problems
 
     def __str__(self) -> str:
-        return "\n".join([f"{self.done} of {self.points} points are done", *self.problems])
+        parts = [f"part {part} is not complete" for part in self.missing_parts]
+        return "\n".join([f"{self.done} of {self.points} points are done", *parts, *self.problems])
 
 
 def check_grid(store: Any) -> GridReport:
@@ -154,12 +159,35 @@ class _Stored:
         variables = [name for name in self._chunks.trailing if not damaged.get(name)]
         shape = tuple(map(len, self._axes))
         done = 0
+        missing: set[Index] = set()
         for block in blocks(shape, self._chunks.chunk, range(len(shape))):
             if not damaged[DONE]:
                 is_done, found = self._block_problems(block, variables)
                 done += block.count * is_done
+                if not is_done or found:
+                    missing.add(block.start)
                 problems += [f"{text}, of {describe(self._axes, block)}" for text in found]
-        return GridReport(math.prod(shape), done, tuple(problems))
+        parts = self._missing_parts(shape, missing)
+        return GridReport(math.prod(shape), done, tuple(problems), tuple(parts))
+
+    def _missing_parts(self, shape: Index, missing: set[Index]) -> Iterator[str]:
+        """Yield the parts that have a missing or damaged block, by the blocks' first points."""
+        for key in sorted(self._held):
+            if not key.startswith(PARTS):
+                continue
+            try:
+                count = int(key.removeprefix(PARTS))
+                ranking = json.loads(self._keys.read(key) or b"")
+            except ValueError:
+                continue
+            if count < 1 or not isinstance(ranking, list):
+                continue
+            if sorted(map(str, ranking)) != sorted(map(str, range(len(shape)))):
+                continue
+            for number in range(1, count + 1):
+                own = blocks(shape, self._chunks.chunk, ranking, (number, count))
+                if any(block.start in missing for block in own):
+                    yield f"{number}/{count}"
 
     def _array_problem(self, name: str) -> str | None:
         """Return what is wrong with the metadata of an array, or with a coordinate."""

@@ -21,8 +21,8 @@ from typing import Any, Final, TypeAlias
 from vkbloom._core import DeviceLostError, Error
 from vkbloom.checks import import_extra
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout, lay_out, origin
 from vkbloom.grid.order import Block
-from vkbloom.grid.plan import Grid, Layout, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.running import Sink, Writer, written_behind
 from vkbloom.renderer import Renderer
@@ -101,16 +101,21 @@ def _lay_out(grid: Grid, adapter: str, validation: bool) -> Layout:
         return lay_out(grid, renderer)
 
 
+def _check_origin(renderer: Renderer, layout: Layout) -> None:
+    """Raise ValueError for a worker whose results may differ from the other workers'."""
+    for what, own in origin(renderer).items():
+        if own != getattr(layout, what):
+            raise ValueError(
+                f"{what}: the worker's {own} is not the grid's {getattr(layout, what)}; their "
+                "pictures may differ, so all workers need the same adapter, driver and version"
+            )
+
+
 def _render(grid: Grid, run: _Run) -> Tally:
     """Render and write a run's blocks; called in a worker."""
     renderer, lock = _renderer(run.adapter, run.validation)
     with lock:
-        if renderer.info.name != run.layout.adapter:
-            raise ValueError(
-                f"adapter: the worker's {renderer.info.name} is not the grid's "
-                f"{run.layout.adapter}; their pictures may differ, so name an adapter that all "
-                "workers have"
-            )
+        _check_origin(renderer, run.layout)
         total = Tally()
         try:
             filler = Filler(grid, run.layout, renderer)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom.checks import import_extra
-from vkbloom.grid import views
+from vkbloom.grid import selection
 
 if TYPE_CHECKING:
     import xarray
@@ -79,7 +79,7 @@ def response_curves(
     ['intensity']
     """
     figure_module = import_extra("matplotlib.figure", "grid", "response_curves")
-    axes = views.axes_of(dataset)
+    axes = selection.axes_of(dataset)
     for field, chosen in (("axis", axis), ("lines", lines)):
         if chosen is not None and chosen not in axes:
             raise ValueError(
@@ -111,7 +111,7 @@ def _figures(
     dataset: xarray.Dataset, variables: Sequence[str] | None, axes: Sequence[str]
 ) -> dict[str, xarray.DataArray]:
     """Return the figures to plot, by their labels."""
-    frames = list(views.framebuffers_of(dataset))
+    frames = list(selection.framebuffers_of(dataset))
     others = [str(name) for name in dataset.data_vars if name not in (*frames, "done")]
     chosen = list(others or frames) if variables is None else list(variables)
     found = {}
@@ -142,33 +142,35 @@ def _draw(
 ) -> None:
     axis, lines = named
     at, most = chosen
-    own = [str(dim) for dim in values.dims if dim not in views.axes_of(dataset)]
+    own = [str(dim) for dim in values.dims if dim not in selection.axes_of(dataset)]
     if len(own) > 1:
         raise ValueError(f"variables: {values.name} has {len(own)} dimensions besides the axes")
     if lines is None and not own:
-        free = [d for d in views.axes_of(dataset) if d not in (axis, *(at or {}))]
+        free = [d for d in selection.axes_of(dataset) if d not in (axis, *(at or {}))]
         lines = next((name for name in reversed(free) if dataset.sizes[name] > 1), None)
     across = own[0] if lines is None and own else lines
     # A Dataset keeps the coordinates of the axes that are not shown.
     table = dataset.drop_vars(list(dataset.data_vars)).assign(value=values)
     shown = [name for name in (axis, lines) if name is not None]
-    part = views.select(table, at, shown)
+    part = selection.select(table, at, shown)
     if own and across != own[0]:
         part = part.isel({own[0]: 0})
-    part = views.thinned(part, across, most)
+    part = selection.thinned(part, across, most)
     coordinate = part[axis].values
     x: Any = (
-        coordinate if _is_number(dataset, axis) else [views.label(value) for value in coordinate]
+        coordinate
+        if _is_number(dataset, axis)
+        else [selection.label(value) for value in coordinate]
     )
     for place in range(part.sizes[across] if across else 1):
         line = part["value"].isel({across: place}) if across else part["value"]
-        label = f"{across}={views.label(part[across].values[place])}" if across else None
+        label = f"{across}={selection.label(part[across].values[place])}" if across else None
         diagram.plot(x, line.transpose(axis).values, marker=".", label=label)
     unit = dataset[axis].attrs.get("units", "1")
     diagram.set_xlabel(axis if unit in ("1", "") else f"{axis} ({unit})")
     unit = values.attrs.get("units", "1")
     diagram.set_ylabel(str(values.name) if unit == "1" else f"{values.name} ({unit})")
-    diagram.set_title(views.caption(part), fontsize="small")
+    diagram.set_title(selection.caption(part), fontsize="small")
     diagram.grid(alpha=0.3)
     if across:
         # Beside the diagram, so that it hides no line.

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
+from vkbloom.grid.layout import Grid, Layout, PassCounter, checked_value
 from vkbloom.grid.order import Block, Index, points
-from vkbloom.grid.plan import Grid, Layout, PassCounter, checked_value
 from vkbloom.grid.reductions import Comparing
 from vkbloom.grid.sources import FrameRenderer, visit
 

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from vkbloom.fields import plain_value
+from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.order import Index
-from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.reductions import Reduction
 from vkbloom.grid.sources import digest
 

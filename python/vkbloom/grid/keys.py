@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["Keys", "open_keys"]
 
 _PURPOSE: Final = "Grids on disk"
+# The end of the names of LocalStore's temporary files.
+_PARTIAL: Final = ".partial"
 
 
 def _run(coroutine: Coroutine[Any, Any, Any]) -> Any:
@@ -75,10 +77,10 @@ class Keys:
             raise OSError(error.errno, error.strerror, f"{self.name}/{key}") from error
 
     def all(self) -> set[str]:
-        """Return all keys."""
+        """Return all keys, without the temporary files of other processes."""
 
         async def listed() -> set[str]:
-            return {key async for key in self.store.list()}
+            return {key async for key in self.store.list() if not key.endswith(_PARTIAL)}
 
         found: set[str] = _run(listed())
         return found
@@ -96,7 +98,7 @@ class Keys:
     def remove_leftovers(self) -> None:
         """Remove the temporary files of a process that was killed while writing."""
         root = self._root
-        for path in root.glob("**/*.partial") if root else ():
+        for path in root.glob(f"**/*{_PARTIAL}") if root else ():
             path.unlink(missing_ok=True)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from vkbloom.checks import import_extra
 from vkbloom.free_memory import memory_left
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout, Variable, attributes_of, lay_out
 from vkbloom.grid.order import blocks, default_chunk
-from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.sources import FrameRenderer
 
@@ -31,11 +31,12 @@ _REFERENCE_BYTES = 64 << 20
 _MARGIN = 10
 
 
-def chunk_of(grid: Grid, layout: Layout) -> tuple[int, ...]:
-    """Return the number of points per block along each axis."""
+def chunk_of(grid: Grid, layout: Layout, parts: int = 1) -> tuple[int, ...]:
+    """Return the number of points per block along each axis, with a block for each part."""
     stored = layout.point_size - layout.reference_size
     most = min(
         BLOCK_POINTS,
+        math.prod(grid.shape) // parts,
         BLOCK_BYTES // max(stored, 1),
         _REFERENCE_BYTES // max(layout.reference_size, 1),
     )

@@ -7,9 +7,12 @@ passes that depend on the axis that changed.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+
+from vkbloom.grid.parts import WHOLE, Part
 
 __all__ = ["Block", "Index", "blocks", "default_chunk", "points", "ranking_of", "walk"]
 
@@ -51,11 +54,21 @@ def _reflected(position: int, radices: Sequence[int]) -> Iterator[int]:
         yield radices[place] - 1 - digit if sweeps % 2 else digit
 
 
-def blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
-    """Yield all blocks of a grid in the order in which they are visited.
+def blocks(
+    shape: Index, chunk: Index, ranking: Sequence[int], part: Part = WHOLE
+) -> Iterator[Block]:
+    """Return the blocks of a part of a grid in the order in which they are visited.
+
+    A part is a run of neighbouring blocks, so that its points share passes.
 
     `shape`: Number of values by axis.
     """
+    count = math.prod(-(-size // step) for size, step in zip(shape, chunk, strict=True))
+    ends = (count * number // part[1] for number in (part[0] - 1, part[0]))
+    return itertools.islice(_all_blocks(shape, chunk, ranking), *ends)
+
+
+def _all_blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
     counts = [-(-shape[axis] // chunk[axis]) for axis in ranking]
     backwards = [False] * len(shape)
     for position in range(math.prod(counts)):

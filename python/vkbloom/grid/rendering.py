@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from vkbloom.grid.filling import Tally
-from vkbloom.grid.plan import Grid, Layout, lay_out
+from vkbloom.grid.layout import Grid, Layout, lay_out
 from vkbloom.grid.progress import Progress
 from vkbloom.grid.running import Sink, run_here
 from vkbloom.interruptible import opened_renderer
@@ -41,8 +41,8 @@ def render_grid(
             layout = cluster.lay_out_there(client, grid, adapter, validation)
         sink = prepared(layout)
         done = int(sink.done.sum())
-        shown = stack.enter_context(Progress(sink.done.size, done, shown=progress))
-        if done < sink.done.size:
+        shown = stack.enter_context(Progress(sink.total, done, shown=progress))
+        if done < sink.total:
             shown.add(Tally(ran=layout.ran))
         if renderer is not None:
             run_here(grid, layout, sink, sink.missing(), renderer=renderer, progress=shown)
@@ -54,8 +54,9 @@ def render_grid(
                 sink,
                 sink.missing(),
                 progress=shown,
-                missing=sink.done.size - done,
+                missing=sink.total - done,
                 adapter=adapter,
                 validation=validation,
             )
+        sink.finish()
     return shown.tally

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.grid.filling import Filler, Tally
+from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.order import Block
-from vkbloom.grid.plan import Grid, Layout
 from vkbloom.grid.progress import Progress
 
 if TYPE_CHECKING:
@@ -43,6 +43,10 @@ class Sink(Protocol):
         """Whether each point is done, in the grid's shape."""
 
     @property
+    def total(self) -> int:
+        """Number of points to render, including those that are done."""
+
+    @property
     def writer(self) -> Writer:
         """The writer, which can be sent to other processes."""
 
@@ -51,6 +55,9 @@ class Sink(Protocol):
 
     def mark(self, written: Iterable[Block]) -> None:
         """Mark points as done; their data must be on the disk."""
+
+    def finish(self) -> None:
+        """Do what is left to do when all points are done."""
 
 
 def empty_arrays(layout: Layout, block: Block) -> dict[str, NDArray[Any]]:

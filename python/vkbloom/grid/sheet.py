@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import check_index
 from vkbloom.framebuffers import leading
-from vkbloom.grid import views
+from vkbloom.grid import selection
 from vkbloom.views import pictures
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def contact_sheet(
     rows, columns = _shown(dataset, rows, columns)
     name = _attachment(dataset, attachment)
     shown = [axis for axis in (rows, columns) if axis is not None]
-    part = views.select(dataset, at, shown)
-    part = views.thinned(views.thinned(part, rows, most), columns, most)
+    part = selection.select(dataset, at, shown)
+    part = selection.thinned(selection.thinned(part, rows, most), columns, most)
     down, across = (
         range(part.sizes[axis]) if axis is not None else range(1) for axis in (rows, columns)
     )
@@ -109,7 +109,7 @@ def contact_sheet(
         np.uint8,
     )
     headings = [_heading(part, columns, column) for column in across]
-    title = [name, views.caption(part)]
+    title = [name, selection.caption(part)]
     if max(map(len, headings)) * _LETTER_WIDTH * letter > size[0]:
         # Narrow columns show the values only; the title names the axis.
         headings = [text.partition("=")[2] for text in headings]
@@ -131,7 +131,7 @@ def _shown(
     dataset: xarray.Dataset, rows: str | None, columns: str | None
 ) -> tuple[str | None, str | None]:
     """Return the vertical and the horizontal axis."""
-    axes = views.axes_of(dataset)
+    axes = selection.axes_of(dataset)
     for field, name in (("rows", rows), ("columns", columns)):
         if name is not None and name not in axes:
             raise ValueError(
@@ -149,7 +149,9 @@ def _shown(
 
 def _attachment(dataset: xarray.Dataset, attachment: str | None) -> str:
     """Return the framebuffer to show."""
-    found = {name: np.empty((0,) * dims) for name, dims in views.framebuffers_of(dataset).items()}
+    found = {
+        name: np.empty((0,) * dims) for name, dims in selection.framebuffers_of(dataset).items()
+    }
     if not found:
         raise ValueError("dataset: the grid has no framebuffers to show")
     if attachment is None:
@@ -168,7 +170,7 @@ def _frame_size(part: xarray.Dataset, name: str, shown: list[str]) -> tuple[int,
 def _heading(part: xarray.Dataset, axis: str | None, place: int) -> str:
     if axis is None:
         return ""
-    return f"{axis}={views.label(part[axis].values[place])}"
+    return f"{axis}={selection.label(part[axis].values[place])}"
 
 
 def _cell(
@@ -177,6 +179,6 @@ def _cell(
     point = part.isel({axis: number for axis, number in place.items() if axis is not None})
     if "done" in point and not bool(point["done"].values):
         return np.full((size[1], size[0], 3), _CELL, np.uint8)
-    is_encoded = name == "final" and views.encoding_of(point) != "none"
+    is_encoded = name == "final" and selection.encoding_of(point) != "none"
     picture = pictures.picture(point[name].values, name, encoded=is_encoded, size=size)
     return np.broadcast_to(picture[:, :, :3], (size[1], size[0], 3))

@@ -83,21 +83,7 @@ def visit(
     points: Iterable[Point],
     attachments: str | Sequence[str],
 ) -> Iterator[tuple[Index, Frames]]:
-    """Render points in the given order.
-
-    Parameters
-    ----------
-    renderer : FrameRenderer
-    source : Source
-    points : iterable of Point
-        Consumed as needed, with some read-ahead.
-    attachments : "all" or sequence of str
-
-    Yields
-    ------
-    (tuple of int, Frames)
-        Index and frames of each point.
-    """
+    """Render points in the given order."""
     drawn: deque[Index] = deque()
 
     def work() -> Iterator[Work]:
@@ -227,30 +213,7 @@ def read_source(
     mask: object = None,
     emission: object = None,
 ) -> Source:
-    """Check the source of a grid.
-
-    Parameters
-    ----------
-    source : Scene, ndarray, or list or mapping of ndarray
-        A mapping gives the images' labels.
-    size : (int, int), optional
-        Size of a scene's frame; default (1280, 720). Images have their own size.
-    shading : {"forward", "deferred"}
-        Shading of a scene.
-    time : float
-        Time of a scene's animation; its period is 1.
-    mask, emission : ndarray, optional
-        Of all images.
-
-    Returns
-    -------
-    ImageSource or SceneSource
-
-    Raises
-    ------
-    TypeError, ValueError
-        The source is something else, or an argument does not apply to it.
-    """
+    """Check the source of a grid."""
     from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     given = {"mask": mask, "emission": emission}

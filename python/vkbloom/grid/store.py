@@ -9,7 +9,9 @@ The process may be killed at any time, because it writes in this order:
 4. The blocks' chunks of ``done``, after the blocks have been flushed to the disk.
 
 ``done`` has the same chunks as the variables. So a process writes only keys of its own blocks, and
-processes with different blocks need no lock.
+processes with different parts need no lock: they write the same metadata. ``done/parts.N`` tells
+that the grid is rendered in N parts, and the order of the axes in which they are divided; when all
+parts are done, it is removed.
 """
 
 from __future__ import annotations
@@ -28,13 +30,15 @@ from vkbloom.grid.axes import Axis
 from vkbloom.grid.chunks import DONE, Chunks
 from vkbloom.grid.identity import FORMAT, differences, fingerprint, identity, short
 from vkbloom.grid.keys import Keys
+from vkbloom.grid.layout import Grid, Layout, Variable, attributes_of
 from vkbloom.grid.order import Block, Index, blocks
-from vkbloom.grid.plan import Grid, Layout, Variable, attributes_of
+from vkbloom.grid.parts import WHOLE, Part
 from vkbloom.grid.running import Writer
 
 __all__ = [
     "IDENTITY",
     "METADATA",
+    "PARTS",
     "GridStore",
     "checked_identity",
     "describe",
@@ -46,6 +50,8 @@ __all__ = [
 
 METADATA: Final = "zarr.json"
 IDENTITY: Final = "vkbloom_grid"
+# In the folder of an array, where readers of Zarr expect chunks and list no members.
+PARTS: Final = f"{DONE}/parts."
 
 _PURPOSE: Final = "Grids on disk"
 # Level 1 is fast; on noisy pictures higher levels compress little better.
@@ -106,8 +112,11 @@ def _add_array(group: Any, name: str, shape: Index, chunk: Index, variable: Vari
 class GridStore:
     """The Zarr store of a grid, with its marks of completed points."""
 
-    def __init__(self, keys: Keys, grid: Grid, layout: Layout, chunk: Index) -> None:
+    def __init__(
+        self, keys: Keys, grid: Grid, layout: Layout, chunk: Index, part: Part = WHOLE
+    ) -> None:
         self.keys = keys
+        self.part = part
         self.grid = grid
         self.layout = layout
         self.chunk = chunk
@@ -121,8 +130,18 @@ class GridStore:
         return self._chunks
 
     def blocks(self) -> Iterable[Block]:
-        """Return all blocks in the order in which they are rendered."""
-        return blocks(self.grid.shape, self.chunk, self.layout.ranking)
+        """Return the blocks of the part in the order in which they are rendered."""
+        return self._blocks(self.part)
+
+    def _blocks(self, part: Part) -> Iterable[Block]:
+        return blocks(self.grid.shape, self.chunk, self.layout.ranking, part)
+
+    @property
+    def total(self) -> int:
+        """Number of points of the part."""
+        if self.part == WHOLE:
+            return self.done.size
+        return sum(block.count for block in self.blocks())
 
     def missing(self) -> Iterable[Block]:
         """Return the blocks that are not done, in the order in which they are rendered."""
@@ -134,6 +153,15 @@ class GridStore:
         self._chunks.mark(found)
         for block in found:
             self.done[block.slices] = True
+
+    def finish(self) -> None:
+        """Remove what only an incomplete store needs, if no other part is missing."""
+        held = self.keys.all()
+        if all(self._chunks.key(DONE, block) in held for block in self._blocks(WHOLE)):
+            self.keys.remove_leftovers()
+            for key in held:
+                if key.startswith(PARTS):
+                    self.keys.remove(key)
 
     def prepare(self, *, resume: bool, verify: bool) -> list[str]:
         """Create the store, or examine an existing one and replace damaged metadata.
@@ -149,14 +177,20 @@ class GridStore:
             )
         if held:
             self._check_identity(expected)
-        self.keys.remove_leftovers()
+        if self.part == WHOLE:
+            self.keys.remove_leftovers()
         mended = []
         for key, content in expected.items():
             found = self.keys.read(key) if held else None
             if normal(key, found) != normal(key, content):
                 self.keys.write(key, content)
-                mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
+                # Another part may have begun to write the metadata.
+                if found is not None or self.part == WHOLE:
+                    mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
         self.keys.flush(expected)
+        if self.part != WHOLE:
+            order = json.dumps(self.layout.ranking).encode()
+            self.keys.write(f"{PARTS}{self.part[1]}", order)
         return mended + self._find_done(held, verify=verify) if held else []
 
     def _check_identity(self, expected: Mapping[str, bytes]) -> None:

@@ -12,9 +12,10 @@ from vkbloom.checks import import_extra
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import chunk_in
 from vkbloom.grid.keys import Keys, open_keys
+from vkbloom.grid.layout import Grid, Layout, ask
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Index
-from vkbloom.grid.plan import Grid, Layout, ask
+from vkbloom.grid.parts import read_part
 from vkbloom.grid.rendering import render_grid
 from vkbloom.grid.sources import ImageSource
 from vkbloom.grid.store import IDENTITY, METADATA, GridStore, read_json, stored_identity
@@ -38,6 +39,7 @@ def grid_to_zarr(
     *,
     client: Client | None = None,
     chunks: Mapping[str, int] | None = None,
+    part: tuple[int, int] | str | None = None,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
     size: tuple[int, int] | None = None,
@@ -71,6 +73,12 @@ def grid_to_zarr(
         Grid points per chunk by axis; 1 for an axis that is not named. Default: chunks of about
         1 MiB, at most 1024 points, along the axes that vary fastest. A chunk is written when all
         its points are rendered; chunks along slower axes make more passes run.
+    part : (int, int) or str, optional
+        Render only part i of n, from 1. Part 0 is part n. Each part is a run of chunks, about 1/n
+        of the points. Processes may render parts at the same time, in any order and repeatedly;
+        `check_grid` names missing parts. Text is "3/16"; "auto/16" takes i, and "auto" also n,
+        from the environment of a job array, such as SLURM_ARRAY_TASK_ID. The default of `chunks`
+        has at least n chunks; name `chunks` for the same bytes as without parts.
     adapter, validation
         Arguments of the renderers, as for `vkbloom.Renderer`.
     resume : bool
@@ -143,11 +151,12 @@ def grid_to_zarr(
     if "done" in (axis.name for axis in grid.axes):
         raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
     check_chunks(grid, chunks)
+    own = read_part(part)
     if client is not None and not keys.is_shared:
         raise ValueError("store: the workers cannot write to a store in memory; use a folder")
 
     def prepared(layout: Layout) -> GridStore:
-        kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys))
+        kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys, own[1]), own)
         for text in kept.prepare(resume=resume, verify=verify):
             if on_mended is not None:
                 on_mended(text)
@@ -161,12 +170,14 @@ def grid_to_zarr(
     return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
 
 
-def _chunk(grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys) -> Index:
+def _chunk(
+    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys, parts: int
+) -> Index:
     """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
         stored = stored_identity(read_json(keys.read(METADATA)) or {})
         held = None if stored is None else chunk_in(stored, grid.shape)
-        return chunk_of(grid, layout) if held is None else held
+        return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
 
 

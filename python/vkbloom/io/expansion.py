@@ -20,13 +20,7 @@ _LARGEST: Final = 1024.0
 
 
 def check_expansion(expand: float | None) -> float:
-    """Return the value that 1 becomes; None is 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        It is not a number from 1 to 1024.
-    """
+    """Return the value that 1 becomes; None is 1."""
     if expand is None:
         return 1.0
     value = as_float("expand", expand)

@@ -244,7 +244,6 @@ def _losses(
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
     """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
 
-    - `values`: ndarray of float, shape (H, W, C).
     - `curve`: "none" and "linear" return the values themselves.
     - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
     """

@@ -34,6 +34,7 @@ __all__ = [
     "check_complete",
     "check_extension",
     "holds",
+    "is_temporary",
     "put_in_place",
     "replacing",
     "reserve",
@@ -50,6 +51,7 @@ _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
 
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _READ_BYTES: Final = 64 << 20  # bytes read at a time
+_TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
 _ZEROS: Final = 1 << 20  # bytes written at a time
 
 
@@ -157,10 +159,15 @@ def write_file(file: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def is_temporary(path: Path) -> bool:
+    """Return whether a file is one that a process writes before it is renamed."""
+    return path.name.startswith(_TEMPORARY)
+
+
 def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
     """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
-    temporary = _link_target(file).with_name(f".vkbloom-{os.urandom(8).hex()}{file.suffix}")
+    temporary = _link_target(file).with_name(f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}")
     try:
         with temporary.open("xb") as stream:
             fill(stream)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom.fields import number_field, value_field
 from vkbloom.own.file import OwnFile, read_file
-from vkbloom.own.params import Param
+from vkbloom.own.params import RANGES, Param
 from vkbloom.own.planning import Request, Row, planned
 from vkbloom.own.resources import made_resources
 from vkbloom.own.shaders import Shaders
@@ -25,6 +25,8 @@ from vkbloom.settings import Settings
 
 Twin = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
 
+#: The largest value of a uniform.
+LARGEST_FLOAT: Final = 3.4028234663852886e38
 #: Fields that a file without BLOOM has not, since it composites by itself.
 COMPOSITED: Final = ("intensity", "composite")
 
@@ -211,7 +213,8 @@ def load_method(
         name = own_name(Path(read.name).stem if read.name != "<text>" else "own")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
-    return registered(name, read, reference)
+    known = class_of(name, read, reference)
+    return known if known.twin is reference else registered(name, read, reference)
 
 
 def own_name(stem: str) -> str:
@@ -268,8 +271,22 @@ def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
     whole = param.number != "float"
     default = int(param.default) if whole else param.default
     return (int if whole else float), number_field(
-        default=default, range=(param.low, param.high), text=param.description
+        default=default,
+        # Finite, since a range that ends at infinity does not contain its beginning.
+        range=(max(param.low, -LARGEST_FLOAT), min(param.high, LARGEST_FLOAT)),
+        slider=slider_of(param),
+        text=param.description,
     )
+
+
+def slider_of(param: Param) -> tuple[float, float] | tuple[()]:
+    """Return the ends of a slider: the file's limits, where one is missing twice the default."""
+    low, high = RANGES[param.number]
+    start = param.low if param.low != low else min(0.0, 2 * param.default)
+    end = param.high if param.high != high else max(start + 1, 2 * param.default)
+    if param.low == param.high:
+        return ()
+    return (start if start < end else end - 1), end
 
 
 #: Names that classes of settings have beside their attributes.

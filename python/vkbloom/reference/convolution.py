@@ -65,10 +65,6 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
 
     The glow is extended by as much as the kernel reaches, so that the Fourier transform's own
     wrapping falls outside.
-
-    - `glow`: ndarray of float64, shape (H, W, C).
-    - `kernel`: ndarray of float64, shape (h, w, C).
-    - Returns: ndarray of float64, shape (H, W, C).
     """
     rows, columns = kernel.shape[:2]
     modes: dict[str, tuple[Any, Any]] = {

@@ -14,10 +14,17 @@ from .framebuffers import checked, framebuffers
 from .sampling import Array
 from .tape import Traced, gradients, value_of
 
-__all__ = ["DISCRETE", "differentiable", "vjp"]
+__all__ = ["DISCRETE", "Gradients", "check_cotangent", "differentiable", "vjp"]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset({"anamorphism", "bloom_scale", "pixels_per_degree", "size"})
+
+
+class Gradients(dict[str, Array]):
+    """Derivatives by name. A name without a derivative raises ValueError."""
+
+    def __missing__(self, name: str) -> Array:
+        raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(self)}")
 
 
 def vjp(
@@ -26,7 +33,7 @@ def vjp(
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
-) -> tuple[dict[str, Array], Callable[[Mapping[str, NDArray[Any]]], dict[str, Array]]]:
+) -> tuple[dict[str, Array], Callable[[Mapping[str, NDArray[Any]]], Gradients]]:
     """Return the framebuffers, and a function for the derivatives of a sum over them.
 
     The bloom buffers are "rgba32float", so that stores do not clamp. Rounding to 8 bits and dither
@@ -56,13 +63,14 @@ def vjp(
         "mask" (H, W) and "emission" if they were given, by "kernel" (of `vkbloom.Convolution`), and
         by each real field under its name. Fields of glare have names such as "glare.0.intensity".
         Values are derivatives by real units: for uint8, by value / 255. At NaN and infinity of the
-        image they are 0.
+        image they are 0. Any other name, such as that of an integer field, raises ValueError.
 
     Raises
     ------
     TypeError, ValueError
-        As for `apply`. From `pullback`: there is no such framebuffer, or a cotangent has another
-        shape, or is not finite.
+        As for `apply`. The method was loaded from a file of passes, which has no derivative. From
+        `pullback`: there is no such framebuffer, or a cotangent has another shape, or is not
+        finite.
 
     See Also
     --------
@@ -84,6 +92,10 @@ def vjp(
     >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
     np.float64(1.5)
     """
+    if hasattr(settings, "twin"):
+        raise ValueError(
+            f"method: {settings.method!r} has no derivative, since its passes come from a file"
+        )
     scene, source, weights, _ = checked(image, settings, mask, emission)
     inputs: dict[str, Traced] = {"image": Traced(scene)}
     if emission is not None:
@@ -103,13 +115,13 @@ def vjp(
     )
     values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
 
-    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
-        given = {name: _cotangent(name, part, values) for name, part in cotangents.items()}
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        given = {name: check_cotangent(name, part, values) for name, part in cotangents.items()}
         given = {name: part for name, part in given.items() if isinstance(found[name], Traced)}
         derivatives = gradients(
             [(found[name], part) for name, part in given.items()], [*inputs.values()]
         )
-        results = dict(zip(inputs, derivatives, strict=True))
+        results = Gradients(zip(inputs, derivatives, strict=True))
         for name, pixels in (("image", scene), ("emission", source)):
             if name in results:
                 results[name] = np.where(np.isfinite(pixels), results[name], 0.0)
@@ -166,7 +178,7 @@ class _TracedSettings:
         return getattr(self._settings, name)
 
 
-def _cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Array]) -> Array:
+def check_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
     """Check and return a cotangent in float64."""
     if name not in values:
         known = ", ".join(values)

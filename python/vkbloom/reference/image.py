@@ -27,7 +27,6 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     """Return an image in real units.
 
     - `image`: ndarray, shape (H, W, C); uint8 (read as value / 255), float16, float32 or float64.
-    - Returns: ndarray of float64, shape (H, W, C).
     """
     array = np.asarray(image)
     if array.dtype.name not in _FORMATS:
@@ -47,7 +46,6 @@ def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     """Return a mask as values of 0 to 1.
 
     - `mask`: ndarray, shape (H, W); uint8 (read as value / 255), bool, or floats.
-    - Returns: ndarray of float64, shape (H, W, 1).
     """
     array = np.asarray(mask)
     if array.shape != size[::-1]:

@@ -44,7 +44,6 @@ def sample(
     - `size`: Width and height of the result, in pixels.
     - `x_taps`, `y_taps`: Offset (in texels of `image`) and weight of each tap along the axis. The
       taps of both axes form a grid, and their weights are multiplied.
-    - Returns: ndarray of float64, shape (height, width, C).
     """
     width, height = size
     rows = _filter_rows(image, height, y_taps)
@@ -133,9 +132,7 @@ def _slopes(image: Array, count: int, offset: float) -> Array:
 def read_rows(image: Array, positions: Array) -> Array:
     """Sample an image along its first axis at any positions, linearly and clamped to the edge.
 
-    - `image`: ndarray of float64, shape (H, W, C).
     - `positions`: ndarray, shape (N,); In texels, with texel n at n.
-    - Returns: ndarray of float64, shape (N, W, C).
     """
     lower = np.floor(positions)
     part = (positions - lower)[:, np.newaxis, np.newaxis]
@@ -151,7 +148,6 @@ def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
 
     - `parts`: The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W,
       C).
-    - Returns: ndarray of float64, shape (H, W, C).
     """
     total, weights = np.zeros(()), np.zeros(())
     for weight, image in parts:

@@ -18,7 +18,6 @@ def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
     - `rgb`: ndarray of float64, shape (..., 3), (..., 4) or (..., 1); A fourth channel is alpha,
       which is ignored. A single channel is its own luminance.
     - `coefficients`: ndarray of float64, shape (3,); Sources differ in the last digits.
-    - Returns: ndarray of float64, shape (..., 1).
     """
     if rgb.shape[-1] == 1:
         return rgb
@@ -35,7 +34,6 @@ def brightest(image: Array) -> Array:
 def masked(image: Array, mask: Array | None) -> Array:
     """Return the image times the mask, which is read bilinearly at the image's pixel centres.
 
-    - `image`: ndarray of float64, shape (h, w, C).
     - `mask`: ndarray of float64, shape (H, W, 1), or None.
     """
     if mask is None:
@@ -62,7 +60,6 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
 
     - `rgb`: ndarray of float64, shape (..., 3) or (..., 4); Alpha is scaled like the colour.
     - `threshold`: In the units of the image; None keeps everything.
-    - Returns: ndarray of float64, of the same shape.
     """
     if threshold is None:
         return rgb
@@ -78,9 +75,7 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
     b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
     divisor.
 
-    - `rgb`: ndarray of float64, shape (..., C).
     - `threshold`, `half_width`: Middle and half-width of the soft part, in the units of the image.
-    - Returns: ndarray of float64, shape (..., C).
     """
     brightness = brightest(rgb)
     soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor

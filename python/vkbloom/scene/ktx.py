@@ -42,84 +42,80 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[Any], ...]:
     order +x, -x, +y, -y, +z, -z; C is 3 or 4; the dtype is uint8, float16 or float32. The arrays
     own their memory.
     """
-    path = Path(path)
-    data = path.read_bytes()
+    data = Path(path).read_bytes()
+    try:
+        order, texel, side, count, offset = _header(data)
+        levels: list[NDArray[Any]] = []
+        for level in range(count):
+            texels, offset = _level(data, offset, (level, max(1, side >> level)), order, texel)
+            levels.append(texels.astype(texel[1]))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    return tuple(levels)
+
+
+def _header(data: bytes) -> tuple[Literal["<", ">"], tuple[int, str], int, int, int]:
+    """Return byte order, channels and dtype, side, number of levels, and where they begin."""
     if data.startswith(_KTX2_IDENTIFIER):
-        raise ValueError(f"{path}: a KTX 2 file; only KTX 1 can be read")
+        raise ValueError("a KTX 2 file; only KTX 1 can be read")
     if not data.startswith(IDENTIFIER):
-        raise ValueError(f"{path}: not a KTX 1 file (its identifier does not match)")
+        raise ValueError("not a KTX 1 file (its identifier does not match)")
     if len(data) < _HEADER_SIZE:
-        raise ValueError(f"{path}: truncated: {len(data)} bytes, the header alone has 64")
+        raise ValueError(f"truncated: {len(data)} bytes, the header alone has 64")
     order: Literal["<", ">"] = (
         "<" if struct.unpack_from("<I", data, 12)[0] == _SAME_ENDIANNESS else ">"
     )
-    (
-        endianness,
-        gl_type,
-        _type_size,
-        gl_format,
-        gl_internal_format,
-        _base_internal_format,
-        width,
-        height,
-        depth,
-        elements,
-        faces,
-        level_count,
-        key_value_size,
-    ) = struct.unpack_from(f"{order}13I", data, 12)
+    # Without glTypeSize and glBaseInternalFormat.
+    endianness, kind, form, internal, width, height, depth, elements, faces, count, size = (
+        struct.unpack_from(f"{order}2I4x2I4x7I", data, 12)
+    )
     if endianness != _SAME_ENDIANNESS:
-        raise ValueError(f"{path}: damaged: its endianness field is {endianness:#010x}")
+        raise ValueError(f"damaged: its endianness field is {endianness:#010x}")
     if elements or depth > 1:
         raise ValueError(
-            f"{path}: an array or 3-D texture (depth {depth}, {elements} elements); "
+            f"an array or 3-D texture (depth {depth}, {elements} elements); "
             "a single cubemap is needed"
         )
     if faces != 6:
-        raise ValueError(f"{path}: has {faces} faces; a cubemap has 6")
+        raise ValueError(f"has {faces} faces; a cubemap has 6")
     if width != height or width == 0:
-        raise ValueError(f"{path}: faces of {width} x {height}; they must be square")
-    texel = _TEXELS.get((gl_internal_format, gl_format, gl_type))
+        raise ValueError(f"faces of {width} x {height}; they must be square")
+    texel = _TEXELS.get((internal, form, kind))
     if texel is None:
         raise ValueError(
-            f"{path}: texels of glInternalFormat {gl_internal_format:#06x}, glFormat "
-            f"{gl_format:#06x}, glType {gl_type:#06x}; RGBA8, RGB8, RGBA16F, RGB16F, RGBA32F "
-            "and RGB32F can be read"
+            f"texels of glInternalFormat {internal:#06x}, glFormat {form:#06x}, glType {kind:#06x};"
+            " RGBA8, RGB8, RGBA16F, RGB16F, RGBA32F and RGB32F can be read"
         )
     # With 0 the file has only the first level, and the reader has to make the others.
-    level_count = max(level_count, 1)
-    if level_count > width.bit_length():
-        raise ValueError(
-            f"{path}: {level_count} mip levels; {width} x {width} has at most {width.bit_length()}"
-        )
+    count = max(count, 1)
+    if count > width.bit_length():
+        raise ValueError(f"{count} mip levels; {width} x {width} has at most {width.bit_length()}")
+    return order, texel, width, count, _HEADER_SIZE + size
 
+
+def _level(
+    data: bytes, offset: int, place: tuple[int, int], order: str, texel: tuple[int, str]
+) -> tuple[NDArray[Any], int]:
+    """Return the texels of a level as stored, and the offset of the next; `place`: number, side."""
+    level, side = place
     channels, kind = texel
-    stored = np.dtype(kind).newbyteorder(order)
-    offset = _HEADER_SIZE + key_value_size
-    levels: list[NDArray[Any]] = []
-    for level in range(level_count):
-        side = max(1, width >> level)
-        row = _aligned(side * channels * stored.itemsize)
-        face = row * side
-        if offset + 4 + 6 * face > len(data):
-            raise ValueError(
-                f"{path}: truncated: level {level} ends at byte {offset + 4 + 6 * face}, "
-                f"the file has {len(data)}"
-            )
-        (image_size,) = struct.unpack_from(f"{order}I", data, offset)
-        if image_size != face:
-            raise ValueError(
-                f"{path}: damaged: level {level} gives {image_size} bytes a face; "
-                f"{side} x {side} has {face}"
-            )
-        # Rows are padded to 4 bytes, so faces and levels need no padding.
-        texels = np.ndarray(
-            (6, side, side, channels),
-            stored,
-            buffer=data,
-            offset=offset + 4,
-            strides=(face, row, channels * stored.itemsize, stored.itemsize),
+    stored = np.dtype(kind).newbyteorder(order)  # type: ignore[arg-type]
+    row = _aligned(side * channels * stored.itemsize)
+    face = row * side
+    end = offset + 4 + 6 * face
+    if end > len(data):
+        raise ValueError(f"truncated: level {level} ends at byte {end}, the file has {len(data)}")
+    (image_size,) = struct.unpack_from(f"{order}I", data, offset)
+    if image_size != face:
+        raise ValueError(
+            f"damaged: level {level} gives {image_size} bytes a face; {side} x {side} has {face}"
         )
-        levels.append(texels.astype(stored.newbyteorder("=")))
-        offset += 4 + 6 * face
-    return tuple(levels)
+    # Rows are padded to 4 bytes, so faces and levels need no padding.
+    texels = np.ndarray(
+        (6, side, side, channels),
+        stored,
+        buffer=data,
+        offset=offset + 4,
+        strides=(face, row, channels * stored.itemsize, stored.itemsize),
+    )
+    return texels, end

@@ -218,8 +218,6 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     - Returns: ``(6, side, side, C)`` in the panorama's dtype: bilinear samples, wrapped in
       longitude and clamped at the poles. NaN and infinity count as 0.
 
-    Notes
-    -----
     Longitude u = 1/2 + atan2(x, -z) / 2 pi and latitude v = 1/2 + asin(y) / pi of the unit
     direction. The direction of a face's pixel inverts the table "Cube map face and coordinate
     selection" of the Vulkan specification.

@@ -56,10 +56,7 @@ def compare_with_law(
     border: int = 0,
     note: str = "",
 ) -> None:
-    """Raise AssertionError with the deviation, its position and the law if a value is wrong.
-
-    `found`, `expected`: ndarray of float64, shape (H, W, C).
-    """
+    """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
     __tracebackhide__ = True
     difference = np.abs(found - expected)
     place = np.unravel_index(int(difference.argmax()), difference.shape)

@@ -482,7 +482,7 @@ def _message(
         for reason in verdict.reasons:
             lines.append(f"  {verdict.name}: FAILED ({verdict.failed_at}): {reason}")
         if verdict.diagnosis is not None and verdict.diagnosis.cause is not None:
-            lines.append(f"  {verdict.name}: cause: {verdict.diagnosis}")
+            lines.append(f"  {verdict.name}: cause: {verdict.diagnosis.summary}")
     of_several = f" (the closest of {count})" if count and count > 1 else ""
     now = given.origin.summary
     lines.append(f"  reference{of_several}: {reference.origin.summary}; now: {now}")

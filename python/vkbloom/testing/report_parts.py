@@ -76,7 +76,7 @@ def figures(verdict: Verdict, images: Mapping[str, NDArray[Any]]) -> Figures:
         "outcome": "equal" if verdict.identical else outcome,
         "failed_at": verdict.failed_at,
         "reasons": list(verdict.reasons),
-        "cause": str(verdict.diagnosis) if verdict.diagnosis else None,
+        "cause": verdict.diagnosis.summary if verdict.diagnosis else None,
         "shape": list(image.shape) if image is not None else None,
         "dtype": image.dtype.name if image is not None else None,
         "atol": verdict.atol,

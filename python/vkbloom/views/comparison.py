@@ -150,16 +150,7 @@ def compare(
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
-    if unknown := [name for name in metrics if name not in ALL_METRICS]:
-        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(ALL_METRICS)}")
-    for name, number in (
-        ("nits_per_unit", nits_per_unit),
-        ("pixels_per_degree", pixels_per_degree),
-    ):
-        if number is not None and not 0 < as_float(name, number) < math.inf:
-            raise ValueError(f"{name}: {number!r} is out of range, finite and above 0")
-        if number is None and "cvvdp" in metrics:
-            raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
+    _check_metrics(metrics, nits_per_unit=nits_per_unit, pixels_per_degree=pixels_per_degree)
     if data_range is not None and not 0 < data_range < math.inf:
         raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
     a, b = checked_image("a", a), checked_image("b", b)
@@ -198,6 +189,17 @@ def compare(
         not_computed=not_computed,
         **computed,
     )
+
+
+def _check_metrics(metrics: Collection[Metric], **viewing: float | None) -> None:
+    """Raise TypeError or ValueError for an unknown metric and wrong viewing conditions."""
+    if unknown := [name for name in metrics if name not in ALL_METRICS]:
+        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(ALL_METRICS)}")
+    for name, number in viewing.items():
+        if number is not None and not 0 < as_float(name, number) < math.inf:
+            raise ValueError(f"{name}: {number!r} is out of range, finite and above 0")
+        if number is None and "cvvdp" in metrics:
+            raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
 
 
 def difference(

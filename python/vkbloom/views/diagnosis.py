@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom.io.srgb import decode_srgb, encode_srgb
 from vkbloom.views.comparison import checked_image
+from vkbloom.views.shifts import LEAST_SHIFT, find_shift
 
 __all__ = ["Cause", "Diagnosis", "diagnose"]
 
@@ -35,12 +36,11 @@ _Map = Callable[[_Image], _Image]
 # What a value may be off by for reasons that are no cause: a level of integers, and for floats
 # a few roundings to half of 2**-11 each.
 _RELATIVE: Final = 2.0**-8
-# A cause explains a difference if at most this share of it (root mean square) remains: of exact
-# causes, and of a shift, because the two images may have been interpolated by different filters.
+# A cause explains a difference if at most this share of it (root mean square) remains.
 _REMAINS: Final = 0.5
-_REMAINS_OF_SHIFT: Final = 0.1
-_LEAST_SHIFT: Final = 1 / 64  # pixels
-_WINDOW: Final = 256  # pixels; the side of the part in which a shift is searched
+# Rounding to the nearest value reaches half of the largest allowed error, unless few values differ.
+_LEAST_ROUNDING: Final = 0.3
+_FEW: Final = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +83,11 @@ class Diagnosis:
 
     def __str__(self) -> str:
         return self.text
+
+    @property
+    def summary(self) -> str:
+        """The text, and the residual."""
+        return f"{self.text}; residual {self.residual:.3g}"
 
 
 @dataclass(frozen=True)
@@ -146,6 +151,8 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
         return Diagnosis(cause="equal", text="equal: all values are the same")
     valid = finite_a & finite_b
     step = max(_step(a), _step(b))
+    # The least difference of two halves.
+    tiny = 2.0**-24 if np.float16 in (a.dtype, b.dtype) else 0.0
     plain_a, plain_b = (np.where(valid, image, 0.0) for image in (real_a, real_b))
     unequal = int((~valid & ~same).sum())
     if unequal:
@@ -157,7 +164,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     found = _of_rounding(a, b, plain_a, plain_b)
     if found is None:
         for candidate in _candidates(plain_a, plain_b):
-            found = _judged(candidate, plain_a, plain_b, step)
+            found = _judged(candidate, plain_a, plain_b, step, tiny)
             if found is not None:
                 break
     return found or _of_shift(plain_a, plain_b, step)
@@ -221,7 +228,11 @@ def _of_rounding(
         ("half", 2.0**-10 * largest + 2.0**-24, _is_half(real_a) or _is_half(real_b)),
         ("8-bit", 1 / 255, _has_levels(real_a, 255) or _has_levels(real_b, 255)),
     ):
-        if is_stored and (error <= allowed * (1 + 1e-9)).all():
+        if not is_stored or (error > allowed * (1 + 1e-9)).any():
+            continue
+        # Noise that is much smaller than the steps of one image is not their rounding.
+        is_small = name != "float" and (error <= _LEAST_ROUNDING * allowed).all()
+        if not is_small or np.count_nonzero(error) < _FEW:
             return Diagnosis(
                 cause="rounding",
                 value=name,
@@ -316,7 +327,9 @@ def _of_colours(curve: _Map, colours: int, image: _Image) -> _Image:
     return np.concatenate([curve(image[:, :, :colours]), image[:, :, colours:]], axis=2)
 
 
-def _judged(candidate: _Candidate, a: _Image, b: _Image, step: float) -> Diagnosis | None:
+def _judged(
+    candidate: _Candidate, a: _Image, b: _Image, step: float, tiny: float
+) -> Diagnosis | None:
     """Return the diagnosis if the cause explains the difference."""
     if candidate.is_of_b:
         a, b = b, a
@@ -324,7 +337,7 @@ def _judged(candidate: _Candidate, a: _Image, b: _Image, step: float) -> Diagnos
     if step:
         mapped = np.clip(mapped, 0, 1)
     residual = b - mapped
-    allowed = step + _RELATIVE * np.maximum(np.abs(b), np.abs(mapped))
+    allowed = step + tiny + _RELATIVE * np.maximum(np.abs(b), np.abs(mapped))
     if step:
         # The level of `a` that was rounded becomes larger where the map is steep.
         lower, upper = np.maximum(a - step / 2, 0), a + step / 2
@@ -341,112 +354,25 @@ def _judged(candidate: _Candidate, a: _Image, b: _Image, step: float) -> Diagnos
 
 def _of_shift(a: _Image, b: _Image, step: float) -> Diagnosis:
     """Return the diagnosis of a shift by any number of pixels, or of no known cause."""
-    # Bright lights alone would decide otherwise.
-    small_a, small_b = (image / (1 + np.abs(image)) for image in (a, b))
-    place = _brightest_window(small_a + small_b)
-    height, width = a.shape[:2]
-    for start in {_whole_shift(small_a.mean(axis=2), small_b.mean(axis=2)), (0, 0)}:
-        if max(abs(start[0]) / width, abs(start[1]) / height) > 0.25:
-            continue
-        shift = _refined(small_a, small_b, place, start)
-        moved, inner = _moved(a, shift), _inner(a.shape, shift)
-        pairs = ((moved, b, a), (moved / (1 + np.abs(moved)), small_b, small_a))
-        if max(map(abs, shift)) >= _LEAST_SHIFT and all(
-            _is_explained(image[inner], other[inner], reference[inner], step)
-            for image, other, reference in pairs
-        ):
-            return Diagnosis(
-                cause="shift",
-                value=(round(shift[0], 3) + 0.0, round(shift[1], 3) + 0.0),
-                residual=_rms((b - moved)[inner]),
-                text=f"shift: the second image is {_direction(shift)} of the first",
-            )
-    return _none(a, b)
-
-
-def _is_explained(moved: _Image, found: _Image, reference: _Image, step: float) -> bool:
-    difference = _rms(found - reference)
-    remains = _rms(found - moved)
-    return difference > 2 * step and remains <= _REMAINS_OF_SHIFT * difference + step / 2
+    found = find_shift(a, b, step)
+    if found is None:
+        return _none(a, b)
+    shift, residual = found
+    return Diagnosis(
+        cause="shift",
+        value=(round(shift[0], 3) + 0.0, round(shift[1], 3) + 0.0),
+        residual=residual,
+        text=f"shift: the second image is {_direction(shift)} of the first",
+    )
 
 
 def _direction(shift: tuple[float, float]) -> str:
     parts = [
         f"{abs(round(value, 2)):g} px {words[value < 0]}"
         for value, words in zip(shift, (("right", "left"), ("below", "above")), strict=True)
-        if abs(value) >= _LEAST_SHIFT
+        if abs(value) >= LEAST_SHIFT
     ]
     return " and ".join(parts)
-
-
-def _whole_shift(a: _Image, b: _Image) -> tuple[int, int]:
-    """Return the shift (x, y) of `b` against `a` in whole pixels, by their cross-correlation."""
-    spectra = [np.fft.rfft2(image - image.mean()) for image in (a, b)]
-    correlation = np.fft.irfft2(np.conj(spectra[0]) * spectra[1], a.shape)
-    y, x = (int(index) for index in np.unravel_index(int(correlation.argmax()), a.shape))
-    height, width = a.shape
-    return x - width * (x > width // 2), y - height * (y > height // 2)
-
-
-def _brightest_window(image: _Image) -> tuple[slice, slice]:
-    """Return rows and columns around the brightest pixel, where a shift is best seen."""
-    y, x = np.unravel_index(int(image.sum(axis=2).argmax()), image.shape[:2])
-    found = []
-    for place, side in zip((int(y), int(x)), image.shape[:2], strict=True):
-        start = min(max(place - _WINDOW // 2, 0), max(side - _WINDOW, 0))
-        found.append(slice(start, start + _WINDOW))
-    return found[0], found[1]
-
-
-def _refined(
-    a: _Image, b: _Image, window: tuple[slice, slice], start: tuple[int, int]
-) -> tuple[float, float]:
-    """Return the shift to a part of a pixel: least squares of b(x) - a(x - shift) (Gauss-Newton).
-
-    Source: Lucas and Kanade, "An Iterative Image Registration Technique with an Application to
-    Stereo Vision", IJCAI 1981.
-    """
-    shift = np.array(start, np.float64)
-    margin = int(np.abs(shift).max()) + 2
-    rows, columns = window
-    reach = tuple(
-        slice(max(part.start - margin, 0), part.stop + margin) for part in (rows, columns)
-    )
-    part_a, part_b = a[reach], b[reach]
-    inner = _inner(part_a.shape, (margin - 2, margin - 2))
-    if min(part_a.shape[:2]) <= 2 * margin + 2:
-        return float(start[0]), float(start[1])
-    for _ in range(20):
-        moved = _moved(part_a, (float(shift[0]), float(shift[1])))
-        slopes = np.stack(
-            [np.asarray(np.gradient(moved, axis=axis))[inner].ravel() for axis in (1, 0)]
-        )
-        normal = slopes @ slopes.T
-        if np.linalg.det(normal) <= 1e-12 * np.trace(normal) ** 2:
-            break
-        # A shift to the right lowers the values where they rise to the right.
-        change = -np.linalg.solve(normal, slopes @ (part_b - moved)[inner].ravel())
-        shift += np.clip(change, -0.5, 0.5)
-        if np.abs(change).max() < 1e-4 or np.abs(shift - start).max() > 1.5:
-            break
-    return float(shift[0]), float(shift[1])
-
-
-def _moved(image: _Image, shift: tuple[float, float]) -> _Image:
-    """Return an image moved by (x, y) pixels with linear interpolation; edges wrap."""
-    for axis, value in ((1, shift[0]), (0, shift[1])):
-        whole = int(np.floor(value))
-        part = value - whole
-        image = (1 - part) * np.roll(image, whole, axis) + part * np.roll(image, whole + 1, axis)
-    return image
-
-
-def _inner(shape: tuple[int, ...], shift: tuple[float, float]) -> tuple[slice, slice]:
-    """Return the rows and columns that a shift does not bring in from outside the image."""
-    x, y = (
-        min(int(abs(value)) + 2, side // 3) for value, side in zip(shift, shape[1::-1], strict=True)
-    )
-    return slice(y, shape[0] - y), slice(x, shape[1] - x)
 
 
 def _multiplied(image: _Image) -> _Image:

@@ -157,7 +157,6 @@ def labelled(
 ) -> NDArray[np.uint8]:
     """Draw light grey texts at (x, baseline y); leave them out if there is no font.
 
-    - `sheet`: ndarray, shape (H, W, 3).
     - `size`: Font size in pixels.
     """
     try:
@@ -193,10 +192,8 @@ def picture(
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
 
-    - `array`: ndarray, shape (H, W) or (H, W, C).
     - `size`: Width and height of the picture: pixels are averaged or repeated.
     - `stops`: Exposure of float colours in stops; other values do not change.
-    - Returns: ndarray of uint8, shape (H, W, C).
     """
     values = np.atleast_3d(array).astype(np.float32)
     ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)

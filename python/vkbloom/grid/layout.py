@@ -24,7 +24,7 @@ from vkbloom.plans import Framebuffer
 from vkbloom.settings import Settings, check_settings
 from vkbloom.version import installed_version
 
-__all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out"]
+__all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out", "origin"]
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
@@ -222,10 +222,17 @@ def lay_out(
         reference_size=reference_size,
         structural=structural,
         ran=ran,
-        adapter=renderer.info.name,
-        driver=renderer.info.driver_info or renderer.info.driver,
-        version=installed_version(),
+        **origin(renderer),
     )
+
+
+def origin(renderer: FrameRenderer) -> dict[str, str]:
+    """Return what may change the bits of a result: the adapter, its driver, and the version."""
+    return {
+        "adapter": renderer.info.name,
+        "driver": renderer.info.driver_info or renderer.info.driver,
+        "version": installed_version(),
+    }
 
 
 def ranking(grid: Grid) -> tuple[int, ...]:

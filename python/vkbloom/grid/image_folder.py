@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from vkbloom.frames import Frames
 from vkbloom.grid.identity import differences, identity
+from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.memory import chunk_of
 from vkbloom.grid.order import Block, Index, blocks, points
-from vkbloom.grid.plan import Grid, Layout
+from vkbloom.grid.parts import WHOLE, Part
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
 from vkbloom.io import image_writing, safe_writing
@@ -109,6 +110,8 @@ class GridFiles:
         grid: Grid,
         layout: Layout,
         forms: Sequence[FileForm] = (),
+        *,
+        part: Part = WHOLE,
     ) -> None:
         image_writing.check_writable(f"image{suffix}")
         check_name(folder)
@@ -116,7 +119,8 @@ class GridFiles:
         light = replace(grid, source=ImageSource(()))
         self._files = _FileWriter(folder.absolute(), suffix, light, layout, tuple(forms))
         self._identity = {**identity(grid, layout, ()), "suffix": suffix}
-        self._chunk = chunk_of(grid, layout)
+        self._chunk = chunk_of(grid, layout, part[1])
+        self._part = part
         self.done = np.zeros(grid.shape, np.bool_)
 
     @property
@@ -126,7 +130,12 @@ class GridFiles:
 
     def _blocks(self) -> Iterable[Block]:
         files = self._files
-        return blocks(files.grid.shape, self._chunk, files.layout.ranking)
+        return blocks(files.grid.shape, self._chunk, files.layout.ranking, self._part)
+
+    @property
+    def total(self) -> int:
+        """Number of points of the part."""
+        return sum(block.count for block in self._blocks())
 
     def missing(self) -> Iterable[Block]:
         """Return the blocks that are not done, in the order in which they are rendered."""
@@ -137,13 +146,16 @@ class GridFiles:
         for block in written:
             self.done[block.slices] = True
 
+    def finish(self) -> None:
+        """Do nothing: each file is complete."""
+
     def prepare(self, *, resume: bool) -> None:
         """Create the folder, or examine an existing one."""
         files = self._files
         index = files.folder / _INDEX
         own = self._identity
-        if not files.folder.exists() or not any(files.folder.iterdir()):
-            files.folder.mkdir(parents=True, exist_ok=True)
+        files.folder.mkdir(parents=True, exist_ok=True)
+        if all(safe_writing.is_temporary(path) for path in files.folder.iterdir()):
             safe_writing.write_file(index, json.dumps(own, indent=1).encode())
             return
         try:
@@ -161,5 +173,6 @@ class GridFiles:
         found = differences(stored, own)
         if found:
             raise ValueError(f"{files.folder}: contains another grid; {'; '.join(found)}")
-        for place in np.ndindex(files.grid.shape):
-            self.done[place] = files.is_there(place)
+        for block in self._blocks():
+            for place in points(block, files.layout.ranking):
+                self.done[place] = files.is_there(place)

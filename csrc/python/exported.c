@@ -1,0 +1,436 @@
+// The Exported type: memory of a renderer's device that CUDA shares, as other libraries take it.
+// DLPack's structs: https://dmlc.github.io/dlpack/latest/c_api.html
+#include "python/module.h"
+
+enum { DEVICE_CUDA = 2 };  // kDLCUDA
+
+struct exported_object {
+    PyObject_HEAD
+    struct vkb_exports *exports;
+    struct vkb_export *run;
+    long process;  // the process that opened the renderer
+};
+
+struct tensor {
+    void *data;
+    struct {
+        int32_t type, id;
+    } device;
+    int32_t ndim;
+    struct {
+        uint8_t code, bits;
+        uint16_t lanes;
+    } dtype;
+    int64_t *shape, *strides;
+    uint64_t byte_offset;
+};
+
+struct managed {
+    struct tensor tensor;
+    void *context;
+    void (*deleter)(struct managed *self);
+};
+
+struct versioned {
+    struct {
+        uint32_t major, minor;
+    } version;
+    void *context;
+    void (*deleter)(struct versioned *self);
+    uint64_t flags;
+    struct tensor tensor;
+};
+
+#define NAME           "dltensor"
+#define VERSIONED_NAME "dltensor_versioned"
+
+enum { MOST_DIMENSIONS = 4 };
+
+// What an exported capsule owns.
+struct shared {
+    PyObject *owner;
+    int64_t shape[MOST_DIMENSIONS], strides[MOST_DIMENSIONS];
+    struct managed managed;
+    struct versioned versioned;
+};
+
+static struct exported_object *exported_of(PyObject *object)
+{
+    return (struct exported_object *)object;
+}
+
+static void dealloc(PyObject *object)
+{
+    struct exported_object *self = exported_of(object);
+
+    // A forked process returns nothing: the device belongs to its parent.
+    if (self->run && self->process == vkb_current_process())
+        vkb_exports_give_back(self->exports, self->run);
+    vkb_free_object(object);
+}
+
+bool vkb_is_exported(PyObject *object)
+{
+    return PyType_GetSlot(Py_TYPE(object), Py_tp_dealloc) == (void *)dealloc;
+}
+
+struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **exports)
+{
+    *exports = exported_of(object)->exports;
+    return exported_of(object)->run;
+}
+
+// Opens CUDA at the first call.
+static struct vkb_exports *open_exports(struct vkb_renderer *renderer, struct vkb_error *error)
+{
+    if (vkb_require_open(renderer, error) && !renderer->exports)
+        renderer->exports = vkb_exports_create(&renderer->device, error);
+    return renderer->open ? renderer->exports : NULL;
+}
+
+static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ssize_t size)
+{
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE((PyObject *)renderer));
+    struct vkb_error error = {0};
+
+    if (size < 1) {
+        PyErr_Format(PyExc_ValueError, "export: a size of %zd bytes is not above 0", size);
+        return NULL;
+    }
+    struct vkb_exports *exports = open_exports(renderer, &error);
+    if (!exports || error.kind != VKB_OK)
+        return (void *)vkb_raise(state, &error);
+    struct exported_object *self = vkb_new_object(state->exported_type);
+    if (!self)
+        return NULL;
+    self->process = renderer->process;
+    self->run = vkb_exports_take(exports, (uint64_t)size, &error);
+    if (!self->run) {
+        Py_DECREF(self);
+        return (void *)vkb_raise(state, &error);
+    }
+    self->exports = exports;
+    return self;
+}
+
+PyObject *vkb_renderer_export(PyObject *renderer, PyObject *argument)
+{
+    const Py_ssize_t size = PyLong_AsSsize_t(argument);
+
+    return PyErr_Occurred() ? NULL
+                            : (PyObject *)new_exported((struct vkb_renderer *)renderer, size);
+}
+
+PyObject *vkb_renderer_cuda(PyObject *object, PyObject *unused)
+{
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    struct vkb_error error = {0};
+    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+
+    (void)unused;
+    if (!exports || error.kind != VKB_OK)
+        return vkb_raise(state, &error);
+    return Py_BuildValue("(iN)", vkb_cuda_ordinal(exports->cuda),
+                         PyLong_FromVoidPtr(vkb_cuda_stream(exports->cuda)));
+}
+
+PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
+{
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    const long number = PyLong_AsLong(ordinal);
+    char name[VKB_CUDA_NAME_SIZE];
+    struct vkb_error error = {0};
+
+    if (PyErr_Occurred())
+        return NULL;
+    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    if (!exports || error.kind != VKB_OK)
+        return vkb_raise(state, &error);
+    vkb_cuda_name(exports->cuda, (int)number, name);
+    return PyUnicode_FromString(name);
+}
+
+PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
+{
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+    const char *what;
+    unsigned long long address, after;
+    Py_ssize_t size;
+    struct vkb_error error = {0};
+    bool done;
+
+    if (!PyArg_ParseTuple(arguments, "sKnK:snapshot", &what, &address, &size, &after))
+        return NULL;
+    struct exported_object *self = new_exported(renderer, size);
+    if (!self)
+        return NULL;
+    struct vkb_cuda *cuda = self->exports->cuda;
+    done = vkb_cuda_check(cuda, what, address, &error);
+    if (done) {
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_copy(cuda, self->run->memory.address, address, (size_t)size,
+                             (void *)(uintptr_t)after, &error);
+        Py_END_ALLOW_THREADS
+    }
+    if (done)
+        return (PyObject *)self;
+    Py_DECREF(self);
+    return vkb_raise(state, &error);
+}
+
+static PyObject *numbers(const int64_t *values, int32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (int32_t i = 0; tuple && i < count; ++i) {
+        PyObject *number = PyLong_FromLongLong(values[i]);
+        if (!number || PyTuple_SetItem(tuple, i, number) < 0)
+            Py_CLEAR(tuple);
+    }
+    return tuple;
+}
+
+PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule)
+{
+    const struct tensor *tensor;
+
+    (void)module;
+    if (PyCapsule_IsValid(capsule, VERSIONED_NAME)) {
+        struct versioned *versioned = PyCapsule_GetPointer(capsule, VERSIONED_NAME);
+        if (versioned->version.major != 1) {
+            PyErr_Format(PyExc_BufferError, "DLPack: version %u is not 1",
+                         versioned->version.major);
+            return NULL;
+        }
+        tensor = &versioned->tensor;
+    } else {
+        struct managed *managed = PyCapsule_GetPointer(capsule, NAME);
+        if (!managed)
+            return NULL;
+        tensor = &managed->tensor;
+    }
+    return Py_BuildValue(
+        "(K(ii)(iii)NN)", (unsigned long long)(uintptr_t)tensor->data + tensor->byte_offset,
+        (int)tensor->device.type, (int)tensor->device.id, (int)tensor->dtype.code,
+        (int)tensor->dtype.bits, (int)tensor->dtype.lanes, numbers(tensor->shape, tensor->ndim),
+        tensor->strides ? numbers(tensor->strides, tensor->ndim) : Py_NewRef(Py_None));
+}
+
+// Consumers call these in any thread, with or without the GIL, and maybe after Python has ended.
+static void release_shared(struct shared *shared)
+{
+    if (!Py_IsInitialized())
+        return;
+    const PyGILState_STATE state = PyGILState_Ensure();
+    Py_DECREF(shared->owner);
+    vkb_free(shared);
+    PyGILState_Release(state);
+}
+
+static void delete_managed(struct managed *self)
+{
+    release_shared(self->context);
+}
+
+static void delete_versioned(struct versioned *self)
+{
+    release_shared(self->context);
+}
+
+// A capsule that was consumed has another name.
+static void destroy_capsule(PyObject *capsule)
+{
+    if (PyCapsule_IsValid(capsule, NAME)) {
+        struct managed *managed = PyCapsule_GetPointer(capsule, NAME);
+        managed->deleter(managed);
+    } else if (PyCapsule_IsValid(capsule, VERSIONED_NAME)) {
+        struct versioned *versioned = PyCapsule_GetPointer(capsule, VERSIONED_NAME);
+        versioned->deleter(versioned);
+    }
+}
+
+static bool read_shape(PyObject *shape, struct shared *shared)
+{
+    const Py_ssize_t count = PyTuple_Size(shape);
+    int64_t stride = 1;
+
+    if (count < 0 || count > MOST_DIMENSIONS) {
+        if (!PyErr_Occurred())
+            PyErr_SetString(PyExc_ValueError, "shape: too many dimensions");
+        return false;
+    }
+    for (Py_ssize_t i = count - 1; i >= 0; --i) {
+        shared->shape[i] = PyLong_AsLongLong(PyTuple_GetItem(shape, i));
+        shared->strides[i] = stride;
+        stride *= shared->shape[i];
+    }
+    return !PyErr_Occurred();
+}
+
+static PyObject *make_capsule(PyObject *object, PyObject *arguments)
+{
+    struct exported_object *self = exported_of(object);
+    PyObject *shape;
+    int code, bits, versioned;
+    struct vkb_error error = {0};
+
+    if (!PyArg_ParseTuple(arguments, "O!iip:capsule", &PyTuple_Type, &shape, &code, &bits,
+                          &versioned))
+        return NULL;
+    struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
+    if (!shared)
+        return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    if (!read_shape(shape, shared)) {
+        vkb_free(shared);
+        return NULL;
+    }
+    shared->owner = Py_NewRef(object);
+    const struct tensor tensor = {
+        .data = (void *)(uintptr_t)self->run->memory.address,
+        .device = {DEVICE_CUDA, vkb_cuda_ordinal(self->exports->cuda)},
+        .ndim = (int32_t)PyTuple_Size(shape),
+        .dtype = {(uint8_t)code, (uint8_t)bits, 1},
+        .shape = shared->shape,
+        .strides = shared->strides,
+    };
+    shared->managed = (struct managed){tensor, shared, delete_managed};
+    shared->versioned = (struct versioned){{1, 0}, shared, delete_versioned, 0, tensor};
+    PyObject *capsule = versioned
+                          ? PyCapsule_New(&shared->versioned, VERSIONED_NAME, destroy_capsule)
+                          : PyCapsule_New(&shared->managed, NAME, destroy_capsule);
+    if (!capsule)
+        release_shared(shared);
+    return capsule;
+}
+
+// Whether the memory holds so many bytes from `offset` on.
+static bool reaches(const struct exported_object *self, Py_ssize_t offset, Py_ssize_t size)
+{
+    if (offset >= 0 && size >= 0 && (uint64_t)offset + (uint64_t)size <= self->run->size)
+        return true;
+    PyErr_SetString(PyExc_ValueError, "size: the bytes are outside of the memory");
+    return false;
+}
+
+static PyObject *read_bytes(PyObject *object, PyObject *arguments)
+{
+    struct exported_object *self = exported_of(object);
+    PyObject *array;
+    Py_ssize_t offset;
+    Py_buffer view;
+    struct vkb_error error = {0};
+    bool done = false;
+
+    if (!PyArg_ParseTuple(arguments, "On:read", &array, &offset)
+        || PyObject_GetBuffer(array, &view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
+        return NULL;
+    if (reaches(self, offset, view.len)) {
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_read(self->exports->cuda, view.buf,
+                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)view.len,
+                             &error);
+        Py_END_ALLOW_THREADS
+        if (!done)
+            vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    }
+    PyBuffer_Release(&view);
+    return done ? Py_NewRef(Py_None) : NULL;
+}
+
+static PyObject *copy_to(PyObject *object, PyObject *arguments)
+{
+    struct exported_object *self = exported_of(object);
+    unsigned long long address, after;
+    Py_ssize_t size;
+    struct vkb_error error = {0};
+    bool done;
+
+    if (!PyArg_ParseTuple(arguments, "KnK:copy_to", &address, &size, &after)
+        || !reaches(self, 0, size))
+        return NULL;
+    done = vkb_cuda_check(self->exports->cuda, "out", address, &error);
+    if (done) {
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_copy(self->exports->cuda, address, self->run->memory.address, (size_t)size,
+                             (void *)(uintptr_t)after, &error);
+        Py_END_ALLOW_THREADS
+    }
+    return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+}
+
+static PyObject *clone(PyObject *object, PyObject *argument)
+{
+    struct exported_object *self = exported_of(object);
+    const Py_ssize_t size = PyLong_AsSsize_t(argument);
+    struct vkb_error error = {0};
+    bool done;
+
+    if (PyErr_Occurred() || !reaches(self, 0, size))
+        return NULL;
+    if (!self->exports->device) {
+        PyErr_SetString(PyExc_BufferError, "copy: the renderer is closed; copy the result");
+        return NULL;
+    }
+    struct exported_object *other = vkb_new_object((PyObject *)Py_TYPE(object));
+    if (!other)
+        return NULL;
+    other->process = self->process;
+    other->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
+    done = other->run != NULL;
+    if (done) {
+        other->exports = self->exports;
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_copy(self->exports->cuda, other->run->memory.address,
+                             self->run->memory.address, (size_t)size, NULL, &error);
+        Py_END_ALLOW_THREADS
+    }
+    if (done)
+        return (PyObject *)other;
+    Py_DECREF(other);
+    return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+}
+
+static PyObject *get_address(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyLong_FromUnsignedLongLong(exported_of(object)->run->memory.address);
+}
+
+static PyObject *get_ordinal(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyLong_FromLong(vkb_cuda_ordinal(exported_of(object)->exports->cuda));
+}
+
+static PyMethodDef methods[] = {
+    {"capsule", make_capsule, METH_VARARGS,
+     "capsule(shape, code, bits, versioned) -> a capsule of DLPack."},
+    {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
+    {"clone", clone, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
+    {"copy_to", copy_to, METH_VARARGS,
+     "copy_to(address, size, stream). To other memory of the GPU, after the stream's work."},
+    {0},
+};
+
+static PyGetSetDef attributes[] = {
+    {"address", get_address, NULL, "The address for CUDA.", NULL},
+    {"ordinal", get_ordinal, NULL, "CUDA's number of the GPU.", NULL},
+    {0},
+};
+
+static PyType_Slot slots[] = {
+    {Py_tp_dealloc, dealloc},
+    {Py_tp_methods, methods},
+    {Py_tp_getset, attributes},
+    {Py_tp_doc, "Memory of a renderer's device that CUDA shares."},
+    {0},
+};
+
+// No garbage collection: it holds no references to objects.
+PyType_Spec vkb_exported_spec = {
+    .name = "vkbloom._core.Exported",
+    .basicsize = sizeof(struct exported_object),
+    .flags = VKB_TYPE_FLAGS,
+    .slots = slots,
+};

@@ -1,0 +1,59 @@
+// The part of CUDA's driver API that arrays on the device need. libcuda is opened at run time.
+// Calls must not overlap, except those that say so; the core makes them with the GIL.
+#ifndef VKB_CUDA_H
+#define VKB_CUDA_H
+
+#include "vulkan/error.h"
+
+#include <stdint.h>
+
+typedef unsigned long long vkb_cuda_address;
+
+// The primary context of a GPU, with a stream.
+struct vkb_cuda;
+
+// Memory that CUDA has imported.
+struct vkb_cuda_memory {
+    void *handle;
+    vkb_cuda_address address;
+    void *event;  // recorded by vkb_cuda_mark
+};
+
+// Opens the context of the GPU with that UUID; `name` is the adapter's. A value error names the
+// GPUs that CUDA has if that one is not among them.
+struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error);
+// Each user holds it; the last one that releases it closes the context.
+void vkb_cuda_hold(struct vkb_cuda *cuda);
+void vkb_cuda_release(struct vkb_cuda *cuda);
+
+int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
+// As other libraries get it.
+void *vkb_cuda_stream(const struct vkb_cuda *cuda);
+
+enum { VKB_CUDA_NAME_SIZE = 320 };
+// "name (uuid:...)" of a device by its ordinal.
+void vkb_cuda_name(const struct vkb_cuda *cuda, int ordinal, char name[VKB_CUDA_NAME_SIZE]);
+
+// Imports exported memory. The descriptor belongs to CUDA or is closed.
+bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
+                     struct vkb_cuda_memory *memory, struct vkb_error *error);
+void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
+
+// Fails with a value error unless this is memory of the GPU that is not managed. `what` is the
+// argument's name.
+bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
+                    struct vkb_error *error);
+
+// Copies on the stream, after the work that `after` (a stream; NULL: none) has got so far, and
+// waits. May overlap with other calls.
+bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
+                   void *after, struct vkb_error *error);
+bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
+                   struct vkb_error *error);
+
+// Remembers the work that the context has got so far, which may use the memory; and whether it is
+// over.
+void vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
+bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
+
+#endif

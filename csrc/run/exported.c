@@ -1,0 +1,210 @@
+#include "run/exported.h"
+
+#include <limits.h>
+
+static size_t element_size(enum vkb_format format)
+{
+    return vkb_formats[format].channel_size;
+}
+
+static bool is_float(enum vkb_format format)
+{
+    return format != VKB_FORMAT_RGBA8_UNORM;
+}
+
+// Whether the rows can be copied to an image as they are.
+static bool is_direct(const struct vkb_input *input)
+{
+    const ptrdiff_t pixel = (ptrdiff_t)vkb_pixel_size(input->format);
+
+    return input->channels == vkb_formats[input->format].channels && vkb_input_is_contiguous(input)
+        && input->row_stride >= pixel * (ptrdiff_t)input->width && input->row_stride % pixel == 0
+        && input->offset % (size_t)pixel == 0 && input->offset % 4 == 0;
+}
+
+// The bytes of the memory between which the elements lie.
+struct span {
+    VkDeviceSize start, end;
+};
+
+static struct span span_of(const struct vkb_device *device, const struct vkb_input *input)
+{
+    const ptrdiff_t reaches[3] = {
+        input->row_stride * (ptrdiff_t)(input->height - 1),
+        input->pixel_stride * (ptrdiff_t)(input->width - 1),
+        input->channel_stride * (ptrdiff_t)(input->channels - 1),
+    };
+    const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
+    ptrdiff_t first = (ptrdiff_t)input->offset,
+              last = first + (ptrdiff_t)element_size(input->format);
+
+    for (int i = 0; i < 3; ++i) {
+        first += reaches[i] < 0 ? reaches[i] : 0;
+        last += reaches[i] > 0 ? reaches[i] : 0;
+    }
+    return (struct span){(VkDeviceSize)first / align * align, ((VkDeviceSize)last + 3) / 4 * 4};
+}
+
+bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input *input,
+                        struct vkb_error *error)
+{
+    const struct span span = span_of(device, input);
+    const VkDeviceSize size = span.end - span.start;
+
+    return (size <= device->limits.maxStorageBufferRange && size <= INT_MAX)
+        || vkb_fail(error, VKB_ERROR_VALUE,
+                    "image: its pixels lie in %.4g MiB of memory, more than the device reads at "
+                    "once; make it contiguous",
+                    (double)size / (1 << 20));
+}
+
+VkDeviceSize vkb_exported_input_scratch(const struct vkb_input *input)
+{
+    return is_direct(input)
+             ? 0
+             : (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
+}
+
+VkDeviceSize vkb_exported_output_scratch(const struct vkb_output *output)
+{
+    return vkb_readback_is_complete(output)
+             ? 0
+             : (VkDeviceSize)output->width * output->row_count * vkb_pixel_size(output->format);
+}
+
+// Dispatches do not write to the scratch memory, nor do copies, before `last` has read it.
+static void free_scratch(const struct vkb_run *run, enum vkb_access last)
+{
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+
+    vkb_barrier_record(run->device, commands, NULL, true, last, VKB_ACCESS_COPY_TARGET);
+    vkb_barrier_record(run->device, commands, NULL, true, last, VKB_ACCESS_DISPATCH_STORED);
+}
+
+static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
+                   struct vkb_error *error)
+{
+    const struct vkb_readback *readback = &run->submission->readback;
+    struct vkb_gather_work work = *given;
+
+    work.counts = (VkDescriptorBufferInfo){
+        readback->counts.handle,
+        (VkDeviceSize)run->counts_slot * VKB_COUNTS_SIZE,
+        VKB_COUNTS_SIZE,
+    };
+    if (!work.to.buffer)
+        work.to = work.counts;
+    // All add to the same counts.
+    vkb_barrier_record(run->device, run->submission->commands.buffer, NULL, true,
+                       VKB_ACCESS_DISPATCH_CHANGED, VKB_ACCESS_DISPATCH_CHANGED);
+    return vkb_gather_create(run->device, run->frame->pipelines.cache, &run->frame->gather, error)
+        && vkb_gather_record(run->device, &run->frame->gather, run->submission->commands.buffer,
+                             run->submission->descriptors, &work, error);
+}
+
+static bool gather_input(struct vkb_run *run, const struct vkb_input *input, bool stores,
+                         struct vkb_error *error)
+{
+    static const uint32_t ones[] = {[1] = 255, [2] = 0x3c00, [4] = 0x3f800000};
+    const struct span span = span_of(run->device, input);
+    const uint32_t size = (uint32_t)element_size(input->format);
+    const struct vkb_gather_work work = {
+        .layout =
+            {
+                .offset = (int32_t)(input->offset - span.start),
+                .row_stride = (int32_t)input->row_stride,
+                .pixel_stride = (int32_t)input->pixel_stride,
+                .channel_stride = (int32_t)input->channel_stride,
+                .width = input->width,
+                .height = input->height,
+                .channels = vkb_formats[input->format].channels,
+                .from_channels = input->channels,
+                .size = size,
+                .one = ones[size],
+                .stores = stores,
+                .is_float = is_float(input->format),
+            },
+        .from = {input->exported->buffer.handle, span.start, span.end - span.start},
+        .to = {stores ? run->submission->readback.scratch.handle : VK_NULL_HANDLE, 0,
+               VK_WHOLE_SIZE},
+    };
+
+    return gather(run, &work, error);
+}
+
+static void copy_to_image(struct vkb_run *run, const struct vkb_input *input,
+                          struct vkb_image *image, bool direct)
+{
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const uint32_t pixel = (uint32_t)vkb_pixel_size(input->format);
+
+    vkb_image_transition(run->device, commands, image, VKB_ACCESS_COPY_TARGET);
+    run->device->vk.vkCmdCopyBufferToImage(
+        commands,
+        direct ? input->exported->buffer.handle : run->submission->readback.scratch.handle,
+        image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1,
+        &(VkBufferImageCopy){
+            .bufferOffset = direct ? input->offset : 0,
+            .bufferRowLength = direct ? (uint32_t)input->row_stride / pixel : 0,
+            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+            .imageExtent = {image->width, image->height, 1},
+        });
+}
+
+bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
+                               struct vkb_error *error)
+{
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const struct vkb_input *input = staged->input;
+    const bool direct = is_direct(input), stores = staged->send && !direct;
+
+    vkb_barrier_record_acquire(run->device, commands, input->exported->buffer.handle);
+    if ((stores || is_float(input->format)) && !gather_input(run, input, stores, error))
+        return false;
+    if (!staged->send)
+        return true;
+    if (stores)
+        vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_DISPATCH_STORED,
+                           VKB_ACCESS_COPY_SOURCE);
+    copy_to_image(run, input, &staged->image->image, direct);
+    if (stores)
+        free_scratch(run, VKB_ACCESS_COPY_SOURCE);
+    staged->image->content.valid = true;
+    return true;
+}
+
+bool vkb_exported_record_output(struct vkb_run *run, const struct vkb_output *output,
+                                struct vkb_error *error)
+{
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const bool complete = vkb_readback_is_complete(output);
+    const uint32_t size = (uint32_t)element_size(output->format);
+    const uint32_t pixel = (uint32_t)vkb_pixel_size(output->format);
+    const struct vkb_gather_work work = {
+        .layout =
+            {
+                .row_stride = (int32_t)(output->width * pixel),
+                .pixel_stride = (int32_t)pixel,
+                .channel_stride = (int32_t)size,
+                .width = output->width,
+                .height = output->row_count,
+                .channels = output->channels,
+                .from_channels = output->channels,
+                .size = size,
+                .stores = true,
+            },
+        .from = {run->submission->readback.scratch.handle, 0, VK_WHOLE_SIZE},
+        .to = {output->exported->buffer.handle, 0, VK_WHOLE_SIZE},
+    };
+
+    if (!complete) {
+        vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_COPY_TARGET,
+                           VKB_ACCESS_DISPATCH_LOADED);
+        if (!gather(run, &work, error))
+            return false;
+        free_scratch(run, VKB_ACCESS_DISPATCH_LOADED);
+    }
+    vkb_barrier_record_release(run->device, commands, output->exported->buffer.handle,
+                               complete ? VKB_ACCESS_COPY_TARGET : VKB_ACCESS_DISPATCH_STORED);
+    return true;
+}

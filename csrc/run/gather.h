@@ -1,0 +1,38 @@
+// A dispatch outside of the graph: moves elements from any strides to a dense buffer, and counts
+// NaN and infinity among them.
+#ifndef VKB_GATHER_H
+#define VKB_GATHER_H
+
+#include "vulkan/memory.h"
+
+// Created at the first use; destroying a zeroed or half-created one is safe.
+struct vkb_gather {
+    VkDescriptorSetLayout sets;
+    VkPipelineLayout layout;
+    VkPipeline pipeline;
+};
+
+bool vkb_gather_create(const struct vkb_device *device, VkPipelineCache cache,
+                       struct vkb_gather *gather, struct vkb_error *error);
+void vkb_gather_destroy(const struct vkb_device *device, struct vkb_gather *gather);
+
+// The push constants of gather.comp: strides in bytes, `one` for channels that are not there.
+struct vkb_gather_layout {
+    int32_t offset, row_stride, pixel_stride, channel_stride;
+    uint32_t width, height, channels, from_channels;
+    uint32_t size, one, stores, is_float;
+};
+
+struct vkb_gather_work {
+    struct vkb_gather_layout layout;
+    VkDescriptorBufferInfo from, to, counts;
+};
+
+// Bytes from the counts of one request to those of the next.
+enum { VKB_COUNTS_SIZE = 256 };
+
+bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather *gather,
+                       VkCommandBuffer commands, VkDescriptorPool pool,
+                       const struct vkb_gather_work *work, struct vkb_error *error);
+
+#endif

@@ -1,0 +1,373 @@
+"""Arrays on the device: images of other libraries on a GPU, and framebuffers that stay there."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
+
+import numpy as np
+
+from vkbloom import _core
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Device", "DeviceArray", "Taken", "fill", "likeness", "on_cuda", "on_host", "take"]
+
+#: Where framebuffers are wanted.
+Device = Literal["host", "device"]
+
+# DLPack's types of devices and elements.
+_CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
+_UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
+_DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
+_CODES = {"uint8": _UINT, "float16": _FLOAT, "float32": _FLOAT}
+_FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
+# CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
+_LEGACY = 1
+
+
+class DeviceArray:
+    """A framebuffer that stays on the renderer's device.
+
+    Other libraries take it without a copy: ``torch.from_dlpack(array)``,
+    ``cupy.from_dlpack(array)`` and ``jax.dlpack.from_dlpack(array)``. It stays valid after the
+    renderer is closed. Its memory is used again when this object and all arrays that were made of
+    it are gone, and when the GPU has done all work that it had been given until then.
+
+    On a CPU adapter the device's memory is the host's: NumPy and the libraries above view it there.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (H, W, C), or (H, W) for depth.
+    dtype : numpy.dtype
+
+    See Also
+    --------
+    Renderer.apply : Its argument `device`.
+
+    Examples
+    --------
+    >>> image = np.full((16, 24, 3), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     final = renderer.apply(image, device="device")["final"]
+    >>> final.shape, final.dtype
+    ((16, 24, 3), dtype('float32'))
+    >>> np.from_dlpack(final).shape
+    (16, 24, 3)
+    """
+
+    def __init__(
+        self, memory: _core.Exported | NDArray[Any], shape: tuple[int, ...], dtype: str
+    ) -> None:
+        self._memory = memory
+        self.shape = tuple(shape)
+        self.dtype = np.dtype(dtype)
+
+    @property
+    def ndim(self) -> int:
+        """The number of dimensions."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """The number of elements."""
+        return math.prod(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of all elements."""
+        return self.size * self.dtype.itemsize
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __repr__(self) -> str:
+        place = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
+        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {place}>"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
+
+    def numpy(self) -> NDArray[Any]:
+        """Return a copy in the host's memory.
+
+        Returns
+        -------
+        ndarray
+
+        Raises
+        ------
+        Error
+            CUDA failed.
+
+        See Also
+        --------
+        numpy.from_dlpack : A view, on a CPU adapter.
+
+        Examples
+        --------
+        >>> image = np.full((16, 24, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     final = renderer.apply(image, device="device")["final"]
+        >>> final.numpy().shape
+        (16, 24, 3)
+        """
+        if isinstance(self._memory, np.ndarray):
+            return self._memory.copy()
+        array = np.empty(self.shape, self.dtype)
+        self._memory.read(array, 0)
+        return array
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return a copy in the host's memory; ``copy=False`` is a ValueError."""
+        if copy is False:
+            raise ValueError("DeviceArray: NumPy cannot view it; use copy=None")
+        array = self.numpy()
+        return array if dtype is None else array.astype(dtype, copy=False)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """Return DLPack's type and number of the device."""
+        if isinstance(self._memory, np.ndarray):
+            return _CPU, 0
+        return _CUDA, self._memory.ordinal
+
+    def __dlpack__(
+        self,
+        *,
+        stream: int | None = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any:
+        """Return a capsule of DLPack.
+
+        `stream`: The consumer's. The framebuffer is complete, so that no stream has to wait.
+        `max_version`: At least (1, 0) gives a capsule of DLPack 1, otherwise one of 0.
+        `dl_device`: This device, or (1, 0) for a copy on the host.
+        `copy`: True gives a copy.
+        """
+        here = self.__dlpack_device__()
+        wanted = here if dl_device is None else (int(dl_device[0]), int(dl_device[1]))
+        if wanted not in (here, (_CPU, 0)):
+            raise BufferError(f"dl_device: {wanted} is neither the array's, {here}, nor the host")
+        if here[0] == _CPU or wanted[0] == _CPU:
+            if here[0] != _CPU and copy is False:
+                raise BufferError("copy: False is not possible from the device to the host")
+            # NumPy's own argument `copy` came later than its capsules.
+            array = self.numpy() if copy or here[0] != _CPU else np.asarray(self._memory)
+            options: dict[str, Any] = {} if max_version is None else {"max_version": max_version}
+            return array.__dlpack__(**options)
+        if stream is not None and not isinstance(stream, int):
+            raise TypeError(f"stream: {stream!r} is not a number")
+        if stream == 0:
+            raise ValueError("stream: 0 is ambiguous; 1 is CUDA's default stream, 2 a thread's")
+        memory = self._memory
+        assert not isinstance(memory, np.ndarray)
+        if copy:
+            memory = memory.clone(self.nbytes)
+        versioned_capsule = max_version is not None and max_version[0] >= 1
+        return memory.capsule(
+            self.shape, _CODES[self.dtype.name], 8 * self.dtype.itemsize, versioned_capsule
+        )
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        """The array for Numba and others, version 3."""
+        if isinstance(self._memory, np.ndarray):
+            raise AttributeError("__cuda_array_interface__: the array is on the host")
+        return {
+            "shape": self.shape,
+            "typestr": self.dtype.str,
+            "data": (self._memory.address, False),
+            "strides": None,
+            # Complete: no stream has to wait.
+            "stream": None,
+            "version": 3,
+        }
+
+
+def on_host(array: Any) -> NDArray[Any]:
+    """Return a framebuffer as an array of NumPy, copied if it is on the device."""
+    return array.numpy() if isinstance(array, DeviceArray) else array
+
+
+def on_cuda(image: object) -> bool:
+    """Return whether an object is an array in the memory of a GPU with CUDA."""
+    if isinstance(image, np.ndarray | DeviceArray):
+        return isinstance(image, DeviceArray) and image.__dlpack_device__()[0] == _CUDA
+    device = getattr(image, "__dlpack_device__", None)
+    if device is None:
+        return hasattr(image, "__cuda_array_interface__")
+    try:
+        kind = int(device()[0])
+    except Exception:  # whatever a foreign object raises; a later use of it tells more
+        return False
+    return kind in (_CUDA, _CUDA_MANAGED)
+
+
+def likeness(image: Any) -> NDArray[Any]:
+    """Return an array of the host with an array's shape and dtype, of undefined content."""
+    dtype = str(image.dtype).rsplit(".", 1)[-1]
+    if dtype not in _FORMATS:
+        raise TypeError(f"image: dtype {dtype} is not one of uint8, float16, float32 on the device")
+    return np.empty(tuple(image.shape), dtype)
+
+
+class _Array(NamedTuple):
+    """An array of CUDA, strides in bytes; `stream`: what the copy waits for, 0: nothing."""
+
+    owner: object
+    address: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+    stream: int
+
+
+class Taken(NamedTuple):
+    """A copy of what an array spans, in memory that Vulkan shares."""
+
+    memory: _core.Exported
+    offset: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+
+    def image(self, index: int | None = None) -> Any:
+        """Return it, or one image of a batch, as the core reads it."""
+        offset, shape, strides = self.offset, self.shape, self.strides
+        if index is not None:
+            offset, shape, strides = offset + index * strides[0], shape[1:], strides[1:]
+        return self.memory, offset, shape, strides, _FORMATS[self.dtype]
+
+    def numpy(self) -> NDArray[Any]:
+        """Return the array in the host's memory."""
+        low, high = _span(self.shape, self.strides, self.dtype)
+        span = np.empty(high - low, np.uint8)
+        self.memory.read(span, 0)
+        return np.ndarray(
+            self.shape, self.dtype, buffer=span.data, offset=self.offset, strides=self.strides
+        ).copy()
+
+
+def _span(shape: tuple[int, ...], strides: tuple[int, ...], dtype: str) -> tuple[int, int]:
+    """Return the bytes that an array touches, from its first element on."""
+    reaches = [(side - 1) * stride for side, stride in zip(shape, strides, strict=True)]
+    low = sum(min(reach, 0) for reach in reaches)
+    return low, sum(max(reach, 0) for reach in reaches) + np.dtype(dtype).itemsize
+
+
+def _check_dtype(name: str, code: int, bits: int, lanes: int) -> str:
+    if lanes == 1 and (dtype := _DTYPES.get((code, bits))):
+        return dtype
+    if (name, code, bits, lanes) == ("mask", _BOOL, 8, 1):
+        return "bool"
+    kind = {_BFLOAT: "bfloat", _COMPLEX: "complex", _UINT: "uint", _FLOAT: "float"}.get(code, "int")
+    cure = f"convert it: {name}.to(torch.float32) in PyTorch, {name}.astype('float32') elsewhere"
+    if code == _COMPLEX:
+        cure = f"take its real part or its absolute value: abs({name})"
+    raise TypeError(
+        f"{name}: dtype {kind}{bits} is not one of uint8, float16, float32 on the device; {cure}"
+    )
+
+
+def _contiguous(shape: tuple[int, ...]) -> tuple[int, ...]:
+    strides = [1]
+    for side in reversed(shape[1:]):
+        strides.insert(0, strides[0] * side)
+    return tuple(strides[: len(shape)])
+
+
+def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
+    kind, ordinal = (int(number) for number in image.__dlpack_device__())
+    if kind == _CUDA_MANAGED:
+        raise ValueError(
+            f"{name}: it is in managed (unified) memory; copy it to the device's own memory"
+        )
+    ours, stream = core.cuda()
+    if ordinal != ours:
+        raise ValueError(
+            f"{name}: it is on {core.cuda_name(ordinal)}, and the renderer is on "
+            f"{core.cuda_name(ours)}; open a renderer with the array's GPU as adapter, or move the "
+            "array"
+        )
+    try:
+        capsule = image.__dlpack__(stream=stream, max_version=(1, 0))
+    except TypeError:
+        # Of a producer that knows no versions.
+        capsule = image.__dlpack__(stream=stream)
+    address, (kind, _), (code, bits, lanes), shape, strides = _core.read_dlpack(capsule)
+    if kind != _CUDA:
+        raise ValueError(f"{name}: its DLPack capsule is of device type {kind}, not 2 (CUDA)")
+    dtype = _check_dtype(name, code, bits, lanes)
+    size = np.dtype(dtype).itemsize
+    elements = _contiguous(shape) if strides is None else strides
+    # The producer has ordered our stream after its own work.
+    return _Array(capsule, address, shape, tuple(size * one for one in elements), dtype, 0)
+
+
+def _from_interface(image: Any, name: str) -> _Array:
+    about = image.__cuda_array_interface__
+    shape, typestr = tuple(about["shape"]), about["typestr"]
+    if about.get("mask") is not None:
+        raise ValueError(f"{name}: a mask of __cuda_array_interface__ is not taken")
+    try:
+        dtype = np.dtype(typestr).name if typestr[0] in "<|=" else typestr
+    except TypeError:
+        dtype = typestr
+    if dtype not in _FORMATS:
+        raise TypeError(
+            f"{name}: dtype {dtype} is not one of uint8, float16, float32 on the device; convert "
+            f"it: {name}.astype('float32')"
+        )
+    size = np.dtype(dtype).itemsize
+    strides = about.get("strides") or tuple(size * one for one in _contiguous(shape))
+    stream = about.get("stream")
+    # Before version 3 nothing tells of a stream, so the default stream is waited for.
+    after = _LEGACY if stream is None and about.get("version", 0) < 3 else stream or 0
+    return _Array(image, about["data"][0], shape, tuple(strides), dtype, after)
+
+
+def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> None:
+    """Copy a framebuffer to the caller's array on the device, after what its producer works on."""
+    array = _from_dlpack(target, name, core) if hasattr(target, "__dlpack__") else None
+    array = array or _from_interface(target, name)
+    if (array.shape, array.dtype) != (made.shape, made.dtype.name):
+        raise ValueError(
+            f"{name} has shape {array.shape} and dtype {array.dtype}, it must have {made.shape} "
+            f"and {made.dtype}"
+        )
+    size = made.dtype.itemsize
+    if array.strides != tuple(size * one for one in _contiguous(made.shape)):
+        raise ValueError(f"{name} must be C-contiguous")
+    if isinstance(made._memory, np.ndarray):
+        raise TypeError(f"{name}: the framebuffer is on the host")
+    made._memory.copy_to(array.address, made.nbytes, array.stream)
+
+
+def take(image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (3,)) -> Taken:
+    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
+
+    `sides`: The numbers of dimensions that it may have.
+    """
+    if isinstance(image, DeviceArray) or hasattr(image, "__dlpack__"):
+        array = _from_dlpack(image, name, core)
+    else:
+        core.cuda()
+        array = _from_interface(image, name)
+    shape = array.shape
+    if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in (3, 4)):
+        raise ValueError(
+            f"{name}: shape {shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            + (f"; for a batch, call apply_each({name})" if len(shape) == 4 else "")
+            + (
+                f"; move the channels last: {name}.permute(1, 2, 0)"
+                if len(shape) == 3 and shape[0] in (3, 4)
+                else ""
+            )
+        )
+    low, high = _span(shape, array.strides, array.dtype)
+    memory = core.snapshot(name, array.address + low, high - low, array.stream)
+    return Taken(memory, -low, shape, array.strides, array.dtype)

@@ -1,0 +1,56 @@
+"""The framebuffers of an image, and the function that takes cotangents back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.checks import check_emission, check_image, check_mask
+from vkbloom.frames import Frames
+from vkbloom.image import Image
+from vkbloom.reference import vjp as reference_vjp
+from vkbloom.reference.derivatives import Gradients, check_cotangent
+from vkbloom.settings import Settings
+
+__all__ = ["Pullback", "vjp"]
+
+#: From cotangents by framebuffer to derivatives by name.
+Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
+
+
+def vjp(
+    apply: Callable[..., Frames],
+    image: object,
+    settings: Settings,
+    mask: object | None,
+    emission: object | None,
+) -> tuple[Frames, Pullback]:
+    """Return the framebuffers of `Renderer.apply` in buffers of floats, and their pullback.
+
+    The arrays are copied, since they may change before the pullback is called.
+    """
+    if isinstance(image, Image):
+        raise ValueError("image: derivatives need the pixels; give the array, not the uploaded one")
+    if hasattr(settings, "twin"):
+        raise ValueError(
+            f"method: {settings.method!r} has no derivative, since its passes come from a file"
+        )
+    pixels = np.array(check_image(image))
+    given: dict[str, NDArray[Any]] = {}
+    if mask is not None:
+        given["mask"] = np.array(check_mask(mask, (pixels.shape[0], pixels.shape[1])))
+    if emission is not None:
+        given["emission"] = np.array(check_emission(emission, pixels))
+    frames = apply(pixels, settings.replace(format="rgba32float"), **given)
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        for name, part in cotangents.items():
+            check_cotangent(name, part, frames)
+        _, back = reference_vjp(pixels, settings, **given)
+        found = back(cotangents)
+        return Gradients((name, part.astype(np.float32)) for name, part in found.items())
+
+    return frames, pullback

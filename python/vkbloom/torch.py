@@ -1,0 +1,437 @@
+"""Bloom as an operator of PyTorch, with its derivatives.
+
+Tensors of float64 are computed by `vkbloom.reference`, all others by a renderer. The bloom buffers
+are "rgba32float".
+
+Examples
+--------
+>>> import torch
+>>> import vkbloom.torch
+>>> image = torch.full((8, 8, 3), 0.5, requires_grad=True)
+>>> final = vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+>>> final.sum().backward()
+>>> round(float(image.grad.mean()), 4)
+1.5
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from vkbloom.checks import import_extra
+from vkbloom.gradients import Pullback
+from vkbloom.reference import apply as reference_apply
+from vkbloom.reference import vjp as reference_vjp
+from vkbloom.reference.derivatives import differentiable
+from vkbloom.renderer import Renderer
+from vkbloom.settings import Settings, check_settings, field_info
+
+torch: Any = import_extra("torch", "torch", "vkbloom.torch")
+
+__all__ = ["Bloom", "bloom"]
+
+
+def bloom(
+    image: Any,
+    settings: Settings,
+    *,
+    mask: Any = None,
+    emission: Any = None,
+    renderer: Renderer | None = None,
+    channels_first: bool = False,
+) -> Any:
+    """Add bloom to tensors.
+
+    Parameters
+    ----------
+    image : Tensor, shape (..., H, W, C)
+        Linear light with 3 or 4 channels, of float16, float32 or float64. Those of float64 are
+        computed in NumPy by `vkbloom.reference`, all others by the renderer.
+    settings : Settings
+        `Settings.format` is not read: the bloom buffers are "rgba32float".
+    mask : Tensor, shape (..., H, W), optional
+        As for `Renderer.apply`, with the image's leading dimensions.
+    emission : Tensor, optional
+        Of the image's shape and dtype.
+    renderer : Renderer, optional
+        Default: one that this module opens at the first call.
+    channels_first : bool
+        Whether image, emission and result have the shape (..., C, H, W).
+
+    Returns
+    -------
+    Tensor
+        ``final``, of the image's shape, dtype and device.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As for `Renderer.apply` and `Renderer.vjp`.
+    RuntimeError
+        From a backward pass: a second derivative was asked for.
+
+    See Also
+    --------
+    Bloom : The same as a module, which can learn fields of the settings.
+    vkbloom.Renderer.vjp : The derivatives as arrays.
+
+    Notes
+    -----
+    The operator is ``torch.ops.vkbloom.bloom``, with a fake kernel, so `torch.compile` does not
+    look into it.
+
+    Examples
+    --------
+    >>> image = torch.rand(2, 3, 16, 16)
+    >>> vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=2), channels_first=True).shape
+    torch.Size([2, 3, 16, 16])
+    """
+    settings = check_settings(settings, of_image=True)
+    return _call(
+        image,
+        settings,
+        {},
+        mask=mask,
+        emission=emission,
+        renderer=renderer,
+        channels_first=channels_first,
+    )
+
+
+class Bloom(torch.nn.Module):  # type: ignore[misc]
+    """Bloom as a module of PyTorch.
+
+    Parameters
+    ----------
+    settings : Settings
+        Where learning starts, and the fields that stay as they are.
+    learn : sequence of str
+        The fields that are parameters of the module: real ones, such as "intensity",
+        "level_weights" or "glare.0.intensity".
+    renderer, channels_first
+        As for `bloom`.
+
+    Raises
+    ------
+    ValueError
+        A field has no derivative, or is None.
+
+    See Also
+    --------
+    bloom : The function.
+
+    Notes
+    -----
+    An optimizer may move a parameter out of the range of its field. Each call moves it back to the
+    nearest end.
+
+    Examples
+    --------
+    >>> module = vkbloom.torch.Bloom(vkbloom.Pyramid(levels=2), learn=("intensity",))
+    >>> [name for name, _ in module.named_parameters()]
+    ['learned.intensity']
+    >>> module(torch.rand(16, 16, 3)).shape
+    torch.Size([16, 16, 3])
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        learn: tuple[str, ...] = (),
+        *,
+        renderer: Renderer | None = None,
+        channels_first: bool = False,
+    ) -> None:
+        super().__init__()
+        self._start = check_settings(settings, of_image=True)
+        self._names = (learn,) if isinstance(learn, str) else tuple(learn)
+        self._renderer = renderer
+        self._channels_first = channels_first
+        known = differentiable(self._start)
+        for name in self._names:
+            if name not in known:
+                raise ValueError(
+                    f"learn: {name!r} of the method {self._start.method} has no derivative; those "
+                    f"with one are {', '.join(known)}"
+                )
+        # The names of parameters have no dots.
+        self.learned = torch.nn.ParameterDict(
+            {name.replace(".", "_"): torch.tensor(known[name]) for name in self._names}
+        )
+
+    @property
+    def settings(self) -> Settings:
+        """The settings with what was learned."""
+        return _replaced(self._start, dict(zip(self._names, self._values(), strict=True)))
+
+    def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
+        """Add bloom, as `bloom` does."""
+        values = dict(zip(self._names, self._values(), strict=True))
+        return _call(
+            image,
+            self._start,
+            values,
+            mask=mask,
+            emission=emission,
+            renderer=self._renderer,
+            channels_first=self._channels_first,
+        )
+
+    def _values(self) -> list[Any]:
+        """Return the parameters, moved into the ranges of their fields."""
+        parameters = [self.learned[name.replace(".", "_")] for name in self._names]
+        with torch.no_grad():
+            for name, parameter in zip(self._names, parameters, strict=True):
+                if (ends := field_info(self._start, name).range) is not None:
+                    parameter.clamp_(*ends)
+        return parameters
+
+
+def _call(
+    image: Any,
+    settings: Settings,
+    values: dict[str, Any],
+    *,
+    mask: Any,
+    emission: Any,
+    renderer: Renderer | None,
+    channels_first: bool,
+) -> Any:
+    """Run the operator; `values` are tensors of fields."""
+    for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
+        if tensor is not None and not isinstance(tensor, torch.Tensor):
+            raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
+    _check(image, mask, emission, channels_first)
+    if channels_first:
+        image = image.movedim(-3, -1)
+        emission = None if emission is None else emission.movedim(-3, -1)
+    final = torch.ops.vkbloom.bloom(
+        image,
+        mask,
+        emission,
+        [*values.values()],
+        ",".join(values),
+        _text(settings),
+        _number(renderer),
+    )
+    return final.movedim(-1, -3) if channels_first else final
+
+
+def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
+    """Check shapes, dtypes and devices, so that errors come from the call and not the operator."""
+    shape = tuple(image.shape)
+    order = "(..., C, H, W)" if channels_first else "(..., H, W, C)"
+    if len(shape) < 3 or shape[-3 if channels_first else -1] not in (3, 4):
+        raise ValueError(f"image: the shape {shape} is not {order} with 3 or 4 channels")
+    if not image.is_floating_point():
+        raise TypeError(f"image: {image.dtype} has no derivative; give floats of linear light")
+    if emission is not None and (emission.shape, emission.dtype) != (image.shape, image.dtype):
+        raise ValueError(
+            f"emission: {tuple(emission.shape)} of {emission.dtype} is not the image's "
+            f"{shape} of {image.dtype}"
+        )
+    sides = (*shape[:-3], *(shape[-2:] if channels_first else shape[-3:-1]))
+    if mask is not None and tuple(mask.shape) != sides:
+        raise ValueError(f"mask: the shape {tuple(mask.shape)} is not {sides}")
+    for name, tensor in (("mask", mask), ("emission", emission)):
+        if tensor is not None and tensor.device != image.device:
+            raise ValueError(f"{name}: its device {tensor.device} is not the image's")
+
+
+@functools.lru_cache(64)
+def _text(settings: Settings) -> str:
+    """Return settings as the text that an operator can take."""
+    return settings.to_json()
+
+
+@functools.lru_cache(64)
+def _settings(text: str) -> Settings:
+    return Settings.from_json(text)
+
+
+def _replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
+    """Return settings with the values of tensors."""
+    return settings.replace(
+        **{name: _field_value(value.detach().cpu().tolist()) for name, value in values.items()}
+    )
+
+
+def _field_value(value: Any) -> Any:
+    return tuple(map(_field_value, value)) if isinstance(value, list) else value
+
+
+#: Renderers by the number that the operator takes; `_OWN` is the one of this module.
+_RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
+_OWN: Final = 0
+_opening: Final = threading.Lock()
+
+
+@functools.cache
+def _own_renderer() -> Renderer:
+    return Renderer()
+
+
+def _renderer(number: int) -> Renderer:
+    if number != _OWN:
+        return _RENDERERS[number]
+    with _opening:
+        return _own_renderer()
+
+
+def _number(renderer: Renderer | None) -> int:
+    if renderer is None:
+        return _OWN
+    _RENDERERS[id(renderer)] = renderer
+    return id(renderer)
+
+
+def _each(  # noqa: PLR0917
+    image: Any, mask: Any, emission: Any, values: Sequence[Any], names: str, text: str
+) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
+    """Yield the index, the arrays and the settings of each image of a batch."""
+    given = {"image": image, "mask": mask, "emission": emission}
+    arrays = {
+        name: part.detach().cpu().contiguous().numpy()
+        for name, part in given.items()
+        if part is not None
+    }
+    settings = _replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
+    for index in np.ndindex(tuple(image.shape[:-3])):
+        yield index, {name: part[index] for name, part in arrays.items()}, settings
+
+
+def _split(names: str) -> list[str]:
+    return names.split(",") if names else []
+
+
+def _vjp(arrays: dict[str, Any], settings: Settings, renderer: int) -> tuple[Any, Pullback]:
+    """Return framebuffers and pullback: of the reference for float64, else of the renderer."""
+    given = dict(arrays)
+    image = given.pop("image")
+    if image.dtype == np.float64:
+        return reference_vjp(image, settings, **given)
+    return _renderer(renderer).vjp(image, settings, **given)
+
+
+def _operator(name: str, parameters: str, result: str) -> Any:
+    """Declare an operator, whose types PyTorch cannot read from annotations of `Any`."""
+    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor[] values, "
+    schema += f"str names, str settings, int renderer) -> {result}"
+    return torch.library.custom_op(name, mutates_args=(), schema=schema)
+
+
+@_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]
+def _bloom(  # noqa: PLR0917
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    settings: str,
+    renderer: int,
+) -> Any:
+    final = np.empty(image.shape, _dtype(image))
+    for index, arrays, one in _each(image, mask, emission, values, names, settings):
+        given = dict(arrays)
+        pixels = given.pop("image")
+        if pixels.dtype == np.float64:
+            final[index] = reference_apply(pixels, one, **given)["final"]
+        else:
+            frames = _renderer(renderer).apply(
+                pixels, one.replace(format="rgba32float"), attachments="final", **given
+            )
+            final[index] = frames["final"]
+    return torch.from_numpy(final).to(image.device)
+
+
+def _dtype(tensor: Any) -> Any:
+    return torch.empty(0, dtype=tensor.dtype).numpy().dtype
+
+
+@_bloom.register_fake  # type: ignore[untyped-decorator]
+def _(  # noqa: PLR0917
+    image: Any, mask: Any, emission: Any, values: Any, names: str, settings: str, renderer: int
+) -> Any:
+    return torch.empty(image.shape, dtype=image.dtype, device=image.device)
+
+
+@_operator("vkbloom::bloom_backward", "Tensor cotangent, ", "Tensor[]")  # type: ignore[untyped-decorator]
+def _backward(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    settings: str,
+    renderer: int,
+) -> list[Any]:
+    """Return the derivatives by the image, those of mask and emission that are there, and values.
+
+    Of a batch, the derivatives by values are added.
+    """
+    inputs = {"image": image, "mask": mask, "emission": emission}
+    found = {
+        name: np.zeros(part.shape, np.float64)
+        for name, part in [*inputs.items(), *zip(_split(names), values, strict=True)]
+        if part is not None
+    }
+    wanted = cotangent.detach().cpu().numpy()
+    for index, arrays, one in _each(image, mask, emission, values, names, settings):
+        _, pullback = _vjp(arrays, one, renderer)
+        gradients = pullback({"final": wanted[index]})
+        for name, total in found.items():
+            if name in inputs:
+                total[index] = gradients[name]
+            else:
+                np.add(total, gradients[name], out=total)
+    parts = [*(part for part in inputs.values() if part is not None), *values]
+    return [
+        torch.from_numpy(total).to(part.device, part.dtype)
+        for total, part in zip(found.values(), parts, strict=True)
+    ]
+
+
+@_backward.register_fake  # type: ignore[untyped-decorator]
+def _(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Any,
+    names: str,
+    settings: str,
+    renderer: int,
+) -> Any:
+    parts = [part for part in (image, mask, emission, *values) if part is not None]
+    return [torch.empty(part.shape, dtype=part.dtype, device=part.device) for part in parts]
+
+
+def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+    image, mask, emission, values, *ctx.texts = inputs
+    ctx.given = [part is not None for part in (image, mask, emission)]
+    ctx.save_for_backward(*(part for part in (image, mask, emission) if part is not None), *values)
+
+
+def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
+    saved = iter(ctx.saved_tensors)
+    inputs = [next(saved) if given else None for given in ctx.given]
+    found = iter(torch.ops.vkbloom.bloom_backward(cotangent, *inputs, [*saved], *ctx.texts))
+    return *(next(found) if given else None for given in ctx.given), [*found], None, None, None
+
+
+def _refuse(ctx: Any, *cotangents: Any) -> Any:
+    raise RuntimeError(
+        "vkbloom::bloom: its second derivative is not implemented; the first is exact, so compute "
+        "without create_graph=True"
+    )
+
+
+_bloom.register_autograd(_back, setup_context=_keep)
+_backward.register_autograd(_refuse)

@@ -1,0 +1,259 @@
+// A stand-in for libcuda.so.1: one GPU, whose UUID is STAND_IN_UUID and whose memory is the host's.
+// It imports the memory that lavapipe exports by mapping its descriptor. With STAND_IN_LOG, it
+// writes what is left at the end to that file. The work of a stream is done at once.
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define EXPORT __attribute__((visibility("default")))
+
+enum { SUCCESS, INVALID_VALUE, OUT_OF_MEMORY, INVALID_DEVICE = 101 };
+enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
+
+// What is there now, by kind; and bytes copied to the host.
+static long contexts, streams, events, memories, mappings, read_bytes, current;
+
+struct memory_handle {
+    int type;
+    union {
+        int descriptor;
+        void *others[2];
+    } handle;
+    unsigned long long size;
+    unsigned flags, reserved[16];
+};
+
+struct memory {
+    char *start;
+    size_t size;
+    int descriptor;
+};
+
+static void report(void)
+{
+    const char *path = getenv("STAND_IN_LOG");
+    FILE *file = path ? fopen(path, "w") : NULL;
+
+    if (!file)
+        return;
+    fprintf(file, "%ld %ld %ld %ld %ld %ld %ld\n", contexts, streams, events, memories, mappings,
+            current, read_bytes);
+    fclose(file);
+}
+
+EXPORT int cuInit(unsigned flags)
+{
+    static int known;
+
+    if (!known++)
+        atexit(report);
+    return flags ? INVALID_VALUE : SUCCESS;
+}
+
+EXPORT int cuGetErrorName(int error, const char **name)
+{
+    *name = error == OUT_OF_MEMORY ? "CUDA_ERROR_OUT_OF_MEMORY" : "CUDA_ERROR_OF_THE_STAND_IN";
+    return SUCCESS;
+}
+
+EXPORT int cuDeviceGetCount(int *count)
+{
+    *count = 2;
+    return SUCCESS;
+}
+
+EXPORT int cuDeviceGet(int *device, int ordinal)
+{
+    *device = ordinal;
+    return ordinal >= 0 && ordinal < 2 ? SUCCESS : INVALID_DEVICE;
+}
+
+EXPORT int cuDeviceGetName(char *name, int size, int device)
+{
+    snprintf(name, (size_t)size, "Stand-in %d", device);
+    return SUCCESS;
+}
+
+// The first device is another one, so that the renderer's is not found by chance.
+EXPORT int cuDeviceGetUuid(unsigned char uuid[16], int device)
+{
+    const char *text = getenv("STAND_IN_UUID");
+
+    memset(uuid, 0xee, 16);
+    for (int i = 0; device == 1 && text && i < 16; ++i) {
+        unsigned byte;
+        text += *text == '-';
+        sscanf(text, "%2x", &byte);
+        uuid[i] = (unsigned char)byte;
+        text += 2;
+    }
+    return SUCCESS;
+}
+
+EXPORT int cuDevicePrimaryCtxRetain(void **context, int device)
+{
+    ++contexts;
+    *context = &contexts;
+    return device == 1 ? SUCCESS : INVALID_DEVICE;
+}
+
+EXPORT int cuDevicePrimaryCtxRelease_v2(int device)
+{
+    --contexts;
+    return device == 1 ? SUCCESS : INVALID_DEVICE;
+}
+
+EXPORT int cuCtxPushCurrent_v2(void *context)
+{
+    __atomic_add_fetch(&current, 1, __ATOMIC_SEQ_CST);
+    return context == &contexts ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuCtxPopCurrent_v2(void **context)
+{
+    __atomic_sub_fetch(&current, 1, __ATOMIC_SEQ_CST);
+    *context = &contexts;
+    return SUCCESS;
+}
+
+EXPORT int cuCtxSynchronize(void)
+{
+    return SUCCESS;
+}
+
+EXPORT int cuStreamCreate(void **stream, unsigned flags)
+{
+    ++streams;
+    *stream = &streams;
+    return flags == 1 ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuStreamDestroy_v2(void *stream)
+{
+    --streams;
+    return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuStreamSynchronize(void *stream)
+{
+    return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuStreamWaitEvent(void *stream, void *event, unsigned flags)
+{
+    return stream && event && !flags ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuEventCreate(void **event, unsigned flags)
+{
+    *event = calloc(1, 1);
+    if (*event)
+        __atomic_add_fetch(&events, 1, __ATOMIC_SEQ_CST);
+    return *event && flags == 2 ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuEventDestroy_v2(void *event)
+{
+    __atomic_sub_fetch(&events, 1, __ATOMIC_SEQ_CST);
+    free(event);
+    return SUCCESS;
+}
+
+EXPORT int cuEventRecord(void *event, void *stream)
+{
+    return event && stream ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuEventQuery(void *event)
+{
+    return event ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuCtxRecordEvent(void *context, void *event)
+{
+    return context == &contexts && event ? SUCCESS : INVALID_VALUE;
+}
+
+// Addresses 1 to 3 stand for freed memory, managed memory and memory of the other GPU.
+EXPORT int cuPointerGetAttribute(void *value, int attribute, unsigned long long address)
+{
+    if (address == 1)
+        return INVALID_VALUE;
+    if (attribute == IS_MANAGED)
+        *(unsigned *)value = address == 2;
+    else if (attribute == DEVICE_ORDINAL)
+        *(int *)value = address == 3 ? 0 : 1;
+    return SUCCESS;
+}
+
+EXPORT int cuImportExternalMemory(void **handle, const struct memory_handle *given)
+{
+    struct memory *memory = calloc(1, sizeof *memory);
+    struct stat about;
+
+    if (!memory || given->type != 1 || given->flags != 1
+        || fstat(given->handle.descriptor, &about) != 0) {
+        free(memory);
+        return INVALID_VALUE;
+    }
+    memory->size = (size_t)about.st_size;
+    memory->descriptor = given->handle.descriptor;
+    *handle = memory;
+    ++memories;
+    return SUCCESS;
+}
+
+// Mesa's anonymous files begin with their size and the offset of what was allocated.
+EXPORT int cuExternalMemoryGetMappedBuffer(unsigned long long *address, void *handle,
+                                           const unsigned long long *buffer)
+{
+    struct memory *memory = handle;
+    size_t header[2];
+
+    memory->start =
+        mmap(NULL, memory->size, PROT_READ | PROT_WRITE, MAP_SHARED, memory->descriptor, 0);
+    if (memory->start == MAP_FAILED)
+        return OUT_OF_MEMORY;
+    memcpy(header, memory->start, sizeof header);
+    if (header[1] + buffer[0] + buffer[1] > memory->size)
+        return INVALID_VALUE;
+    *address = (unsigned long long)(uintptr_t)(memory->start + header[1] + buffer[0]);
+    ++mappings;
+    return SUCCESS;
+}
+
+EXPORT int cuMemFree_v2(unsigned long long address)
+{
+    --mappings;
+    return address ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuDestroyExternalMemory(void *handle)
+{
+    struct memory *memory = handle;
+
+    if (memory->start)
+        munmap(memory->start, memory->size);
+    close(memory->descriptor);
+    free(memory);
+    --memories;
+    return SUCCESS;
+}
+
+EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, size_t size,
+                                void *stream)
+{
+    memcpy((void *)(uintptr_t)to, (const void *)(uintptr_t)from, size);
+    return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
+{
+    __atomic_add_fetch(&read_bytes, (long)size, __ATOMIC_SEQ_CST);
+    memcpy(to, (const void *)(uintptr_t)from, size);
+    return stream == &streams ? SUCCESS : INVALID_VALUE;
+}

@@ -1,0 +1,312 @@
+"""What a renderer does with arrays of CUDA, over the stand-in for libcuda; prints JSON.
+
+The device's memory is the host's, so that arrays of NumPy stand for arrays on the device.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import gc
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.images import picture
+from vkbloom import Pyramid, Renderer, Separable
+
+VALIDATION = "validated" in sys.argv
+
+_get = ctypes.pythonapi.PyCapsule_GetPointer
+_get.restype, _get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+
+
+class OnDevice:
+    """An array of NumPy that says that it is on a device of CUDA."""
+
+    def __init__(self, array: NDArray[Any], device: tuple[int, int] = (2, 1), code: int = 0):
+        self.array, self.device, self.code = array, device, code
+        self.streams: list[int | None] = []
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return self.device
+
+    def __dlpack__(self, *, stream: int | None = None) -> Any:
+        self.streams.append(stream)
+        capsule = self.array.__dlpack__()
+        tensor = _get(capsule, b"dltensor")
+        assert tensor
+        ctypes.c_int32.from_address(tensor + 8).value = self.device[0]
+        ctypes.c_int32.from_address(tensor + 12).value = self.device[1]
+        if self.code:
+            ctypes.c_uint8.from_address(tensor + 20).value = self.code
+        return capsule
+
+
+class Interfaced:
+    """The same through the interface of Numba."""
+
+    def __init__(self, array: NDArray[Any], **about: Any):
+        self.array = array
+        start = array.__array_interface__["data"][0]
+        self.__cuda_array_interface__ = {
+            "shape": array.shape,
+            "typestr": array.dtype.str,
+            "data": (start, False),
+            "strides": array.strides,
+            "version": 3,
+            **about,
+        }
+
+
+def strided(rng: np.random.Generator, dtype: str) -> NDArray[Any]:
+    """Return an image with one of many layouts."""
+    height, width, channels = (
+        int(rng.integers(1, 40)),
+        int(rng.integers(1, 40)),
+        3 + rng.integers(2),
+    )
+    image = picture(width, height, int(channels), dtype, seed=int(rng.integers(99)))
+    match rng.integers(6):
+        case 0:
+            return np.moveaxis(np.ascontiguousarray(np.moveaxis(image, -1, 0)), 0, -1)
+        case 1:
+            return image[::-1, ::-1]
+        case 2:
+            return np.repeat(image, 2, axis=1)[:, ::2]
+        case 3:
+            large = np.zeros((height + 3, width + 5, 4), dtype)
+            large[1:-2, 2:-3, : image.shape[2]] = image
+            return large[1:-2, 2:-3, : image.shape[2]]
+        case 4:
+            return image.transpose(1, 0, 2)
+    return image
+
+
+def same(frames: Any, expected: Any) -> None:
+    assert list(frames) == list(expected)
+    for name, array in expected.items():
+        made = frames[name]
+        assert isinstance(made, vkbloom.DeviceArray), type(made)
+        assert made.shape == array.shape
+        assert made.dtype == array.dtype
+        np.testing.assert_array_equal(made.numpy(), array, err_msg=name)
+    assert (frames.info["nan"], frames.info["inf"]) == (expected.info["nan"], expected.info["inf"])
+
+
+def layouts(renderer: Any) -> None:
+    rng = np.random.default_rng(1)
+    methods = (Separable(threshold=0.3), Pyramid(levels=2), Separable(bloom_scale=0.5))
+    for step in range(60):
+        dtype = ("uint8", "float16", "float32")[step % 3]
+        image = strided(rng, dtype)
+        if dtype != "uint8" and step % 4 == 0:
+            image = image.copy()
+            image[0, 0, 0], image[-1, -1, -1] = np.nan, -np.inf
+        mask: Any = rng.random(image.shape[:2], np.float32) if step % 5 == 0 else None
+        settings = methods[step % len(methods)]
+        expected = renderer.apply(image, settings, mask=mask)
+        given = OnDevice(image) if step % 2 else Interfaced(image)
+        device_mask = OnDevice(mask) if mask is not None and step % 2 else mask
+        same(renderer.apply(given, settings, mask=device_mask), expected)
+        # And the host's again: its image on the device was replaced.
+        again = renderer.apply(image, settings, mask=mask)
+        np.testing.assert_array_equal(again["final"], expected["final"])
+
+
+def streams(renderer: Any) -> None:
+    image = OnDevice(picture(20, 10))
+    renderer.apply(image)
+    assert len(image.streams) == 1
+    assert image.streams[0] not in (None, 0)
+
+
+def sequences(renderer: Any) -> None:
+    images = np.stack([picture(24, 16, 3, "float16", seed=i) for i in range(5)])
+    expected = [renderer.apply(image) for image in images]
+    moved = np.moveaxis(np.ascontiguousarray(np.moveaxis(images, -1, 1)), 1, -1)
+    for batch in (images, moved, images[::2]):
+        wanted = expected[::2] if len(batch) == 3 else expected
+        for frames, right in zip(renderer.apply_each(OnDevice(batch)), wanted, strict=True):
+            same(frames, right)
+    for frames, right in zip(
+        renderer.apply_each([OnDevice(one) for one in images]), expected, strict=True
+    ):
+        same(frames, right)
+    settings = [Pyramid(levels=2, intensity=step / 4) for step in range(40)]
+    many = renderer.apply_many(OnDevice(images[0]), settings)
+    for frames, one in zip(many, settings, strict=True):
+        same(frames, renderer.apply(images[0], one))
+    handle = renderer.upload(OnDevice(images[1]), mask=np.ones((16, 24), np.float32))
+    same(renderer.apply(handle), renderer.apply(images[1], mask=np.ones((16, 24), np.float32)))
+
+
+def places(renderer: Any) -> None:
+    image, emission = picture(24, 16), picture(24, 16, seed=1)
+    expected = renderer.apply(image, emission=emission)
+    same(renderer.apply(OnDevice(image), emission=OnDevice(emission)), expected)
+    same(renderer.apply(image, emission=OnDevice(emission)), expected)
+    same(renderer.apply(OnDevice(image), emission=emission), expected)
+    host = renderer.apply(OnDevice(image), emission=emission, device="host")
+    assert isinstance(host["final"], np.ndarray)
+    np.testing.assert_array_equal(host["final"], expected["final"])
+    first = renderer.apply(OnDevice(image))
+    second = renderer.apply(first["final"])
+    same(second, renderer.apply(first["final"].numpy()))
+    out, other = OnDevice(np.zeros_like(image)), np.zeros((16, 24, 4), image.dtype)
+    frames = renderer.apply(OnDevice(image), out={"final": out, "bloom": other})
+    np.testing.assert_array_equal(out.array, renderer.apply(image)["final"])
+    assert frames["bloom"] is other
+    renderer.apply(image, out={"final": out})
+    assert renderer.plan(Kind(image)).outputs["final"] == (image.shape, image.dtype)
+
+
+class Kind(OnDevice):
+    """With the attributes that arrays of all libraries have."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.array.shape
+
+    @property
+    def dtype(self) -> str:
+        return f"torch.{self.array.dtype}"
+
+
+def capsules(renderer: Any) -> None:
+    image = picture(24, 16)
+    frames = renderer.apply(OnDevice(image))
+    final = frames["final"]
+    array: Any = final
+    assert array.__dlpack_device__() == (2, 1)
+    for version, name in (
+        (None, b"dltensor"),
+        ((0, 8), b"dltensor"),
+        ((1, 1), b"dltensor_versioned"),
+    ):
+        capsule = array.__dlpack__(stream=1, max_version=version)
+        assert _get(capsule, name)
+        address, device, dtype, shape, strides = vkbloom._core.read_dlpack(capsule)
+        assert (device, dtype, shape) == ((2, 1), (2, 32, 1), image.shape)
+        assert strides == (24 * image.shape[2], image.shape[2], 1)
+        assert address == array.__cuda_array_interface__["data"][0]
+    about = array.__cuda_array_interface__
+    assert about["version"] == 3
+    assert about["stream"] is None
+    copied = vkbloom._core.read_dlpack(array.__dlpack__(stream=1, copy=True))
+    assert copied[0] != address
+    np.testing.assert_array_equal(np.from_dlpack(Consumer(array)), array.numpy())
+    raises(ValueError, "stream: 0", lambda: array.__dlpack__(stream=0))
+    raises(BufferError, "dl_device: (2, 0)", lambda: array.__dlpack__(dl_device=(2, 0)))
+
+
+class Consumer:
+    """Asks for the host's memory."""
+
+    def __init__(self, array: Any):
+        self.array = array
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return (1, 0)
+
+    def __dlpack__(self, **options: Any) -> Any:
+        return self.array.__dlpack__(dl_device=(1, 0), max_version=(1, 0))
+
+
+def recycling(renderer: Any) -> None:
+    """Memory is used again when the last consumer lets go, and not before."""
+    image = OnDevice(picture(64, 64))
+    final = renderer.apply(image, attachments="final")["final"]
+    address, right = final.__cuda_array_interface__["data"][0], final.numpy()
+    capsule = final.__dlpack__(stream=1)
+    del final
+    others = [renderer.apply(image, attachments="final")["final"] for _ in range(5)]
+    assert address not in [one.__cuda_array_interface__["data"][0] for one in others]
+    del others
+    view = np.ctypeslib.as_array((ctypes.c_float * right.size).from_address(address))
+    np.testing.assert_array_equal(view, right.ravel())
+    del capsule
+    places = set()
+    for _ in range(10):
+        one = renderer.apply(image, attachments="final")["final"]
+        places.add(one.__cuda_array_interface__["data"][0])
+    assert len(places) <= 7
+
+
+def lifetime(renderer: Any) -> None:
+    other: Any = Renderer("software")
+    with other:
+        image = picture(24, 16)
+        final = other.apply(OnDevice(image))["final"]
+        other_handle = other.upload(OnDevice(image))
+        right = final.numpy()
+        raises(ValueError, "uploaded to another renderer", lambda: renderer.apply(other_handle))
+    np.testing.assert_array_equal(final.numpy(), right)
+    capsule = final.__dlpack__(stream=1)
+    del final
+    gc.collect()
+    assert vkbloom._core.read_dlpack(capsule)[0]
+    same(renderer.apply(OnDevice(image)), renderer.apply(image))
+
+
+def raises(kind: type[Exception], part: str, call: Callable[[], object]) -> None:
+    with pytest.raises(kind) as caught:
+        call()
+    assert part in str(caught.value)
+
+
+def errors(renderer: Any) -> None:
+    image = picture(24, 16)
+    half = image.astype(np.float16)
+    apply = renderer.apply
+    wrong: list[tuple[Any, type[Exception], str]] = [
+        (OnDevice(image, (2, 0)), ValueError, "Stand-in 0 (uuid:eeeeeeee-"),
+        (OnDevice(image, (13, 1)), ValueError, "managed (unified) memory"),
+        (OnDevice(half, code=4), TypeError, "image.to(torch.float32)"),
+        (OnDevice(image.astype(np.complex64)), TypeError, "abs(image)"),
+        (OnDevice(image.astype(np.float64)), TypeError, "float64 is not one of"),
+        (OnDevice(image[:0]), ValueError, "sides of at least 1"),
+        (OnDevice(image[..., 0]), ValueError, "is not (H, W, 3)"),
+        (OnDevice(np.moveaxis(image, -1, 0)), ValueError, "image.permute(1, 2, 0)"),
+        (OnDevice(image[None]), ValueError, "apply_each(image)"),
+        (Interfaced(image, data=(1, False)), ValueError, "may have been freed"),
+        (Interfaced(image, data=(2, False)), ValueError, "managed (unified)"),
+        (Interfaced(image, data=(3, False)), ValueError, "it is on Stand-in 0"),
+        (Interfaced(image, typestr="<c8"), TypeError, "complex64"),
+    ]
+    for given, kind, part in wrong:
+        raises(kind, part, functools.partial(apply, given))
+    wide = OnDevice(image)
+    raises(ValueError, "emission", lambda: apply(wide, emission=OnDevice(image[1:])))
+    raises(ValueError, "mask", lambda: apply(wide, mask=OnDevice(np.full((16, 24), 2, np.float32))))
+    raises(ValueError, "it must have", lambda: apply(wide, out={"final": OnDevice(half)}))
+    raises(ValueError, "C-contiguous", lambda: apply(wide, out={"final": OnDevice(image[:, ::-1])}))
+    raises(ValueError, "device: 'gpu'", lambda: apply(wide, device="gpu"))
+    # None of them has left the context in use or broken.
+    same(apply(wide), apply(image))
+
+
+WORK = (layouts, streams, sequences, places, capsules, recycling, lifetime, errors)
+
+
+def main() -> None:
+    wrong = {}
+    with Renderer("software", validation=VALIDATION) as renderer:
+        for work in WORK:
+            try:
+                work(renderer)
+            except Exception as error:
+                import traceback
+
+                wrong[work.__name__] = f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+    print(json.dumps(wrong))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+"""Builds the stand-in for libcuda, and the environment of processes that use it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.core.builds import compiler
+from vkbloom import AdapterInfo
+
+SOURCE = Path(__file__).with_name("cuda_stand_in.c")
+
+
+def build(folder: Path) -> Path:
+    """Build the library; return its folder."""
+    if os.name == "nt":
+        pytest.skip("memory is exported as descriptors of files")
+    options = ("-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
+    subprocess.run(
+        [*compiler(), *options, "-fvisibility=hidden", SOURCE, "-o", folder / "libcuda.so.1"],
+        check=True,
+    )
+    return folder
+
+
+def variables(folder: Path, adapter: AdapterInfo) -> dict[str, str]:
+    """Return the environment in which the adapter is a GPU of the stand-in."""
+    paths = (str(folder), os.environ.get("LD_LIBRARY_PATH", ""))
+    return {
+        "LD_LIBRARY_PATH": os.pathsep.join(filter(None, paths)),
+        "STAND_IN_UUID": adapter.uuid,
+        "STAND_IN_LOG": str(folder / "left"),
+    }

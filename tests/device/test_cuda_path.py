@@ -1,0 +1,33 @@
+"""Arrays on the device, over a stand-in for libcuda that maps what lavapipe exports."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.core.builds import ROOT
+from tests.device import stand_in
+from tests.processes import python
+from vkbloom import AdapterInfo
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return stand_in.build(tmp_path_factory.mktemp("cuda"))
+
+
+@pytest.mark.parametrize("validation", ["validated", "plain"])
+def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None:
+    """Layouts, batches, places, capsules, lifetimes and errors (device_work.py)."""
+    done = python(
+        *("-m", "tests.device.device_work", validation),
+        cwd=ROOT,
+        **stand_in.variables(folder, software),
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {}
+    left = (folder / "left").read_text().split()
+    # Contexts, streams, events, memories, mappings, contexts that are current.
+    assert left[:6] == ["0"] * 6, left

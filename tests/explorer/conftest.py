@@ -1,0 +1,35 @@
+"""A browser, and a server of the explorer's page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.explorer.explorer_hosts import CHROMIUM, served
+from vkbloom.explorer.viewer import Viewer
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        # Without a sandbox, which root has not; nothing but our own pages is opened. Without the
+        # screen's colours, so that a screenshot holds what was drawn.
+        arguments = ["--no-sandbox", "--force-color-profile=srgb"]
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
+    """Serves viewers from a thread, and returns where."""
+    with ExitStack() as stack:
+        yield lambda new_viewer: stack.enter_context(served(new_viewer))

@@ -1,0 +1,58 @@
+"""Render parts of a grid, named by standard input, into the store of the first argument.
+
+After the word "killed" the process kills itself when two chunks are written.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vkbloom
+from vkbloom.grid.chunks import Chunks
+
+
+def render(store: Path, part: str | None) -> None:
+    """Render 512 points in 64 chunks."""
+    vkbloom.grid_to_zarr(
+        np.random.default_rng(3).random((12, 10, 3), dtype=np.float32),
+        vkbloom.Separable(threshold=0.2),
+        {
+            "blur_scale": np.linspace(0.5, 2, 8),
+            "exposure": np.linspace(-1, 1, 8),
+            "blur_strength": np.linspace(1, 2, 8),
+        },
+        store,
+        chunks={"blur_strength": 8},
+        reduce={"mean": vkbloom.reductions.Mean()},
+        part=part,
+        progress=False,
+    )
+
+
+def kill_after_two_chunks(store: Path) -> None:
+    """End this process as by a power failure, with a temporary file beside its chunks."""
+    written: list[Any] = []
+    write = Chunks.write
+
+    def writing(self: Chunks, block: Any, arrays: Any) -> None:
+        if len(written) == 2:
+            (store / "final" / f"c.{os.getpid()}.partial").write_bytes(b"half of it")
+            os.kill(os.getpid(), signal.SIGKILL)
+        written.append(block)
+        write(self, block, arrays)
+
+    Chunks.write = writing  # type: ignore[method-assign]
+
+
+if __name__ == "__main__":
+    for word in sys.stdin.read().split():
+        if word == "killed":
+            kill_after_two_chunks(Path(sys.argv[1]))
+        else:
+            render(Path(sys.argv[1]), word)

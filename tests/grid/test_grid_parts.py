@@ -1,0 +1,164 @@
+"""Parts of a grid: disjoint, in any order, by processes that do not know of each other."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import vkbloom
+from tests.framebuffers import noise
+from tests.grid.grid_in_parts import render
+from tests.grid.stores import contents
+from vkbloom import check_grid, grid_to_zarr
+from vkbloom.cli.program import program
+from vkbloom.grid.order import blocks
+from vkbloom.grid.parts import _ARRAYS, read_part
+
+pytest.importorskip("zarr")
+SCRIPT = "tests.grid.grid_in_parts"
+ROOT = Path(__file__).resolve().parents[2]
+AXES: dict[str, Any] = {"intensity": np.linspace(0, 1, 5), "blur_scale": [0.5, 1.0, 2.0, 3.0]}
+
+
+def start(store: Path, *words: str) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", SCRIPT, store], stdin=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    assert process.stdin is not None
+    process.stdin.write(" ".join(words))
+    process.stdin.close()
+    return process
+
+
+def make(store: Any, **changes: Any) -> Any:
+    image = noise(16, 21, 3, dtype="float32")
+    return grid_to_zarr(image, vkbloom.Separable(), AXES, store, progress=False, **changes)
+
+
+def test_sixteen_parts_of_four_processes_of_which_two_are_killed(tmp_path: Path) -> None:
+    parts = [f"{number}/16" for number in range(1, 17)]
+    random.Random(7).shuffle(parts)
+    store = tmp_path / "parts.zarr"
+    queues = [parts[:4], parts[4:8], [*parts[8:10], "killed", *parts[10:12]], ["killed", parts[12]]]
+    started = [start(store, *queue) for queue in queues]
+    ended = [process.wait() for process in started]
+    assert ended == [0, 0, -signal.SIGKILL, -signal.SIGKILL]
+
+    missing = sorted(parts[10:], key=parts.index)
+    report = check_grid(store)
+    assert sorted(report.missing_parts) == sorted(missing)
+    assert f"part {missing[0]} is not complete" in str(report)
+    assert not report.complete
+    assert not report.problems
+
+    for part in (*parts[10:15], parts[0]):
+        render(store, part)
+    assert check_grid(store).missing_parts == (parts[15],)
+    render(store, parts[15])
+    assert check_grid(store).complete
+    render(tmp_path / "whole.zarr", None)
+    assert contents(store) == contents(tmp_path / "whole.zarr")
+
+
+def test_parts_are_disjoint_and_complete() -> None:
+    shape, chunk, ranking = (7, 3, 5), (2, 3, 1), (2, 0, 1)
+    every = list(blocks(shape, chunk, ranking))
+    for count in (1, 2, 7, len(every), len(every) + 5):
+        parts = [list(blocks(shape, chunk, ranking, (i, count))) for i in range(1, count + 1)]
+        assert [block for part in parts for block in part] == every
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+
+
+def test_chunks_suffice_for_all_parts(tmp_path: Path) -> None:
+    store = tmp_path / "a.zarr"
+    for number in range(15):
+        make(store, part=(number, 16))
+    # 0 is the same as 16.
+    assert check_grid(store).missing_parts == ("15/16",)
+    found = make(store)
+    assert check_grid(store).complete
+    make(tmp_path / "whole.zarr")
+    whole = make(tmp_path / "whole.zarr")
+    np.testing.assert_array_equal(found["final"].values, whole["final"].values)
+
+
+def test_damage_in_a_part_is_repaired_by_it_alone(tmp_path: Path) -> None:
+    store = tmp_path / "a.zarr"
+    for number in (1, 2, 3):
+        make(store, part=(number, 4))
+    files = contents(store)
+    damaged = max((store / "final").glob("c.*"))
+    damaged.write_bytes(b"damaged")
+    (part,) = set(check_grid(store).missing_parts) - {"4/4"}
+    others = {f"{number}/4" for number in (1, 2, 3)} - {part}
+    for other in others:
+        make(store, part=other)
+    assert damaged.read_bytes() == b"damaged"
+    make(store, part=part)
+    assert contents(store) == files
+
+
+def test_another_grid_is_refused(tmp_path: Path) -> None:
+    make(tmp_path / "a.zarr", part=(1, 2))
+    with pytest.raises(ValueError, match="contains another grid; variables"):
+        make(tmp_path / "a.zarr", part=(2, 2), attachments=("bloom",))
+
+
+def test_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = tmp_path / "a.png"
+    vkbloom.write(image, noise(12, 10, 3, dtype="uint8"))
+    for out in ("whole", "parts"):
+        words = ["grid", str(image), "-o", str(tmp_path / out), "--axis", "intensity=0:1:6"]
+        for number in "20" if out == "parts" else [""]:
+            if number:
+                monkeypatch.setenv("SLURM_ARRAY_TASK_ID", number)
+                monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "3")
+            more = ["--part", "auto"] if number else []
+            done = CliRunner().invoke(program, [*words, *more])
+            assert done.exit_code == 0, done.output
+        assert len(list((tmp_path / out).glob("*.png"))) == (4 if out == "parts" else 6)
+    assert "part 3/3 of 6 points" in done.output
+    done = CliRunner().invoke(program, [*words, "--part", "1/3"])
+    assert contents(tmp_path / "whole") == contents(tmp_path / "parts")
+    assert CliRunner().invoke(program, [*words, "--part", "4/3"]).exit_code == 2
+
+
+def test_numbers_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in _ARRAYS:
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ValueError, match="not a task of a job array"):
+        read_part("auto/3")
+    for name, count in _ARRAYS.items():
+        with monkeypatch.context() as patch:
+            patch.setenv(name, "2")
+            assert read_part("auto/16") == (2, 16)
+            if count is None:
+                with pytest.raises(ValueError, match="is not I/N"):
+                    read_part("auto")
+                continue
+            patch.setenv(count, "4")
+            assert read_part("auto") == (2, 4)
+            # The tasks 2 and 7 alone, which a count does not tell.
+            patch.setenv(name, "7")
+            with pytest.raises(ValueError, match="7 of 4 is not 1 to 4; write auto/N"):
+                read_part("auto")
+
+
+@pytest.mark.parametrize("part", [(0, 0), (17, 16), (-1, 16), "3", "3/", "a/b", "1/2/3", ""])
+def test_wrong_values(part: Any) -> None:
+    with pytest.raises(ValueError, match="part: "):
+        read_part(part)
+
+
+@pytest.mark.parametrize("part", [3, (1.0, 2), (True, 2), (1, 2, 3)])
+def test_wrong_types(part: Any) -> None:
+    with pytest.raises(TypeError, match="part: "):
+        read_part(part)
