@@ -3,6 +3,7 @@
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
 # make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
+# make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -22,7 +23,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test check docs bench wheels lint format sanitize clean
+.PHONY: demo test check docs bench engines wheels lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -53,6 +54,19 @@ wheels:
 # BENCH: options for python -m benchmarks.
 bench: build/stamp/core build/stamp/peers
 	$(PYTHON) -m benchmarks --out out/bench.md $(BENCH)
+
+# Installs engines, each into an environment of its own, and compares with them (docs/engines.md).
+engines: build/stamp/core build/engines/blender/done build/engines/pygfx/done
+	$(PYTHON) tools/engines/compare.py blender=build/engines/blender/bin/python \
+	    pygfx=build/engines/pygfx/bin/python $(ENGINES)
+
+# bpy is for one version of Python.
+build/engines/blender/done: PACKAGES := bpy==5.0.1 numpy==1.26.4
+build/engines/pygfx/done: PACKAGES := pygfx==0.17.0 rendercanvas==2.7.2 wgpu==0.32.0
+build/engines/%/done:
+	python3.11 -m venv $(@D)
+	$(@D)/bin/pip install --quiet $(PACKAGES)
+	touch $@
 
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .

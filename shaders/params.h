@@ -30,6 +30,7 @@
     SETTING(white, 1.0, 0.01, 65504.0) \
     SETTING(smoothness, 0.1, 0.0, 1.0) \
     SETTING(maximum, 3.4e38, 0.0, 65504.0) \
+    SETTING(saturation, 1.0, 0.0, 16.0) \
     SETTING(offset, 1.0, 0.0, 16.0) \
     SETTING(intensity, 1.0, 0.0, 65504.0) \
     SETTING(exposure, 0.0, -32.0, 32.0) \
@@ -195,6 +196,32 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
+// The end of Blender's glare (blender_end.frag): one factor for each channel.
+#define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    READS(B, saturation) \
+    VEC4S(B, factors, 1)
+
+// Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows from
+// its end at the left or right or at the bottom, or back from its other end. `distance` is that of
+// the pixels that are mixed.
+#define STAR_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, step_x) \
+    INPUT(B, int, step_y) \
+    INPUT(B, int, backwards) \
+    INPUT(B, int, distance) \
+    INPUT(B, float, fade) \
+    INPUT(B, float, limit)
+
+// Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of the
+// sides; the share of the samples that jitter leaves.
+#define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, most) \
+    INPUT(B, float, sun_x) \
+    INPUT(B, float, sun_y) \
+    INPUT(B, float, left) \
+    INPUT(B, float, limit)
+
 // The light of the deferred system.
 #define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
 
@@ -274,6 +301,9 @@
     BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(flare, FLARE_BLOCK) \
     BLOCK(dirt, DIRT_BLOCK) \
+    BLOCK(blender_end, BLENDER_END_BLOCK) \
+    BLOCK(star, STAR_BLOCK) \
+    BLOCK(sun_beams, SUN_BEAMS_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
@@ -298,7 +328,9 @@
     COUNT(high_quality_filtering, 1, 0, 1) \
     COUNT(node, 0, 0, 1) \
     COUNT(bicubic, 1, 0, 1) \
-    COUNT(karis_average, 0, 0, 1)
+    COUNT(karis_average, 0, 0, 1) \
+    COUNT(streaks, 4, 1, 16) \
+    COUNT(diagonal, 1, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
@@ -313,7 +345,11 @@
     REAL(scale_y, 1.0, 0.0, 16.0) \
     REAL(anamorphism, 0.0, -1.0, 1.0) \
     REAL(size, 0.5, 0.0, 1.0) \
-    REAL(filter_radius, 0.005, 0.0, 1.0)
+    REAL(filter_radius, 0.005, 0.0, 1.0) \
+    REAL(streaks_angle, 0.0, -360.0, 360.0) \
+    REAL(fade, 0.9, 0.75, 1.0) \
+    REAL(color_modulation, 0.25, 0.0, 1.0) \
+    REAL(jitter, 0.0, 0.0, 1.0)
 
 // The numbers of the stages of glare: floats and integers, as above. Each stage has some of them.
 #define GLARE_SETTING_ROWS(SETTING) \
@@ -520,17 +556,34 @@
     NAME(BOUNDARY_WRAP, 2, wrap) \
     NAME(BOUNDARY_WRAP_X, 3, wrap_x)
 
+#define TYPE_NAMES(NAME) \
+    NAME(TYPE_BLOOM, 0, bloom) \
+    NAME(TYPE_GHOSTS, 1, ghosts) \
+    NAME(TYPE_STREAKS, 2, streaks) \
+    NAME(TYPE_FOG_GLOW, 3, fog_glow) \
+    NAME(TYPE_SIMPLE_STAR, 4, simple_star) \
+    NAME(TYPE_SUN_BEAMS, 5, sun_beams) \
+    NAME(TYPE_KERNEL, 6, kernel)
+
+#define QUALITY_NAMES(NAME) \
+    NAME(QUALITY_HIGH, 0, high) \
+    NAME(QUALITY_MEDIUM, 1, medium) \
+    NAME(QUALITY_LOW, 2, low)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
     CHOICE(alpha, ALPHA_NAMES) \
     CHOICE(texel, TEXEL_NAMES) \
-    CHOICE(boundary, BOUNDARY_NAMES)
+    CHOICE(boundary, BOUNDARY_NAMES) \
+    CHOICE(type, TYPE_NAMES) \
+    CHOICE(quality, QUALITY_NAMES)
 
 // Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
     NAME(COMPOSITE_OFF, -1, off) \
+    NAME(COMPOSITE_ADD_TO_POSITIVE, 5, add_to_positive) \
     NAME(THRESHOLD_NONE, 0, none) \
     NAME(THRESHOLD_HARD, 1, hard) \
     NAME(THRESHOLD_KNEE, 2, knee) \
@@ -545,6 +598,7 @@
     NAME(STORED_SINGLE, 2, single) \
     NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
     NAME(STORED_UFLOAT, 4, ufloat) \
+    NAME(STORED_SRGB8, 5, srgb8) \
     NAME(BLOOM_OWN, 0, own_image) \
     NAME(BLOOM_LINES, 1, lines) \
     NAME(BLOOM_LIT, 2, lit) \

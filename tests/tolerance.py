@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import DualKawase, Frames, GodotBloom, Pyramid, Separable, Settings, _core, reference
+from vkbloom import (
+    BlenderGlare,
+    DualKawase,
+    Frames,
+    GodotBloom,
+    Pyramid,
+    Separable,
+    Settings,
+    _core,
+    reference,
+)
 
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 _DTYPES = {format: dtype for dtype, format in FORMATS.items()}
@@ -24,7 +34,7 @@ _HALF_ROUNDING = 2.0**-11
 _HALF_LEAST = 2.0**-25
 
 # The threshold pass of these methods writes the glow.
-_WITH_THRESHOLD_PASS = (Separable, Pyramid, DualKawase)
+_WITH_THRESHOLD_PASS = (Separable, Pyramid, DualKawase, BlenderGlare)
 
 # Framebuffers in which one 8-bit stage's rounding arrives, or that of the glow and one more.
 _FIRST_STAGES = ("glow", "blur_vertical", "down_0")
@@ -146,7 +156,8 @@ def assert_matches_reference(
             expected[name],
             stages_of_8_bits=1 if is_first else 2,
             # No value has come through more passes than there are before it.
-            stages=index + 1 + (hidden if index else 0),
+            # (Blender's glow are the highlights of a frame, which is an image of its own.)
+            stages=index + 1 + (hidden if index else 0) + isinstance(settings, BlenderGlare),
             # (Where taps count less the brighter they are, signs may make more of them.)
             magnitude=np.maximum(np.abs(expected[name]), magnitudes[name]),
         )

@@ -128,12 +128,11 @@ bool vkb_graph_bands(const struct vkb_graph *graph, uint32_t output, uint32_t he
     // images.
     bands->reach = (uint32_t)ceil(before + after);
     for (uint32_t i = 0; i < bands->level_count; ++i)
-        if (graph->images[bands->levels[i]].format == VKB_FORMAT_RG11B10_UFLOAT)
+        if (vkb_is_rounded(graph->images[bands->levels[i]].format))
             return false;
     return is_tall(graph, output, height)
         && (bands->head == VKB_NO_IMAGE
-            || (bands->level_count > 0
-                && graph->images[bands->head].format != VKB_FORMAT_RG11B10_UFLOAT));
+            || (bands->level_count > 0 && !vkb_is_rounded(graph->images[bands->head].format)));
 }
 
 static bool find_image(const struct vkb_graph *graph, const char *name, uint32_t *image,

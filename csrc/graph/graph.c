@@ -42,6 +42,7 @@ enum vkb_mode vkb_storage_mode(enum vkb_format format)
     return format == VKB_FORMAT_RGBA8_UNORM    ? STORED_UNORM8
          : format == VKB_FORMAT_RGBA16_FLOAT   ? STORED_HALF
          : format == VKB_FORMAT_RG11B10_UFLOAT ? STORED_UFLOAT
+         : format == VKB_FORMAT_RGBA8_SRGB     ? STORED_SRGB8
                                                : STORED_SINGLE;
 }
 

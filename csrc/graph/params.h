@@ -135,6 +135,8 @@ enum vkb_encoding { ENCODING_NAMES(VKB_NAME_ENUM) };
 enum vkb_alpha { ALPHA_NAMES(VKB_NAME_ENUM) };
 enum vkb_texel { TEXEL_NAMES(VKB_NAME_ENUM) };
 enum vkb_boundary { BOUNDARY_NAMES(VKB_NAME_ENUM) };
+enum vkb_type { TYPE_NAMES(VKB_NAME_ENUM) };
+enum vkb_quality { QUALITY_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 

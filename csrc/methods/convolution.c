@@ -225,13 +225,13 @@ static bool add_rows_back(const struct convolution *convolution, uint32_t column
     return vkb_graph_add_pass(convolution->graph, &row, error);
 }
 
-bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                  const struct vkb_image_row *result, struct vkb_graph *graph, uint32_t *target,
+                  struct vkb_error *error)
 {
     const int boundary = settings->choices[VKB_CHOICE_boundary];
     const bool wrap_x = boundary == BOUNDARY_WRAP_X;
     const struct vkb_size size = source->buffers;
-    const bool same = size.width == source->final.width && size.height == source->final.height;
     struct convolution convolution = {
         .settings = settings,
         .source = source,
@@ -239,9 +239,8 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
         .reach_x.kernel = settings->kernel.width,
         .reach_y.kernel = settings->kernel.height,
     };
-    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const enum vkb_format single = VKB_FORMAT_RGBA32_FLOAT;
-    uint32_t kernel, spectrum, rows, columns, target;
+    uint32_t kernel, spectrum, rows, columns;
 
     convolution.x =
         make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
@@ -251,18 +250,28 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
                   size.height, &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
     const struct vkb_size lines = {padded.width, size.height};
-    if (!add_kernel(&settings->kernel, graph, &kernel, error)
-        || !vkb_add_target(graph, "kernel_spectrum", single, padded, false, &spectrum, error)
-        || !vkb_add_target(graph, "rows_spectrum", single, lines, false, &rows, error)
-        || !vkb_add_target(graph, "spectrum", single, padded, false, &columns, error)
-        || !vkb_add_target(graph, same ? "bloom" : "convolved", same ? source->format : single,
-                           size, same, &target, error)
-        || !add_placing(&convolution, kernel, spectrum, error)
-        || !add_kernel_spectrum(&convolution, spectrum, error)
-        || !add_rows(&convolution, rows, error)
-        || !add_columns(&convolution, rows, spectrum, columns, error)
-        || !add_rows_back(&convolution, columns, target, error))
-        return false;
-    *bloom = target;
-    return same || vkb_levels_enlarge(&levels, target, 1.0, bloom, error);
+    return add_kernel(&settings->kernel, graph, &kernel, error)
+        && vkb_add_target(graph, "kernel_spectrum", single, padded, false, &spectrum, error)
+        && vkb_add_target(graph, "rows_spectrum", single, lines, false, &rows, error)
+        && vkb_add_target(graph, "spectrum", single, padded, false, &columns, error)
+        && vkb_add_target(graph, result->name, result->format, size, result->framebuffer, target,
+                          error)
+        && add_placing(&convolution, kernel, spectrum, error)
+        && add_kernel_spectrum(&convolution, spectrum, error) && add_rows(&convolution, rows, error)
+        && add_columns(&convolution, rows, spectrum, columns, error)
+        && add_rows_back(&convolution, columns, *target, error);
+}
+
+bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    const struct vkb_size size = source->buffers;
+    const bool same = size.width == source->final.width && size.height == source->final.height;
+    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_image_row whole = {
+        .name = "bloom", .format = source->format, .framebuffer = true};
+    const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
+
+    return vkb_convolve(settings, source, same ? &whole : &part, graph, bloom, error)
+        && (same || vkb_levels_enlarge(&levels, *bloom, 1.0, bloom, error));
 }

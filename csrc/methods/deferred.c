@@ -88,7 +88,7 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
         .final = size,
         .format = settings->format ? settings->format : HDR,
     };
-    const enum vkb_format extracted = vkb_end_format(settings, source.format);
+    const enum vkb_format extracted = vkb_first_format(settings, source.format);
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
                        && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE;
 

@@ -64,7 +64,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
         struct vkb_mesh_params lamp = params;
         // The intensity applies to the deferred system only: 8 bits cannot hold radiance.
         lamp.glow_intensity = 1.0f;
-        if (!vkb_add_glow(settings, source, &lamp, vkb_end_format(settings, glow.format),
+        if (!vkb_add_glow(settings, source, &lamp, vkb_first_format(settings, glow.format),
                           glow.buffers, true, vkb_threshold_mode(settings), graph, &glow.glow,
                           error)
             || !vkb_add_bloom(settings, &glow, graph, &composite.bloom, error))

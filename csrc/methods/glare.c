@@ -20,7 +20,9 @@ struct stage {
 };
 
 typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
-static add_stage add_streaks, add_ghosts, add_halo, add_dirt;
+static add_stage add_streaks, add_flare, add_dirt;
+#define add_ghosts add_flare
+#define add_halo   add_flare
 
 static const struct {
     const char *name;
@@ -38,10 +40,10 @@ static struct vkb_size size_of(const struct stage *stage, uint32_t image)
 }
 
 // Its taps may be anywhere, and its images are beside the bloom's levels.
-static struct vkb_pass_row glare_row(const struct stage *stage, const struct vkb_shader *fragment,
-                                     uint32_t from, uint32_t to)
+static struct vkb_pass_row glare_row(const struct vkb_levels *levels,
+                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = vkb_fetching_row(&stage->levels, fragment, from, to);
+    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
 
     row.reach = INFINITY;
     return row;
@@ -74,30 +76,33 @@ static float step_of(double step)
     return fabs(step) < 1e-9 ? 0.0f : (float)step;
 }
 
-// An iteration of ray `ray`, of so many, into the image `to`. `before`, if there is one, is added.
-static bool add_iteration(const struct stage *stage, int ray, int rays, int iteration,
-                          uint32_t from, uint32_t before, uint32_t to, struct vkb_error *error)
+// Lets a pass add the image `before` to its result, if there is one.
+static void add_before(struct vkb_pass_row *row, uint32_t before)
 {
-    const struct vkb_glare_values *values = &stage->settings->values;
-    const double angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays);
-    const double step = values->length * pow(values->base, iteration);
-    const bool last = iteration == values->iterations - 1;
-    struct vkb_pass_row row = glare_row(stage, &vkb_shader_streaks_frag, from, to);
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row->reads[1] = before != VKB_NO_IMAGE ? before : row->reads[0];
+    row->read_count = 2;
+    row->constants.add_own = before != VKB_NO_IMAGE;
+}
+
+bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
+                 struct vkb_error *error)
+{
+    const struct vkb_glare_values *values = ray->values;
+    const double step = values->length * pow(values->base, ray->iteration);
+    struct vkb_pass_row row = glare_row(levels, &vkb_shader_streaks_frag, ray->from, ray->to);
     struct vkb_streaks_params *params = &row.params.streaks;
 
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = before != VKB_NO_IMAGE ? before : from;
-    row.read_count = 2;
-    row.constants.add_own = before != VKB_NO_IMAGE;
-    row.constants.first = iteration == 0 && values->threshold > 0.0f;
+    add_before(&row, ray->before);
+    row.constants.first = ray->iteration == 0 && values->threshold > 0.0f;
     row.block = VKB_BLOCK_streaks;
-    set_weights(values, iteration, last ? 1.0 / rays : 1.0, params);
+    set_weights(values, ray->iteration, ray->gain, params);
     // Light goes in the direction of the angle, so that it comes from the other one.
-    params->step_x = step_of(-step * cos(angle));
-    params->step_y = step_of(step * sin(angle));
-    params->threshold = iteration == 0 ? values->threshold : 0.0f;
-    params->limit = vkb_formats[stage->levels.source->format].limit;
-    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+    params->step_x = step_of(-step * cos(ray->angle));
+    params->step_y = step_of(step * sin(ray->angle));
+    params->threshold = ray->iteration == 0 ? values->threshold : 0.0f;
+    params->limit = vkb_formats[levels->source->format].limit;
+    return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
 // Adds the image that a pass of ray `ray` writes; the last one is the stage's framebuffer.
@@ -125,49 +130,56 @@ static bool add_streaks(const struct stage *stage, uint32_t *image, struct vkb_e
         uint32_t from = stage->from;
         for (int iteration = 0; iteration < values->iterations; ++iteration, from = *image) {
             const bool last = iteration == values->iterations - 1;
-            if (!add_ray_image(stage, ray, iteration, last && ray == rays - 1, image, error)
-                || !add_iteration(stage, ray, rays, iteration, from, last ? before : VKB_NO_IMAGE,
-                                  *image, error))
+            if (!add_ray_image(stage, ray, iteration, last && ray == rays - 1, image, error))
+                return false;
+            const struct vkb_ray row = {
+                .values = values,
+                .angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays),
+                .gain = last ? 1.0 / rays : 1.0,
+                .iteration = iteration,
+                .from = from,
+                .before = last ? before : VKB_NO_IMAGE,
+                .to = *image,
+            };
+            if (!vkb_add_ray(&stage->levels, &row, error))
                 return false;
         }
     }
     return true;
 }
 
-// A stage of one pass with the block of ghosts and halo.
-static bool add_flare(const struct stage *stage, const struct vkb_shader *fragment, uint32_t *image,
-                      struct vkb_error *error)
+bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                   uint32_t before, uint32_t to, struct vkb_error *error)
 {
-    const struct vkb_glare_values *values = &stage->settings->values;
+    const struct vkb_glare_values *values = &stage->values;
+    const bool ghosts = stage->kind == VKB_STAGE_GHOSTS;
+    struct vkb_pass_row row =
+        glare_row(levels, ghosts ? &vkb_shader_ghosts_frag : &vkb_shader_halo_frag, from, to);
 
-    if (!vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
-                          error))
-        return false;
-    struct vkb_pass_row row = glare_row(stage, fragment, stage->from, *image);
+    if (ghosts)
+        add_before(&row, before);
     row.block = VKB_BLOCK_flare;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
-        .limit = vkb_formats[stage->levels.source->format].limit,
+        .limit = vkb_formats[levels->source->format].limit,
         .maximum = values->maximum,
         .aberration = values->aberration,
         .radius = values->radius,
         .falloff = values->falloff,
         .vignette = values->vignette,
         .width = values->width,
-        .count = (int)stage->settings->ghost_count,
+        .count = (int)stage->ghost_count,
     };
-    memcpy(row.params.flare.ghosts, stage->settings->ghosts, sizeof row.params.flare.ghosts);
-    return vkb_graph_add_pass(stage->levels.graph, &row, error);
+    memcpy(row.params.flare.ghosts, stage->ghosts, sizeof row.params.flare.ghosts);
+    return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
-static bool add_ghosts(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+// A stage of one pass with the block of ghosts and halo.
+static bool add_flare(const struct stage *stage, uint32_t *image, struct vkb_error *error)
 {
-    return add_flare(stage, &vkb_shader_ghosts_frag, image, error);
-}
-
-static bool add_halo(const struct stage *stage, uint32_t *image, struct vkb_error *error)
-{
-    return add_flare(stage, &vkb_shader_halo_frag, image, error);
+    return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
+                            error)
+        && vkb_add_flare(&stage->levels, stage->settings, stage->from, VKB_NO_IMAGE, *image, error);
 }
 
 // Dirt has no image of its own.

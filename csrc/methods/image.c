@@ -73,8 +73,8 @@ static bool add_bloom(const struct vkb_settings *settings, const struct vkb_imag
         .format = settings->format ? settings->format : image->format,
     };
 
-    if (!vkb_add_target(graph, "glow", vkb_end_format(settings, source.format), source.buffers,
-                        true, &source.glow, error)
+    if (!vkb_add_first(settings, graph, vkb_first_format(settings, source.format), source.buffers,
+                       true, &source.glow, error)
         || !vkb_add_threshold(settings, from, inputs->mask, source.glow, graph, error)
         || !vkb_add_bloom(settings, &source, graph, bloom, error))
         return false;

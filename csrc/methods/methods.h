@@ -48,6 +48,29 @@ bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_s
                    const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
                    struct vkb_error *error);
 
+struct vkb_levels;
+
+// Adds the convolution of source->glow with the kernel of the settings. `result` has the name and
+// the format of the image that it writes, and whether this is a framebuffer.
+bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                  const struct vkb_image_row *result, struct vkb_graph *graph, uint32_t *target,
+                  struct vkb_error *error);
+
+// Adds an iteration of a ray of streaks from `from`, with the numbers of a stage, into the image
+// `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights.
+struct vkb_ray {
+    const struct vkb_glare_values *values;
+    double angle, gain;
+    int iteration;
+    uint32_t from, before, to;
+};
+bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
+                 struct vkb_error *error);
+
+// Adds the ghosts of a stage of `from` into the image `to`. `before`, if there is one, is added.
+bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                   uint32_t before, uint32_t to, struct vkb_error *error);
+
 // Adds the rows of the method that the settings name, and those of glare; *bloom is the last image.
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);

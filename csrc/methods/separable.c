@@ -100,8 +100,8 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
 bool vkb_add_separable(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                        struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
-    // Blending does not round to R11G11B10, so layers in this format are added in a separate image.
-    const bool apart = source->format == VKB_FORMAT_RG11B10_UFLOAT && settings->layer_count > 1;
+    // Blending does not round as the shaders do, so such layers are added in a separate image.
+    const bool apart = vkb_is_rounded(source->format) && settings->layer_count > 1;
     const enum vkb_format format = apart ? VKB_FORMAT_RGBA32_FLOAT : source->format;
     uint32_t ends[MAX_LAYERS], sum;
     char name[VKB_NAME_SIZE];

@@ -49,7 +49,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     }
     // A format whose largest value is 1 holds the mean of the levels, and the bloom is multiplied
     // by `total`.
-    if (!vkb_ends_at_one(source->format))
+    if (!vkb_stores_means(source->format))
         total = 1.0;
     for (uint32_t level = 0; level < UNREAL_LEVELS; ++level)
         shares[level] /= total;

@@ -23,6 +23,8 @@ static int composite_of(const struct vkb_settings *settings,
 {
     const int composite = settings->choices[VKB_CHOICE_composite];
 
+    if (settings->method == VKB_METHOD_BLENDER && source->bloom != VKB_NO_IMAGE)
+        return COMPOSITE_ADD_TO_POSITIVE;
     return source->bloom == VKB_NO_IMAGE               ? COMPOSITE_OFF
          : composite == COMPOSITE_MIX && source->apart ? COMPOSITE_ADD
                                                        : composite;

@@ -273,36 +273,51 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
 // sum for a constant image of 1 (`flat`; negative shares count as positive), and the bloom is
 // multiplied by this.
+bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                       uint32_t *top, double *below, struct vkb_error *error)
+{
+    const bool means = vkb_stores_means(levels->source->format);
+
+    *top = levels->downs[levels->count - 1];
+    *below = combination->smallest;
+    for (uint32_t level = levels->count - 1; level-- > 0;) {
+        const uint32_t from = *top;
+        const double own = combination->own[level], coarse = combination->coarse[level] * *below;
+        const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
+        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], top, error)
+            || !add_up(levels, combination, combination->kernel, from, *top, levels->downs[level],
+                       own / flat, coarse / flat, error))
+            return false;
+        *below = flat;
+    }
+    return true;
+}
+
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
                         uint32_t *bloom, struct vkb_error *error)
 {
-    const bool means = vkb_ends_at_one(levels->source->format);
-    uint32_t top = levels->downs[levels->count - 1];
-    double below = combination->smallest;
+    uint32_t top;
+    double below;
 
-    for (uint32_t level = levels->count - 1; level-- > 0;) {
-        const uint32_t from = top;
-        const double own = combination->own[level], coarse = combination->coarse[level] * below;
-        const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
-        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &top, error)
-            || !add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
-                       own / flat, coarse / flat, error))
-            return false;
-        below = flat;
-    }
-    return vkb_levels_bloom(levels, bloom, error)
+    return vkb_levels_add_up(levels, combination, &top, &below, error)
+        && vkb_levels_bloom(levels, bloom, error)
         && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,
                   combination->gain * below, error);
+}
+
+bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double gain, uint32_t to,
+                       struct vkb_error *error)
+{
+    static const struct vkb_combination enlarging = {0};
+
+    return add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain, error);
 }
 
 bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
                         uint32_t *bloom, struct vkb_error *error)
 {
-    static const struct vkb_combination enlarging = {0};
-
     return vkb_levels_bloom(levels, bloom, error)
-        && add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, *bloom, VKB_NO_IMAGE, 0.0, gain,
-                  error);
+        && vkb_levels_resize(levels, from, gain, *bloom, error);
 }
 
 bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,

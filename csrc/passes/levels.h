@@ -102,9 +102,17 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
 // The image "bloom", of the final size.
 bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
 
+// A pass that resizes an image bilinearly and multiplies it by a gain.
+bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double gain, uint32_t to,
+                       struct vkb_error *error);
+
 // The pass "bloom": enlarges the image bilinearly and multiplies it by a gain.
 bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
                         uint32_t *bloom, struct vkb_error *error);
+
+// The passes up_N-2 ... up_0, the last of which is *top, without `last_kernel` and `gain`.
+bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
+                       uint32_t *top, double *below, struct vkb_error *error);
 
 // The passes up_N-2 ... up_0 and "bloom".
 bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,

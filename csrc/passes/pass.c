@@ -61,9 +61,23 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
     return vkb_graph_add_image(graph, &row, index, error);
 }
 
+bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
+                   enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
+                   struct vkb_error *error)
+{
+    const bool glows = settings->method != VKB_METHOD_BLENDER;
+
+    return vkb_add_target(graph, glows ? "glow" : "frame", format, size, framebuffer && glows,
+                          index, error);
+}
+
+enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers)
+{
+    return buffers == VKB_FORMAT_RGBA8_SRGB ? buffers : vkb_end_format(settings, buffers);
+}
+
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
 {
-    return buffers == VKB_FORMAT_RG11B10_UFLOAT && vkb_is_published(settings)
-             ? VKB_FORMAT_RGBA32_FLOAT
-             : buffers;
+    return vkb_is_rounded(buffers) && vkb_is_published(settings) ? VKB_FORMAT_RGBA32_FLOAT
+                                                                 : buffers;
 }

@@ -27,6 +27,7 @@ struct vkb_bloom_source {
         [VKB_FORMAT_RGBA16_FLOAT] = &vkb_shader_##shader##_rgba16float, \
         [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_##shader##_rgba32float, \
         [VKB_FORMAT_RG11B10_UFLOAT] = &vkb_shader_##shader##_rgba32float, \
+        [VKB_FORMAT_RGBA8_SRGB] = &vkb_shader_##shader##_rgba32float, \
     }
 
 // Adds an image that a pass will write.
@@ -34,9 +35,16 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
                     struct vkb_size size, bool framebuffer, uint32_t *index,
                     struct vkb_error *error);
 
-// The format of a method's first image and of its bloom, for bloom buffers of this format.
-// Published methods store only their levels in R11G11B10.
+// The formats of a method's first image and of its bloom, for bloom buffers of this format.
+// Published methods store only their levels in R11G11B10, and read the frame from sRGB, too.
+enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers);
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
+
+// Adds the first image of the bloom, the framebuffer "glow"; for Blender's glare, whose glow are
+// its highlights, an image "frame" that is none.
+bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
+                   enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
+                   struct vkb_error *error);
 
 // The values of SAMPLING_ROWS for a pass that writes `target`.
 struct vkb_sampling {

@@ -55,7 +55,7 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_so
 {
     uint32_t depth;
 
-    if (!vkb_add_target(graph, "glow", format, size, framebuffer, glow, error)
+    if (!vkb_add_first(settings, graph, format, size, framebuffer, glow, error)
         || !vkb_add_target(graph, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer, &depth,
                            error))
         return false;

@@ -96,6 +96,8 @@ struct vkb_settings {
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
     uint32_t level_weight_count;  // 0: none are given
+    float tint[3];                // of Blender's glare, and the position of its sun
+    float sun_position[2];        // as shares of the sides from the lower left
     struct vkb_kernel_data kernel;
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
@@ -103,6 +105,17 @@ struct vkb_settings {
     const struct vkb_own_pass *passes;  // of VKB_METHOD_OWN
     uint32_t pass_count;
 };
+
+// Whether the method convolves with a kernel that Python makes.
+static inline bool vkb_needs_kernel(const struct vkb_settings *settings)
+{
+    const int type = settings->choices[VKB_CHOICE_type];
+
+    return settings->values.bloom
+        && (settings->method == VKB_METHOD_CONVOLUTION
+            || (settings->method == VKB_METHOD_BLENDER
+                && (type == TYPE_FOG_GLOW || type == TYPE_KERNEL)));
+}
 
 static inline bool vkb_is_published(const struct vkb_settings *settings)
 {

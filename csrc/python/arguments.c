@@ -14,6 +14,8 @@ enum attribute {
     ATTRIBUTE_WEIGHTS,
     ATTRIBUTE_LAYERS,
     ATTRIBUTE_LEVEL_WEIGHTS,
+    ATTRIBUTE_TINT,
+    ATTRIBUTE_SUN_POSITION,
     ATTRIBUTE_CHOICES,
     ATTRIBUTE_VALUES = ATTRIBUTE_CHOICES + VKB_CHOICE_COUNT,
 };
@@ -28,6 +30,8 @@ static const char *attribute_name(size_t attribute)
         [ATTRIBUTE_WEIGHTS] = "weights",
         [ATTRIBUTE_LAYERS] = "layers",
         [ATTRIBUTE_LEVEL_WEIGHTS] = "level_weights",
+        [ATTRIBUTE_TINT] = "tint",
+        [ATTRIBUTE_SUN_POSITION] = "sun_position",
     };
 
     return attribute < ATTRIBUTE_CHOICES ? names[attribute]
@@ -244,6 +248,8 @@ static bool require_kernel(const struct vkb_settings *settings)
 
 static bool read_all(const struct reader *reader, struct vkb_settings *settings)
 {
+    uint32_t count;
+
     memset(settings, 0, sizeof *settings);
     for (size_t i = 0; i < vkb_value_row_count; ++i)
         if (!read_value(reader, i, &settings->values))
@@ -262,6 +268,8 @@ static bool read_all(const struct reader *reader, struct vkb_settings *settings)
         && read_layers(reader, settings)
         && read_numbers(reader, ATTRIBUTE_LEVEL_WEIGHTS, MAX_LEVELS, settings->level_weights,
                         &settings->level_weight_count)
+        && read_numbers(reader, ATTRIBUTE_TINT, 3, settings->tint, &count)
+        && read_numbers(reader, ATTRIBUTE_SUN_POSITION, 2, settings->sun_position, &count)
         && require_kernel(settings) && vkb_read_glare(reader->object, settings);
 }
 

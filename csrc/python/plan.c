@@ -160,7 +160,7 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     struct vkb_graph graph = {0};
     struct vkb_error error = {0};
 
-    if (settings->method != VKB_METHOD_CONVOLUTION || !settings->values.bloom)
+    if (!vkb_needs_kernel(settings))
         return true;
     if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error)) {
         if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))

@@ -37,8 +37,8 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
             .limit = FLT_MAX,
         },
-    // Few devices draw into R11G11B10 and store to it, and they may cut bits off: the shaders
-    // round, and single floats hold what they rounded to.
+    // Few devices draw into R11G11B10 and store to it, and they may cut bits off; none stores to
+    // sRGB: the shaders round, and single floats hold what they rounded to.
     [VKB_FORMAT_RG11B10_UFLOAT] =
         {
             .name = "rg11b10ufloat",
@@ -48,6 +48,16 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .channel_size = 4,
             .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
             .limit = (float)UFLOAT11_LIMIT,
+        },
+    [VKB_FORMAT_RGBA8_SRGB] =
+        {
+            .name = "rgba8unorm-srgb",
+            .dtype = "float32",
+            .vk = VK_FORMAT_R32G32B32A32_SFLOAT,
+            .channels = 4,
+            .channel_size = 4,
+            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
+            .limit = (float)UNORM_LIMIT,
         },
     [VKB_FORMAT_R32_FLOAT] =
         {

@@ -12,6 +12,7 @@ enum vkb_format {
     VKB_FORMAT_RGBA16_FLOAT,
     VKB_FORMAT_RGBA32_FLOAT,
     VKB_FORMAT_RG11B10_UFLOAT,
+    VKB_FORMAT_RGBA8_SRGB,
     VKB_FORMAT_R32_FLOAT,  // of masks
     VKB_FORMAT_DEPTH32_FLOAT,
     VKB_FORMAT_COUNT,
@@ -43,10 +44,16 @@ static inline uint32_t vkb_pixel_size(enum vkb_format format)
     return vkb_formats[format].channels * vkb_formats[format].channel_size;
 }
 
-// Whether the largest value is 1: sums of levels do not fit.
-static inline bool vkb_ends_at_one(enum vkb_format format)
+// Whether sums of levels are stored as means. (The one engine with sRGB stores the sums, up to 1.)
+static inline bool vkb_stores_means(enum vkb_format format)
 {
-    return vkb_formats[format].limit < 2.0f;
+    return format == VKB_FORMAT_RGBA8_UNORM;
+}
+
+// Whether the shaders round to this format, and images of single floats hold what they rounded to.
+static inline bool vkb_is_rounded(enum vkb_format format)
+{
+    return format == VKB_FORMAT_RG11B10_UFLOAT || format == VKB_FORMAT_RGBA8_SRGB;
 }
 
 // The format of that name; VKB_FORMAT_NONE if there is none.

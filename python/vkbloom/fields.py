@@ -172,9 +172,9 @@ def flag_field(name: str, **declared: Any) -> Any:
     return dataclasses.field(default=bool(_core.VALUES[name][0]), metadata=declared)
 
 
-def choice_field(name: str, choices: tuple[Any, ...] = ()) -> Any:
+def choice_field(name: str, choices: tuple[Any, ...] = (), **declared: Any) -> Any:
     """Declare a field whose value is one of the core's names, or of some; the first is default."""
-    declared = {"choices": choices} if choices else {}
+    declared |= {"choices": choices} if choices else {}
     return dataclasses.field(default=(choices or _core.CHOICES[name])[0], metadata=declared)
 
 

@@ -22,7 +22,7 @@ from vkbloom.methods.unreal import UnrealBloom
 from vkbloom.psf.aperture import aperture, iris
 from vkbloom.psf.eye import spencer
 from vkbloom.psf.lens import harvey_shack
-from vkbloom.psf.renderers import fog_glow, unreal
+from vkbloom.psf.renderers import unreal
 from vkbloom.suggestions import Named
 
 if TYPE_CHECKING:
@@ -113,7 +113,27 @@ PRESETS: Final[Mapping[str, Preset]] = {
     "blender_bloom": Preset(
         BlenderGlare(),
         "a wide, smooth glow of what is above 1",
-        "Blender 4.5, Glare node, Bloom, High",
+        "Blender 5.0, Glare node, Bloom, High",
+    ),
+    "blender_ghosts": Preset(
+        BlenderGlare(type="ghosts"),
+        "reflections in a lens of what is above 1",
+        "Blender 5.0, Glare node, Ghosts, High",
+    ),
+    "blender_streaks": Preset(
+        BlenderGlare(type="streaks"),
+        "stars of four streaks of what is above 1",
+        "Blender 5.0, Glare node, Streaks, High",
+    ),
+    "blender_simple_star": Preset(
+        BlenderGlare(type="simple_star"),
+        "small diagonal stars of what is above 1",
+        "Blender 5.0, Glare node, Simple Star, High",
+    ),
+    "blender_sun_beams": Preset(
+        BlenderGlare(type="sun_beams"),
+        "beams from the centre of what is above 1",
+        "Blender 5.0, Glare node, Sun Beams, High",
     ),
     "pygfx": Preset(
         PygfxBloom(),
@@ -126,9 +146,9 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "Spencer et al., SIGGRAPH 1995",
     ),
     "blender_fog_glow": Preset(
-        Convolution(fog_glow(256), threshold=1.0),
+        BlenderGlare(type="fog_glow"),
         "a fog around what is above 1",
-        "Blender 4.3, Glare node, Fog Glow",
+        "Blender 5.0, Glare node, Fog Glow, High",
     ),
     # Not normalized, because the sums of the channels are the kernel's tint.
     "unreal_convolution": Preset(

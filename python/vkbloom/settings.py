@@ -29,7 +29,9 @@ Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
 Encoding = Literal["none", "gamma22", "srgb", "pq", "hlg"]
 Alpha = Literal["keep", "max", "blur"]
-BloomFormat = Literal["rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"]
+BloomFormat = Literal[
+    "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat", "rgba8unorm-srgb"
+]
 
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 BLOOM_FORMATS: tuple[BloomFormat, ...] = get_args(BloomFormat)
@@ -97,13 +99,17 @@ class Settings(Record):
     bloom_scale : float
         The same as a fraction of the frame, 0.001 to 4, if `bloom_size` is None. Sides are rounded
         down, but at least 1. A forward scene with neither (a scale of 1) has 256 x 256.
-    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"} or None
-        Format of the bloom buffers. None: "rgba8unorm" for forward scenes and uint8 images,
+    format : str or None
+        Format of the bloom buffers, "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat" or
+        "rgba8unorm-srgb". None: "rgba8unorm" for forward scenes and uint8 images,
         "rgba16float" for deferred scenes, the image's own for float images. "rg11b10ufloat" has 6
         bits of mantissa, 5 for blue, and no negative values. Stored values are rounded to the
         nearest one; negative values and NaN become 0; values above 65024 (64512 for blue) become
         this limit. Its arrays are float32. Published methods store only their levels in it:
         ``glow`` and ``bloom``, which are the frame before and after in an engine, are not rounded.
+        "rgba8unorm-srgb" has 8-bit levels of sRGB: values are clamped to 0..1, encoded and rounded
+        when they are stored, and decoded when they are read. Its arrays are float32 light.
+        Published methods do not round their ``bloom`` to it.
     glare : sequence of Glare, or a name of `vkbloom.glares`
         Up to 5 stages, such as `Streaks`, that read what glows and add light to the bloom. Each has
         a framebuffer of its name, with a number if there are several of a kind. In ``final``,

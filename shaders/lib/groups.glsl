@@ -19,9 +19,11 @@ vec4[5] group_means(Taps taps)
                   0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
 }
 
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+
 float group_luminance(vec4 value)
 {
-    return max(dot(value.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
+    return max(dot(value.rgb, LUMINANCE), 0.0);
 }
 
 float brightest_channel(vec4 value)
@@ -45,18 +47,26 @@ vec4 pyramid_groups(Taps taps)
     return sum / shares;
 }
 
+// What is not finite is 0.
+vec4 usual(vec4 value)
+{
+    return mix(vec4(0.0), value,
+               notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u)));
+}
+
+// pygfx' weights of negative luminances are above 1, and beyond -1 negative. What is not finite is 0.
 vec4 pygfx_groups(Taps taps)
 {
     vec4 means[5] = group_means(taps);
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     [[unroll]] for (int group = 0; group < 5; ++group) {
-        float luminance = group_luminance(means[group]);
+        float luminance = dot(means[group].rgb, LUMINANCE);
         float share = GROUPS == GROUPS_PYGFX_KARIS ? 1.0 / (1.0 + luminance) : GROUP_SHARES[group];
         sum += share * means[group];
         shares += share;
     }
-    return max(sum / shares, vec4(0.0));
+    return max(usual(sum / shares), vec4(0.0));
 }
 
 // A tap multiplied by its weight, and the weight.
@@ -67,7 +77,7 @@ struct Weighted {
 
 Weighted weighted(vec4 value)
 {
-    float weight = 1.0 / (1.0 + brightest_channel(value));
+    float weight = 1.0 / (1.0 + max(value.r, max(value.g, value.b)));
     return Weighted(weight * value, weight);
 }
 
@@ -76,7 +86,8 @@ vec4 mean(Weighted a, Weighted b, Weighted c, Weighted d)
     return (a.value + b.value + c.value + d.value) / (a.weight + b.weight + c.weight + d.weight);
 }
 
-// Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 4.5).
+// Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
+// between texels with negative channels may have a negative brightness.
 vec4 blender_groups(Taps taps)
 {
     Weighted a = weighted(taps.outer[0]), b = weighted(taps.outer[1]), c = weighted(taps.outer[2]);
@@ -85,7 +96,7 @@ vec4 blender_groups(Taps taps)
     vec4 inner = mean(weighted(taps.inner[0]), weighted(taps.inner[1]), weighted(taps.inner[2]),
                       weighted(taps.inner[3]));
     vec4 outer = mean(a, b, d, e) + mean(b, c, e, f) + mean(d, e, g, h) + mean(e, f, h, i);
-    return 0.5 * inner + 0.125 * outer;
+    return usual(0.5 * inner + 0.125 * outer);
 }
 
 // A box of 4 x 4 texels as four taps. The firefly filter weights them by brightness and renormalizes

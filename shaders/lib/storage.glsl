@@ -33,6 +33,8 @@ vec3 storable(vec3 value)
 #else
     if (STORED == STORED_UFLOAT)
         return nearest_ufloat(value);
+    if (STORED == STORED_SRGB8)
+        return nearest_srgb(value);
     // The device converts it back, so the error of one bit does not matter.
     if (STORED == STORED_UNORM8)
         return nearest_level(value) * (1.0 / 255.0);
@@ -40,10 +42,14 @@ vec3 storable(vec3 value)
 #endif
 }
 
-// A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
+// A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour. sRGB has a linear
+// alpha.
 vec4 stored(vec4 value)
 {
-    return vec4(storable(value.rgb), ALPHA == ALPHA_BLUR ? storable(value.aaa).r : 1.0);
+    if (ALPHA != ALPHA_BLUR)
+        return vec4(storable(value.rgb), 1.0);
+    float alpha = STORED == STORED_SRGB8 ? nearest_level(value.aaa).r / 255.0 : storable(value.aaa).r;
+    return vec4(storable(value.rgb), alpha);
 }
 
 // The value that an image of that format returns after a store. Fused passes use it, so that their
@@ -56,6 +62,8 @@ vec3 as_stored(vec3 value, int format)
         return nearest_half(value);
     if (format == STORED_UFLOAT)
         return nearest_ufloat(value);
+    if (format == STORED_SRGB8)
+        return nearest_srgb(value);
     return limited(value, SINGLE_LIMIT);
 }
 

@@ -1,6 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Ghosts: the source scaled about its centre, added up with tints (Chapman, "Pseudo Lens Flare", 2013).
+// Ghosts: the source scaled about its centre, added up with tints (Chapman, "Pseudo Lens Flare", 2013),
+// and added to others.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -9,7 +10,9 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 #include "lib/glare.glsl"
 #include "lib/flare.glsl"
 
-#define TARGET_BINDING 2
+layout(set = 0, binding = 2) uniform sampler2D before;
+
+#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 // Falls towards the border of what a ghost shows.
@@ -31,5 +34,6 @@ vec4 shade()
     }
     vec2 corner = 2.0 * place / size;
     float squared = dot(corner, corner);
-    return stored(mix(1.0, min(squared * squared, 1.0), params.vignette) * sum);
+    sum *= mix(1.0, min(squared * squared, 1.0), params.vignette);
+    return stored(ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) + sum : sum);
 }

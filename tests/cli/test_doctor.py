@@ -45,10 +45,15 @@ def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
     return ended.returncode, answer, [Finding(**entry) for entry in answer["findings"]]
 
 
+def manifests() -> list[Finding]:
+    """Return the findings about the manifests that the loader reads."""
+    return drivers.examine(child.ask("adapters", environment=drivers.LOG).messages)
+
+
 @pytest.fixture(scope="module")
 def lavapipe() -> Path:
     """Return the manifest of lavapipe."""
-    for finding in drivers.examine(None):
+    for finding in manifests():
         if finding.topic.startswith("driver lvp"):
             return Path(finding.found.partition(":")[0])
     pytest.skip("no manifest of lavapipe is here")
@@ -276,28 +281,24 @@ def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> Non
         (b'{"ICD": {"library_path": "libc.so.6"}}', "undefined symbol: vk_icdGetInstanceProcAddr"),
     ],
 )
-def test_a_manifest_that_does_not_work(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes, reason: str
+def test_manifest_that_does_not_work_is_a_problem(
+    tmp_path: Path, content: bytes, reason: str
 ) -> None:
     manifest = tmp_path / "driver.json"
     manifest.write_bytes(content.replace(b"TMP", bytes(tmp_path)))
-    monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
-    finding = by_topic(drivers.examine(None), "driver driver.json")
-    assert finding.status == "problem"
+    finding = drivers.manifest(manifest)
+    assert (finding.topic, finding.status) == ("driver driver.json", "problem")
     assert finding.found.startswith(str(manifest))
     assert reason.replace("{tmp}", str(tmp_path)) in finding.found
 
 
 @linux_only
-def test_a_manifest_of_another_architecture(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_manifest_of_another_architecture_is_a_note(tmp_path: Path) -> None:
     manifest = tmp_path / "driver.json"
     bits = 32 if sys.maxsize > 2**32 else 64
     library = {"library_path": str(tmp_path / "none.so"), "library_arch": str(bits)}
     manifest.write_text(json.dumps({"ICD": library}))
-    monkeypatch.setenv("VK_DRIVER_FILES", str(manifest))
-    finding = by_topic(drivers.examine(None), "driver driver.json")
+    finding = drivers.manifest(manifest)
     assert finding.status == "note"
     assert f"for {bits}-bit programs" in finding.found
 
@@ -310,8 +311,10 @@ def test_a_folder_of_manifests(
     (tmp_path / "a.json").symlink_to(lavapipe)
     (tmp_path / "readme.txt").touch()
     monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path))
-    found = [(finding.topic, finding.status) for finding in drivers.examine(None)]
-    assert found == [("drivers", "note"), ("driver a.json", "ok"), ("driver b.json", "problem")]
+    first, *found = [(finding.topic, finding.status) for finding in manifests()]
+    assert first == ("drivers", "note")
+    # In the loader's order, which is that of the file system.
+    assert sorted(found) == [("driver a.json", "ok"), ("driver b.json", "problem")]
 
 
 @linux_only
@@ -327,52 +330,64 @@ def test_the_search_follows_the_loaders_order(
     added = tmp_path / "added.json"
     added.write_text("{")
     monkeypatch.setenv("VK_ADD_DRIVER_FILES", str(added))
-    topics = [finding.topic for finding in drivers.examine(None)]
+    topics = [finding.topic for finding in manifests()]
     ours = [topic for topic in topics if topic.startswith(("driver XDG", "driver added"))]
     assert ours == ["driver added.json", *(f"driver {name}.json" for name in names)]
 
     monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "absent.json"))
-    assert [finding.topic for finding in drivers.examine(None)] == ["drivers", "driver absent.json"]
+    assert [finding.topic for finding in manifests()] == ["drivers", "driver absent.json"]
+
+
+def log_of(*lines: str) -> list[str]:
+    """Return a log of the loader, of which only the part on drivers counts."""
+    return [
+        "LAYER:            Searching for layer manifest files",
+        "LAYER:               In following locations:",
+        "LAYER:                  /layers",
+        "DRIVER:           Searching for driver manifest files",
+        *(f"DRIVER:               {line}" for line in lines),
+        "DRIVER:           Found ICD manifest file /none.json, version 1.0.0",
+    ]
 
 
 @linux_only
-def test_missing_manifests_are_a_problem(
-    monkeypatch: pytest.MonkeyPatch, without_variables: None, tmp_path: Path
-) -> None:
-    folder = tmp_path / "icd.d"
-    monkeypatch.setattr(drivers, "_standard_folders", lambda: [folder])
-    (finding,) = drivers.examine(None)
+def test_missing_manifests_are_a_problem(without_variables: None) -> None:
+    log = log_of("In following locations:", "/a/icd.d", "/b/icd.d", "Found no files")
+    (finding,) = drivers.examine(log)
     assert finding.status == "problem"
-    assert str(folder) in finding.found
+    assert finding.found.endswith("was found in /a/icd.d, /b/icd.d")
     assert "apt install mesa-vulkan-drivers" in finding.advice
 
 
 @linux_only
-def test_an_empty_variable_hides_every_driver(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VK_DRIVER_FILES", "")
-    (finding,) = drivers.examine(None)
-    assert finding.status == "problem"
-    assert finding.advice.startswith("Unset VK_DRIVER_FILES")
-    status, _, _ = examined(VK_DRIVER_FILES="")
-    assert status == 1
+def test_log_without_a_search_is_a_note(without_variables: None) -> None:
+    assert [finding.status for finding in drivers.examine([])] == ["note"]
 
 
 @linux_only
-@pytest.mark.parametrize(("version", "knows"), [((1, 3, 204), False), ((1, 3, 207), True)])
-def test_an_old_loader_knows_the_old_variable_only(
-    monkeypatch: pytest.MonkeyPatch,
-    without_variables: None,
-    tmp_path: Path,
-    version: tuple[int, ...],
-    knows: bool,
+def test_empty_variable_hides_every_driver() -> None:
+    status, _, findings = examined(VK_DRIVER_FILES="")
+    assert status == 1
+    finding = by_topic(findings, "drivers")
+    assert finding.status == "problem"
+    assert finding.advice.startswith("Unset VK_DRIVER_FILES")
+
+
+@linux_only
+@pytest.mark.parametrize("known", ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"])
+def test_variable_that_an_old_loader_ignores_is_a_note(
+    monkeypatch: pytest.MonkeyPatch, without_variables: None, known: str
 ) -> None:
-    monkeypatch.setenv("VK_DRIVER_FILES", str(tmp_path / "new.json"))
-    monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "old.json"))
-    findings = drivers.examine(version)
-    topics = {finding.topic for finding in findings}
-    assert ("driver new.json" in topics, "driver old.json" in topics) == (knows, not knows)
+    monkeypatch.setenv("VK_DRIVER_FILES", "/VK_DRIVER_FILES.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/VK_ICD_FILENAMES.json")
+    file = f"/{known}.json"
+    findings = drivers.examine(
+        log_of("In following locations:", file, "Found the following files:", file)
+    )
+    assert findings[0].found.startswith(f"{known} is set: the loader uses its 1 manifest")
+    assert findings[-1].topic == f"driver {known}.json"
     advice = {finding.advice for finding in findings}
-    assert ("Set VK_ICD_FILENAMES to the same value." in advice) == (not knows)
+    assert ("Set VK_ICD_FILENAMES to the same value." in advice) == (known != "VK_DRIVER_FILES")
 
 
 # Processes of their own

@@ -63,7 +63,7 @@ class TestControls:
             defaults = METHODS[name]().to_dict()
             without = set(defaults) - set(fields)
             refused = {
-                "blender": {"knee"},
+                "blender": {"knee", "tint", "sun_position", "kernel"},
                 "convolution": {"psf", "kernel_size", "pixels_per_degree"},
                 "filament": {"knee"},
                 "godot": {"knee", "level_weights"},

@@ -50,6 +50,26 @@ class TestTranslate:
         )
         assert found.settings.threshold == pytest.approx(2.5, rel=0.01)
 
+    def test_a_function_such_as_a_program(self, renderer: Renderer) -> None:
+        """What it makes of the picture is the target: there is nothing else to know of it."""
+        seen = []
+
+        def bloom(image: Any) -> Any:
+            seen.append(image.shape)
+            return reference.apply(image, Separable(blur_scale=1.8, intensity=0.4))["final"]
+
+        found = vkbloom.translate(bloom, Separable(), size=SIZE, renderer=renderer, max_calls=120)
+        assert seen == [(64, 96, 3)]
+        assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
+        assert found.loss < 0.02
+        image, start = lights(SIZE), Separable(blur_scale=1.8)
+        of_fit = vkbloom.fit(image, bloom, start, ["intensity"], renderer=renderer)
+        assert of_fit.settings.intensity == pytest.approx(0.4, rel=1e-3)
+        with pytest.raises(TypeError, match="image: a callable target needs an array"):
+            vkbloom.fit(
+                renderer.upload(image), bloom, DualKawase(), ["intensity"], renderer=renderer
+            )
+
     def test_picture(self) -> None:
         image = lights((320, 180))
         assert sorted(set(image.ravel().tolist())) == [0, 0.5, 1.5, 6, 40]

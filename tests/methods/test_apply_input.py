@@ -147,28 +147,6 @@ def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
             assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
-def test_change_of_a_setting_runs_only_dependent_passes(renderer: Renderer) -> None:
-    image = picture(31, 20, 3, "float32", seed=3)
-    whole = set(renderer.apply(image, Separable()).timings)
-    last = set(renderer.apply(image, Separable(exposure=1.0)).timings)
-    assert len(last) == 1
-    blurs = set(renderer.apply(image, Separable(blur_scale=2.0)).timings)
-    assert last < blurs < whole
-    assert not any("glow" in name for name in blurs)
-    assert any("glow" in name for name in whole)
-
-
-def test_passes_of_unrequested_framebuffers_do_not_run(renderer: Renderer) -> None:
-    image = picture(31, 20, 3, "float32", seed=4)
-    frames = renderer.apply(image, Separable(), attachments=("glow",))
-    assert list(frames) == ["glow"]
-    assert len(frames.timings) == 1
-    # The rest is made when it is asked for.
-    whole = renderer.apply(image, Separable())
-    assert_matches_reference(whole, image, Separable())
-    assert "glow" not in whole.timings
-
-
 # --- NaN and infinity ---
 
 

@@ -128,7 +128,7 @@ def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, engine_frames: Path) ->
     image, expected, stride = read_frame(engine_frames, COARSE)
     settings = BevyBloom(format="rg11b10ufloat")
     height, width, _ = image.shape
-    source = BlurInput(image.astype(np.float64), (width, height), Cut(0, 65024, True))
+    source = BlurInput(image.astype(np.float64), (width, height), Cut(0, 65024, "rg11b10"))
     levels = bevy.passes(source, settings)
     cut = relative(every(levels["bloom"], stride), expected)
     assert np.median(cut) < 1e-6

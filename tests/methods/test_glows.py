@@ -190,10 +190,10 @@ def test_blenders_threshold_by_hand(
     """The brightest channel is changed, the others in proportion."""
     image = np.full((4, 5, 3), value, np.float32) * np.array([0.5, 1.0, 0.25], np.float32)
     glare = BlenderGlare(format="rgba32float", **settings)
-    down = renderer.apply(image, glare)["down_0"][..., :3]
+    down = renderer.apply(image, glare)["glow"][..., :3]
     expected = kept * np.array([0.5, 1.0, 0.25])
     assert_allclose(down, np.broadcast_to(expected, down.shape), rtol=1e-5, atol=1e-6)
-    of_reference = reference.apply(image, glare)["down_0"][..., :3]
+    of_reference = reference.apply(image, glare)["glow"][..., :3]
     assert_allclose(of_reference, np.broadcast_to(expected, down.shape), rtol=1e-6, atol=1e-12)
 
 
@@ -211,8 +211,9 @@ def test_blenders_levels(
     renderer: Renderer, frame: tuple[int, int], size: float, levels: int
 ) -> None:
     frames = renderer.apply(lights(frame), BlenderGlare(size=size))
-    assert sum(name.startswith("down") for name in frames) == levels
-    assert frames["down_0"].shape[:2] == frame[::-1]
+    # The glow is the first.
+    assert 1 + sum(name.startswith("down") for name in frames) == levels
+    assert frames["glow"].shape[:2] == frame[::-1]
 
 
 def test_blenders_bloom_in_buffers_of_another_size(renderer: Renderer) -> None:

@@ -80,48 +80,6 @@ def test_reference_tone_mapped(renderer: Renderer, photo: Image, tonemap: Any) -
     assert_close("final", frames["final"], expected, tolerance(photo.dtype, expected))
 
 
-def displacement(image: Array, other: Array) -> Array:
-    """Return (y, x) from one grey image to another: of the peak of their cross-correlation."""
-    # Twice the size, so that what leaves the picture does not come in on the other side.
-    sizes = [2 * side for side in image.shape]
-    spectrum = np.conj(np.fft.rfft2(image, sizes)) * np.fft.rfft2(other, sizes)
-    correlation = np.fft.fftshift(np.fft.irfft2(spectrum, sizes))
-    y, x = map(int, np.unravel_index(int(correlation.argmax()), correlation.shape))
-    lines = (correlation[y - 1 : y + 2, x], correlation[y, x - 1 : x + 2])
-    # The top of the parabola through the peak and its neighbours.
-    parts = [(low - high) / (2 * (low - 2 * top + high)) for low, top, high in lines]
-    place: Array = np.array([y - sizes[0] // 2, x - sizes[1] // 2]) + parts
-    return place
-
-
-# Pixels. Dual Kawase halves by means of 2 x 2, so that a point goes to the middle of its square,
-# and leaves out a strip of odd sides: the formulas themselves move the lamps of the desk, a few
-# pixels wide, by a third of a pixel where a texel of the smallest level is 16 wide.
-SHIFTS = {"dual-kawase": 0.5}
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_no_shift(renderer: Renderer, photo: Image, method: str) -> None:
-    frames = apply(renderer, np.maximum(photo, 0), METHODS[method])
-    glow, bloom = frames["glow"].sum(axis=-1), frames["bloom"].sum(axis=-1)
-    # Each texel of a smaller bloom buffer as the square of pixels that it covers.
-    side = bloom.shape[0] // glow.shape[0]
-    moved = displacement(glow.repeat(side, axis=0).repeat(side, axis=1), bloom)
-    assert np.abs(moved).max() < SHIFTS.get(method, 0.1)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_no_ringing(renderer: Renderer, photo: Image, method: str) -> None:
-    """Nothing is darker for the bloom beside it, nor brighter than the gain allows."""
-    image = np.maximum(photo, 0)
-    frames = apply(renderer, image, METHODS[method])
-    gain = reference.gain(METHODS[method].replace(threshold=None))
-    for name, framebuffer in frames.items():
-        assert framebuffer.min() >= 0, name
-    assert frames["bloom"].max() <= gain * frames["glow"].max() * (1 + 1e-5)
-    assert (frames["final"] >= image[..., :3]).all()
-
-
 # Of a chain's small level, the texels beyond the edge are the edge's, and so a mirror of them.
 @pytest.mark.parametrize(
     ("method", "beyond"),

@@ -59,17 +59,6 @@ def test_gain_includes_the_threshold() -> None:
     assert reference.gain(Pyramid(threshold=0.25, knee=0.5)) == pytest.approx(0.75, rel=1e-12)
 
 
-@pytest.mark.parametrize("settings", [*METHODS, FIREFLY])
-def test_a_flat_image_is_multiplied_by_the_gain(settings: Any) -> None:
-    expected = 0.3 * reference.gain(settings)
-    for framebuffer in (
-        reference.blur(flat(0.3), settings),
-        reference.blur(flat(0.3), settings, (23, 9)),
-        reference.apply(flat(0.3), settings)["bloom"][..., :3],
-    ):
-        assert_close(framebuffer, expected)
-
-
 def test_impulse_response_of_the_tutorial() -> None:
     bloom = reference.blur(impulse(11, 11, 5, 5), Separable())[..., 0]
     profile = [0.227027, *(1.5 * w for w in (0.1945946, 0.1216216, 0.054054, 0.016216)), 0]

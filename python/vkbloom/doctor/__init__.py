@@ -51,8 +51,7 @@ def examine() -> Report:
     Takes some seconds. The test render adds to the pipeline cache, as every render does.
     """
     loader = child.ask("loader")
-    version, layers = _facts(loader)
-    listed = child.ask("adapters", environment={"VK_LOADER_DEBUG": "error,warn"})
+    listed = child.ask("adapters", environment=drivers.LOG)
     adapters: list[Mapping[str, Any]] = [] if listed.value is None else listed.value["adapters"]
 
     chosen = child.ask("render", "auto", "plain")
@@ -61,7 +60,7 @@ def examine() -> Report:
         if adapter["name"] not in renders:
             renders[adapter["name"]] = child.ask("render", adapter["name"], "plain")
     working = [name for name, answer in renders.items() if answer.value is not None]
-    foundation = [_loader(loader), *drivers.examine(version)]
+    foundation = [_loader(loader), *drivers.examine(listed.messages)]
     if any(adapter["bundled"] for adapter in adapters):
         # The bundled driver needs neither loader nor manifest.
         foundation = [
@@ -79,7 +78,7 @@ def examine() -> Report:
         *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
         *([_chosen(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
-        *_validation(layers, working[0] if working else None),
+        *_validation(loader.value and loader.value["layers"], working[0] if working else None),
         installation.cache([adapter["driver_uuid"] for adapter in adapters]),
         *installation.extras(),
     ]
@@ -87,13 +86,6 @@ def examine() -> Report:
         answer.value is not None and not answer.value["differences"] for answer in renders.values()
     )
     return Report(tuple(findings), can_render)
-
-
-def _facts(loader: child.Answer) -> tuple[tuple[int, ...] | None, Mapping[str, str] | None]:
-    """Return the loader's version and layers; None if they are not known."""
-    if loader.value is None:
-        return None, None
-    return tuple(map(int, loader.value["version"].split("."))), loader.value["layers"]
 
 
 def _loader(loader: child.Answer) -> Finding:
@@ -119,9 +111,8 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
         ]
         return Finding("adapters", "ok", ", ".join(names))
     reason = listed.failure or "no driver has a device with Vulkan 1.1"
-    said = (
-        f"; the loader says: {' / '.join(listed.messages[:_MESSAGES])}" if listed.messages else ""
-    )
+    messages = drivers.complaints(listed.messages)
+    said = f"; the loader says: {' / '.join(messages[:_MESSAGES])}" if messages else ""
     return Finding(
         "adapters",
         "problem",

@@ -1,153 +1,115 @@
-"""Find the driver manifests that the Vulkan loader reads, and check whether their libraries open.
+"""Check the driver manifests that the Vulkan loader reads: its log tells where it searches.
 
-Sources: the Vulkan loader's documentation: LoaderDriverInterface.md for the search order and the
-manifests, LoaderInterfaceArchitecture.md for the environment variables.
+Sources: the Vulkan loader's documentation: LoaderDebugging.md for the log, and
+LoaderDriverInterface.md for manifests and environment variables.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from vkbloom.doctor import child
 from vkbloom.doctor.finding import Finding
 
+#: The environment in which the loader writes its log to standard error.
+LOG: Final = {"VK_LOADER_DEBUG": "all"}
 INSTALL_DRIVER: Final = (
     "Install lavapipe, which runs on any CPU (the package vkbloom-lavapipe, or Debian, Ubuntu: apt "
     "install mesa-vulkan-drivers; Fedora: dnf install mesa-vulkan-drivers; Arch: pacman -S "
     "vulkan-swrast), or the Vulkan driver of the GPU's vendor."
 )
-# First loader version that reads VK_DRIVER_FILES; earlier ones read VK_ICD_FILENAMES only.
-_FIRST_WITH_DRIVER_FILES: Final = (1, 3, 207)
-_FOLDER: Final = "vulkan/icd.d"
+# Either replaces the standard folders; older loaders know only the second one.
+_REPLACING: Final = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
+_LOCATIONS: Final = "In following locations:"
+_FILES: Final = "Found the following files:"
 
 
-@dataclass(frozen=True)
-class _Listed:
-    """A manifest, and the folder or variable in which the loader finds it."""
-
-    path: Path
-    origin: str
+def complaints(messages: Sequence[str]) -> list[str]:
+    """Return what processes said besides the information in the loader's log."""
+    return [one for one in messages if not re.match(r"(INFO|DEBUG|DRIVER|LAYER|PERF)\b", one)]
 
 
-def _split(value: str) -> list[Path]:
-    return [Path(part) for part in value.split(os.pathsep) if part]
+def _searched(log: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return where the loader searched for manifests of drivers, and the files that it found."""
+    found: dict[str, dict[str, None]] = {_LOCATIONS: {}, _FILES: {}}
+    is_of_drivers, part = False, ""
+    for line in log:
+        kind, _, text = line.partition(":")
+        text = text.strip()
+        if text.startswith("Searching for ") and text.endswith("manifest files"):
+            is_of_drivers, part = "driver" in text, ""
+        elif text in found:
+            part = text
+        elif kind != "DRIVER" or text.startswith("Found "):
+            part = ""
+        elif is_of_drivers and part:
+            found[part][text] = None
+    return list(found[_LOCATIONS]), list(found[_FILES])
 
 
-def _set_to(variable: str, default: str) -> list[Path]:
-    """Return the paths of an environment variable, or the default if it is empty or not set."""
-    return _split(os.environ.get(variable) or default)
-
-
-def _standard_folders() -> list[Path]:
-    home = os.path.expanduser("~")
-    bases = [
-        *_set_to("XDG_CONFIG_HOME", f"{home}/.config"),
-        *_set_to("XDG_CONFIG_DIRS", "/etc/xdg"),
-        # The usual values of SYSCONFDIR and EXTRASYSCONFDIR in loader builds.
-        Path("/usr/local/etc"),
-        Path("/etc"),
-        *_set_to("XDG_DATA_HOME", f"{home}/.local/share"),
-        *_set_to("XDG_DATA_DIRS", "/usr/local/share:/usr/share"),
-    ]
-    return list(dict.fromkeys(base / _FOLDER for base in bases))
-
-
-def _replacing_variable(loader_version: tuple[int, ...] | None) -> str | None:
-    """Return the name of the set variable that replaces the standard folders, or None."""
-    knows_new_name = loader_version is None or loader_version >= _FIRST_WITH_DRIVER_FILES
-    if knows_new_name and "VK_DRIVER_FILES" in os.environ:
-        return "VK_DRIVER_FILES"
-    return "VK_ICD_FILENAMES" if "VK_ICD_FILENAMES" in os.environ else None
-
-
-def _from_variable(name: str) -> Iterator[_Listed]:
-    """List the manifests of a variable, which may name files and folders of manifests."""
-    for path in _split(os.environ.get(name, "")):
-        manifests = _manifests(path)
-        yield from (_Listed(manifest, name) for manifest in manifests or [path])
-
-
-def _manifests(folder: Path) -> list[Path]:
-    try:
-        return sorted(path for path in folder.iterdir() if path.suffix == ".json")
-    except OSError:
-        return []
-
-
-def _listed(replacing: str | None) -> list[_Listed]:
-    if replacing is not None:
-        return list(_from_variable(replacing))
-    return [
-        *_from_variable("VK_ADD_DRIVER_FILES"),
-        *(
-            _Listed(manifest, str(folder))
-            for folder in _standard_folders()
-            for manifest in _manifests(folder)
-        ),
-    ]
-
-
-def examine(loader_version: tuple[int, ...] | None) -> list[Finding]:
-    """Examine every driver manifest, in the loader's order."""
+def examine(log: Sequence[str]) -> list[Finding]:
+    """Examine every driver manifest that the loader's log names, in its order."""
     if sys.platform == "win32":
         return [
             Finding("drivers", "note", "not examined: on Windows the registry lists the drivers")
         ]
-    replacing = _replacing_variable(loader_version)
-    listed = _listed(replacing)
-    findings = [_search(replacing, listed)]
-    if "VK_DRIVER_FILES" in os.environ and replacing != "VK_DRIVER_FILES":
-        version = ".".join(map(str, loader_version or ()))
+    locations, files = _searched(log)
+    replacing = None
+    for name in _REPLACING:
+        named = os.environ.get(name, "").split(os.pathsep)
+        if name in os.environ and log and set(locations) <= set(named):
+            replacing = name
+            break
+    findings = [_search(replacing, locations, files)]
+    if "VK_DRIVER_FILES" in os.environ and locations and replacing != "VK_DRIVER_FILES":
         findings.append(
             Finding(
                 "drivers",
                 "note",
-                f"VK_DRIVER_FILES is set, but the loader {version} ignores it",
+                "VK_DRIVER_FILES is set, but this loader ignores it",
                 "Set VK_ICD_FILENAMES to the same value.",
             )
         )
-    return findings + [_manifest(entry) for entry in listed]
+    return findings + [manifest(Path(file), replacing) for file in files]
 
 
-def _search(replacing: str | None, listed: list[_Listed]) -> Finding:
-    count = f"{len(listed)} manifest" + ("" if len(listed) == 1 else "s")
-    if replacing is None:
-        folders = list(map(str, _standard_folders()))
-        if "VK_ADD_DRIVER_FILES" in os.environ:
-            folders.insert(0, "VK_ADD_DRIVER_FILES")
-        if listed:
-            origins = dict.fromkeys(entry.origin for entry in listed)
-            return Finding("drivers", "ok", f"{count} in {', '.join(origins)}")
-        return Finding(
-            "drivers",
-            "problem",
-            f"no manifest of a Vulkan driver was found in {', '.join(folders)}",
-            INSTALL_DRIVER,
-        )
-    value = os.environ[replacing]
-    if listed:
+def _search(replacing: str | None, locations: list[str], files: list[str]) -> Finding:
+    count = f"{len(files)} manifest" + ("" if len(files) == 1 else "s")
+    if replacing and files:
         return Finding(
             "drivers",
             "note",
             f"{replacing} is set: the loader uses its {count} and no other driver",
         )
+    if replacing:
+        return Finding(
+            "drivers",
+            "problem",
+            f"{replacing} is {os.environ[replacing]!r}: the loader finds no driver there and "
+            "searches nowhere else",
+            f"Unset {replacing}, or set it to the full path of a driver's manifest.",
+        )
+    if files:
+        folders = dict.fromkeys(str(Path(file).parent) for file in files)
+        return Finding("drivers", "ok", f"{count} in {', '.join(folders)}")
+    if not locations:
+        return Finding("drivers", "note", "the loader's log does not tell where it searches")
     return Finding(
         "drivers",
         "problem",
-        f"{replacing} is {value!r}: the loader finds no driver there and searches nowhere else",
-        f"Unset {replacing}, or set it to the full path of a driver's manifest.",
+        f"no manifest of a Vulkan driver was found in {', '.join(locations)}",
+        INSTALL_DRIVER,
     )
 
 
-def _manifest(entry: _Listed) -> Finding:
-    """Examine one manifest."""
-    path = entry.path
+def manifest(path: Path, origin: str | None = None) -> Finding:
+    """Examine one manifest; `origin`: the environment variable that names it."""
     topic = f"driver {path.name}"
     try:
         library, arch = _read(path)
@@ -155,7 +117,7 @@ def _manifest(entry: _Listed) -> Finding:
         return Finding(
             topic,
             "problem",
-            f"{path}, from {entry.origin}, cannot be read: {error.strerror}",
+            f"{path}, from {origin or path.parent}, cannot be read: {error.strerror}",
             "Make the manifest readable, or remove it from there.",
         )
     except ValueError as error:

@@ -30,6 +30,7 @@ _EXTRAS: Final = {
     "cvvdp": "the reduction ColorVideoVDP",
     "notebook": "the explorer, in notebooks and as a web page",
     "pytest": "frame_regression in tests",
+    "torch": "bloom as an operator of PyTorch",
     "window": "vkbloom view, a window with live controls",
 }
 # Address space of a render of a small image on lavapipe, with the interpreter.

@@ -23,7 +23,10 @@ from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
 from vkbloom.sources import image_source
 
-__all__ = ["fit"]
+__all__ = ["Maker", "fit"]
+
+#: A function of an image, such as `vkbloom.testing.command` makes of a program.
+Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
 # Longer side of the image of the first search in pixels, and its share of the calls.
 _COARSE_SIDE: Final = 384
@@ -33,7 +36,7 @@ _COARSE_CALLS: Final = 0.6
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Settings,
     vary: Sequence[str],
     *,
@@ -47,7 +50,7 @@ def fit(
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Sequence[Settings],
     vary: Sequence[str],
     *,
@@ -60,7 +63,7 @@ def fit(
 ) -> list[FitResult]: ...
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any],
+    target: NDArray[Any] | Maker,
     settings: Settings | Sequence[Settings],
     vary: Sequence[str],
     *,
@@ -77,9 +80,10 @@ def fit(
     ----------
     image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
         As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
-    target : ndarray, shape (H, W, 3) or (H, W, 4)
+    target : ndarray, shape (H, W, 3) or (H, W, 4), or callable
         The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
-        Alpha is not compared.
+        Alpha is not compared. Of a callable, such as `vkbloom.testing.command` makes of a program,
+        what it makes of the image, which is then an array.
     settings : Settings or sequence of Settings
         Where the search starts, and the fields that stay as they are. Of several, such as presets
         of several engines, each is searched by itself.
@@ -167,8 +171,12 @@ def fit(
             raise ValueError(f"bounds: {name!r} is not among the varied fields {', '.join(names)}")
     if renderer is None and isinstance(image, Image):
         raise ValueError("renderer: an uploaded image needs the renderer that has it")
-    wanted = light(check_image(target, "target"))
     pixels = None if isinstance(image, Image) else check_image(image)
+    if callable(target):
+        if pixels is None:
+            raise TypeError("image: a callable target needs an array, not an uploaded image")
+        target = target(pixels)
+    wanted = light(check_image(target, "target"))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     spaces = [
         space_of(check_settings(one), names, bounds or {}, brightest, len(wanted))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_size
-from vkbloom.fits.fitting import fit
+from vkbloom.fits.fitting import Maker, fit
 from vkbloom.fits.losses import Loss
 from vkbloom.fits.result import FitResult
 from vkbloom.fits.space import Bounds
@@ -46,7 +46,7 @@ _LEAST_SIDE: Final = 3
 
 
 def translate(
-    settings: Settings,
+    settings: Settings | Maker,
     to: Settings | type[Settings],
     *,
     size: tuple[int, int] = (1920, 1080),
@@ -65,8 +65,9 @@ def translate(
 
     Parameters
     ----------
-    settings : Settings
-        The bloom to come close to.
+    settings : Settings or callable
+        The bloom to come close to; a callable takes an image and returns it with its bloom, as
+        those do that `vkbloom.testing.command` makes of programs.
     to : Settings or a class of them
         The other method: where the search starts, and its fields that do not vary.
     size : (int, int)
@@ -109,7 +110,8 @@ def translate(
     >>> type(found.settings).__name__, found.loss < found.start_loss
     ('Pyramid', True)
     """
-    check_settings(settings)
+    if not callable(settings):
+        check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
@@ -117,10 +119,9 @@ def translate(
     names = _knobs(start) if vary is None else vary
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
-        target = used.apply(image, _plain(settings), attachments=["final"])["final"]
         found = fit(
             image,
-            target,
+            settings if callable(settings) else _applied(used, image, settings),
             _plain(start),
             names,
             framebuffer="final",
@@ -132,6 +133,15 @@ def translate(
         )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
     return dataclasses.replace(found, settings=found.settings.replace(**look))
+
+
+def _applied(
+    renderer: Renderer, image: NDArray[np.float32], settings: Settings
+) -> NDArray[np.float32]:
+    final: NDArray[np.float32] = renderer.apply(image, _plain(settings), attachments=["final"])[
+        "final"
+    ]
+    return final
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:

@@ -19,14 +19,15 @@ from vkbloom.psf.resampling import box_resample
 from vkbloom.psf.sampled import samples
 from vkbloom.settings import Settings
 
-__all__ = ["Boundary", "Convolution", "PSFLike"]
+__all__ = ["Boundary", "Convolution", "PSFLike", "read_psf"]
 
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: The types of a kernel: a function, the result of its `to_dict`, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike
 
 
-def _read_psf(psf: Any) -> PSF:
+def read_psf(psf: Any) -> PSF:
+    """Return a point-spread function, also of a stored one or an array."""
     if isinstance(psf, PSF):
         return psf
     if isinstance(psf, Mapping):
@@ -101,7 +102,7 @@ class Convolution(Settings):
     method: ClassVar[str] = "convolution"
 
     psf: PSFLike = dataclasses.field(
-        default=spencer(), kw_only=False, metadata={"kind": "psf", "read": _read_psf}
+        default=spencer(), kw_only=False, metadata={"kind": "psf", "read": read_psf}
     )
     normalize: bool = True
     boundary: Boundary = choice_field("boundary")

@@ -20,7 +20,8 @@ class PygfxBloom(Settings):
     filter_radius : float
         Distance of the tent's taps as a share of the width, 0 to 1.
     karis_average : bool
-        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only.
+        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only. A
+        luminance may be negative; a mean that is not finite is 0.
     threshold : None
         pygfx has none.
     composite : {"mix"}
@@ -40,7 +41,10 @@ class PygfxBloom(Settings):
     the tent are `filter_radius` of the smaller level's width apart along both axes. ``bloom`` is
     one bilinear sample of up_0, the sum of the levels.
 
-    Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
+    The stock renderer's buffers have the format "rgba8unorm-srgb"; ``glow`` is then its frame.
+
+    Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c, confirmed by pygfx 0.17.0
+    (``docs/engines.md``).
 
     Examples
     --------

@@ -29,6 +29,7 @@ ROUNDING_NAMES: Final = (
     "half_size",
     "nearest_half",
     "nearest_level",
+    "nearest_srgb",
     "nearest_ufloat",
 )
 
@@ -46,6 +47,8 @@ void main()
         value = vec4(nearest_half(value.rgb), nearest_half(value.aaa).r);
     else if (vkb_stored == 4)
         value = vec4(nearest_ufloat(value.rgb), 1.0);
+    else if (vkb_stored == 5)
+        value = vec4(nearest_srgb(value.rgb), nearest_level(value.aaa).r / 255.0);
     vkb_colour = value;
 }
 """

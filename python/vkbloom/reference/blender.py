@@ -1,27 +1,28 @@
-"""The bloom of Blender's Glare node, in high quality.
+"""Blender's Glare node: highlights, bloom, and what all types end with.
 
-Formulas from the compositor of Blender 4.5, source/blender/nodes/composite/nodes/
+Formulas from the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
 node_composite_glare.cc (@ f92418fbe034: the same formulas).
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .image import BlurInput
+from .blender_lights import FACTORS, GAINS, LIGHTS
+from .image import BlurInput, Storage, finite, storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
-from .threshold import brightest, firefly_weight, masked
+from .threshold import brightest, masked
 from .upsampling import combine, linear, tent_of_target
 
 if TYPE_CHECKING:
     from vkbloom.methods.blender import BlenderGlare
 
-__all__ = ["gain", "passes"]
+__all__ = ["gain", "passes", "saturated"]
 
 # (x, y) in texels, and the share, of the 13 taps' five groups.
 _GROUPS = (
@@ -34,28 +35,100 @@ _GROUPS = (
 
 
 def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
-    """Return the framebuffers.
+    """Return the framebuffers: "glow" are the highlights, "bloom" the glare over the intensity.
 
-    There are n = max(1, floor(log2(size * shorter side))) levels. down_0 has the size of the
-    frame and contains its highlights. Each next level has half the size, by 13 taps. In the first
-    such step, the taps within each of their groups of four are weighted by
-    1 / (1 + brightest channel). up_k = down_k + tent(up_k+1) with a tent of one pixel of the
-    larger level; the bloom is up_0 / n.
+    The glare is made in the size of the highlights, whose sides are those of the frame, a half or a
+    quarter of them, rounded up. It is enlarged bilinearly. Its saturation is multiplied, with a
+    result of 0 to 1, then its channels by the tint.
     """
     height, width, _ = source.image.shape
+    factor = FACTORS[settings.quality]
+    reduced = _means(source.image, factor)
+    bright = source.store(masked(_highlights(reduced, settings), source.mask))
+    found = {"glow": bright}
+    if factor > 1:
+        found = {"highlights": bright, "glow": source.store(sample(bright, (width, height)))}
+    # 8 bits and few bits of mantissa hold too little of what spreads over hundreds of pixels.
+    exact = source.store.high > 65024
+    store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
+    images = _TYPES[settings.type](bright, settings, store, (width, height))
+    light = sample(images.pop("light"), source.size)
+    rgb = np.multiply(saturated(light[..., :3], settings.saturation), settings.tint)
+    alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
+    return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
+
+
+def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
+    """Return the bloom of a flat image of 1, for each channel: in the middle of a large one.
+
+    The saturation of a grey is 0. Streaks and ghosts have colours.
+    """
+    one = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    found = (
+        one * GAINS[settings.type](settings, size) if settings.type in GAINS else np.full(3, one)
+    )
+    tinted = saturated(found, settings.saturation) * np.array(settings.tint)
+    return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
+
+
+def saturated(rgb: Array, saturation: float) -> Array:
+    """Return colours whose saturation s = (max - min) / max is clamp(saturation s, 0, 1).
+
+    The largest channel does not change. Where it is not above 0, the others become equal to it.
+    """
+    most = rgb.max(axis=-1, keepdims=True)
+    least = rgb.min(axis=-1, keepdims=True)
+    above, spread = np.where(most > 0, most, 1.0), most - least
+    wanted = np.clip(saturation * spread / above, 0.0, 1.0)
+    scale = wanted * above / np.where(spread > 0, spread, 1.0)
+    result: Array = np.where(most > 0, most * (1 - wanted) + (rgb - least) * scale, most)
+    return result
+
+
+def _means(image: Array, factor: int) -> Array:
+    """Return the means of factor x factor pixels, rows from below, with the last ones repeated."""
+    for axis, length in enumerate(image.shape[:2]):
+        count = -(-length // factor)
+        places = np.minimum(np.arange(count * factor), length - 1)
+        if axis == 0:
+            places = (length - 1 - places)[::-1]
+        taps = image[places] if axis == 0 else image[:, places]
+        parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
+        image = sum(parts[1:], parts[0]) / factor
+    return image
+
+
+def _bloom(
+    bright: Array, settings: BlenderGlare, store: Storage, size: tuple[int, int]
+) -> dict[str, Array]:
+    """Return the levels, and their sum over their number.
+
+    There are n = max(1, floor(log2(size * shorter side))) levels, of which the highlights are the
+    first. Each next level has half the size, by 13 taps. In the first such step, the taps within
+    each of their groups of four are weighted by 1 / (1 + brightest channel).
+    up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level.
+    """
+    height, width, _ = bright.shape
     count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
-    downs = [source.store(masked(_highlights(source.image, settings), source.mask))]
+    downs = [bright]
     level = (width, height)
     for k in range(1, count):
         level = halved(level)
         shrink = _weighted_taps if k == 1 else downsample
-        downs.append(source.store(shrink(downs[-1], level)))
-    return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
+        downs.append(store(shrink(downs[-1], level)))
+    levels = combine(
+        downs,
+        BlurInput(bright, (width, height), store),
+        upsample=tent_of_target,
+        last=linear,
+        gain=1 / count,
+        end=lambda image: image,
+    )
+    del levels["down_0"]
+    return {**levels, "light": levels.pop("bloom")}
 
 
-def gain(settings: BlenderGlare, size: tuple[int, int]) -> float:
-    """Return the bloom of a flat image of 1: the threshold may change it, the levels do not."""
-    return float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
+_TYPES: dict[str, Any] = {"bloom": _bloom, **LIGHTS}
 
 
 def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
@@ -88,8 +161,11 @@ def _smooth_min(values: Array, end: float, width: float) -> Array:
 
 
 def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
-    result = np.zeros((size[1], size[0], image.shape[2]))
+    """Return the 13 taps of half the size; 0 where negative weights make it undefined."""
+    result: Any = 0.0
     for places, group_share in _GROUPS:
         taps = [sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)]) for x, y in places]
-        result += group_share * weighted_mean((firefly_weight(brightest(tap)), tap) for tap in taps)
-    return result
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = weighted_mean((1 / (1 + brightest(tap)), tap) for tap in taps)
+        result = result + group_share * mean
+    return finite(result)

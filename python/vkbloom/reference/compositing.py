@@ -61,7 +61,8 @@ def composite(
 
     With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" is s + (b - s) i, and
     "screen" is 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies by
-    2^e. `vkbloom.GodotBloom` has its own composites, with the exposure before them. Dither rounds
+    2^e. `vkbloom.GodotBloom` has its own composites, with the exposure before them, and
+    `vkbloom.BlenderGlare` has max(0, s) + i b. Dither rounds
     uint8 to floor(255 c + n) / 255, with c clamped to 0..1 and a noise n in 0..1. It does not
     change other types. All this applies to rgb. ``settings.alpha`` selects the result's alpha from
     the scene's alpha a: "keep" is a; "max" is max(a, clamp(max over rgb of i b, 0, 1)); "blur",
@@ -145,6 +146,8 @@ def composite_checked(
         if settings.method == "godot":
             # The glow was already exposed before the threshold.
             rgb = _godots(rgb * scale, glow, settings, curve, share)
+        elif settings.method == "blender":
+            rgb = curve((np.maximum(rgb, 0.0) + glow) * scale)
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
         alpha = _blend_alpha(alpha, light, settings.alpha)

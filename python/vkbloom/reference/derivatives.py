@@ -17,7 +17,9 @@ from .tape import Traced, gradients, value_of
 __all__ = ["DISCRETE", "Gradients", "check_cotangent", "differentiable", "vjp"]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
-DISCRETE: Final = frozenset({"anamorphism", "bloom_scale", "pixels_per_degree", "size"})
+DISCRETE: Final = frozenset(
+    {"anamorphism", "bloom_scale", "jitter", "pixels_per_degree", "size", "sun_position"}
+)
 
 
 class Gradients(dict[str, Array]):
@@ -166,7 +168,7 @@ class _TracedSettings:
                 _TracedSettings(stage, inputs, f"glare.{place}.")
                 for place, stage in enumerate(stages)
             )
-        if hasattr(settings, "kernel"):
+        if callable(getattr(settings, "kernel", None)):
             self._inputs = inputs
             self.kernel = self._kernel
 

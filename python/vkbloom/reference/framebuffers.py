@@ -59,8 +59,8 @@ def apply(
     colours (such as a clamp against overflow) do not apply to alpha.
 
     Every store to a bloom buffer clamps: to 0..1 in "rgba8unorm", to +-65504 in "rgba16float". Only
-    "rg11b10ufloat" also rounds to the steps of the format. Published methods use this format only
-    for their levels, so their "glow" and "bloom" are not rounded.
+    "rg11b10ufloat" and "rgba8unorm-srgb" also round to the steps of the format. Published methods
+    do not round their "bloom" to these, nor their "glow" to the former.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def framebuffers(
     channels = 4 if settings.alpha == "blur" else 3
     reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
     if settings.published:
-        glow = store.end(reduced)
+        glow = store.first(reduced)
     else:
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
     blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
@@ -206,7 +206,7 @@ def passes(
     size : (int, int), optional
         Width and height of the final image, at whose pixels the last pass is evaluated; by default
         those of the glow.
-    format : {"rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat"}, optional
+    format : str, optional
         Format of the bloom buffers; by default that of the settings, and if this is None, the one
         of the glow's dtype.
     mask : ndarray, shape (height, width), optional
@@ -246,7 +246,7 @@ def passes(
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
-    colours = store.end(colours) if settings.published else store(colours)
+    colours = store.first(colours) if settings.published else store(colours)
     size = size or (width, height)
     weights = as_mask(mask, size) if mask is not None and settings.published else None
     framebuffers: dict[str, Array] = method.passes(

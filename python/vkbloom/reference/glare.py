@@ -14,7 +14,16 @@ from .pyramid import downsample
 from .sampling import Array, sample
 from .tape import Traced
 
-__all__ = ["light", "stage_format", "stages"]
+__all__ = [
+    "light",
+    "moved_by",
+    "places",
+    "read",
+    "stage_format",
+    "stages",
+    "tap_colours",
+    "texels_at",
+]
 
 
 def stage_format(format: str) -> str:
@@ -84,10 +93,10 @@ def _above(image: Array, threshold: float) -> Array:
     return above
 
 
-def _moved(image: Array, x: float, y: float) -> Array:
+def moved_by(image: Array, x: float, y: float) -> Array:
     """Return the image shifted by (x, y) texels, bilinearly, with 0 outside of the image."""
     rows, columns = (np.arange(side, dtype=np.float64) for side in image.shape[:2])
-    return _texels(image, columns[np.newaxis] + x, rows[:, np.newaxis] + y)
+    return texels_at(image, columns[np.newaxis] + x, rows[:, np.newaxis] + y)
 
 
 def _streaks(image: Array, stage: Any, store: Storage) -> Array:
@@ -109,8 +118,8 @@ def _streaks(image: Array, stage: Any, store: Storage) -> Array:
             ray_image = store(
                 sum(
                     weight
-                    * _colours(tap, less, image.shape[2])
-                    * _moved(ray_image, -tap * step * np.cos(angle), tap * step * np.sin(angle))
+                    * tap_colours(tap, less, image.shape[2])
+                    * moved_by(ray_image, -tap * step * np.cos(angle), tap * step * np.sin(angle))
                     for tap, weight in enumerate(weights)
                 )
             )
@@ -118,7 +127,7 @@ def _streaks(image: Array, stage: Any, store: Storage) -> Array:
     return total
 
 
-def _colours(tap: int, less: float, channels: int) -> Array:
+def tap_colours(tap: int, less: float, channels: int) -> Array:
     """Return the factors of the channels at a tap: in turn, red, blue or green is kept."""
     kept = np.ones(channels)
     if tap > 0:
@@ -127,20 +136,20 @@ def _colours(tap: int, less: float, channels: int) -> Array:
     return factors
 
 
-def _places(image: Array) -> tuple[Array, Array]:
+def places(image: Array) -> tuple[Array, Array]:
     """Return the pixels' offsets from the centre along x and y, as shares of the sides."""
     height, width, _ = image.shape
     x, y = ((np.arange(side) + 0.5) / side - 0.5 for side in (width, height))
     return np.meshgrid(x, y)
 
 
-def _read(image: Array, x: Array, y: Array) -> Array:
-    """Return the image at positions as of `_places`, bilinearly, with 0 outside of the image."""
+def read(image: Array, x: Array, y: Array) -> Array:
+    """Return the image at positions as of `places`, bilinearly, with 0 outside of the image."""
     height, width, _ = image.shape
-    return _texels(image, (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5)
+    return texels_at(image, (x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5)
 
 
-def _texels(image: Array, column: Array, row: Array) -> Array:
+def texels_at(image: Array, column: Array, row: Array) -> Array:
     """Return the image at positions in texels, bilinearly, with 0 outside of the image."""
     # At a texel's centre (with roundings) the derivative is the mean of those of both sides, whose
     # value is the same.
@@ -172,9 +181,9 @@ def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
     """Return the input of a ghost or halo: red and blue are shifted, the threshold subtracted."""
     length = np.hypot(x, y)
     moved = stage.aberration / np.where(length > 0, length, np.inf)
-    light = _read(image, x, y)
-    light[..., 0] = _read(image, x - moved * x, y - moved * y)[..., 0]
-    light[..., 2] = _read(image, x + moved * x, y + moved * y)[..., 2]
+    light = read(image, x, y)
+    light[..., 0] = read(image, x - moved * x, y - moved * y)[..., 0]
+    light[..., 2] = read(image, x + moved * x, y + moved * y)[..., 2]
     above = _above(light, stage.threshold)
     above[..., :3] = np.minimum(above[..., :3], stage.maximum)
     return above
@@ -182,7 +191,7 @@ def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
 
 def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
     """Return the sum of the ghosts: the image read at 1/2 + s (p - 1/2)."""
-    x, y = _places(image)
+    x, y = places(image)
     total = np.zeros_like(image)
     tints = stage.tints if len(stage.tints) > 1 else [stage.tints[0]] * len(stage.scales)
     for scale, tint in zip(stage.scales, tints, strict=True):
@@ -198,7 +207,7 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
 def _halo(image: Array, stage: Any, store: Storage) -> Array:
     """Return the image shifted by `radius` to the centre, weighted by a ring of that radius."""
     height, width, _ = image.shape
-    x, y = _places(image)
+    x, y = places(image)
     across, down = x * width / height, y
     distance = np.hypot(across, down)
     step = stage.radius / np.where(distance > 0, distance, np.inf)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,25 +70,40 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
 class Storage:
     """The effect of storing in a format: values are clamped to its range.
 
-    Values are not rounded to the steps of a format, except of "rg11b10ufloat", whose steps are
-    coarse. The tolerance of a comparison allows for the rounding.
+    Values are not rounded to the steps of a format, unless these are coarse. The tolerance of a
+    comparison allows for the rounding.
     """
 
     low: float
     high: float
-    is_coarse: bool = False
+    coarse: Literal["", "rg11b10", "srgb8"] = ""
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether values are rounded."""
+        return self.coarse != ""
+
+    @property
+    def holds_means(self) -> bool:
+        """Whether sums of levels are stored as means, since they would be clamped."""
+        return self.high == 1 and not self.is_coarse
 
     def __call__(self, image: Array) -> Array:
         """Return the image as stored."""
         if self.is_coarse:
-            return _as_rg11b10(image)
+            return _as_rg11b10(image) if self.coarse == "rg11b10" else _as_srgb8(image)
         return np.clip(image, self.low, self.high)
 
+    def first(self, image: Array) -> Array:
+        """Return the first image of a published method as stored."""
+        return self(image) if self.coarse == "srgb8" else self.end(image)
+
     def end(self, image: Array) -> Array:
-        """Return the first or last image of a published method as stored.
+        """Return the last image of a published method as stored.
 
         Engines use "rg11b10ufloat" for the levels only: the frame and the bloom have other
-        formats, so that this format does not change them.
+        formats, so that this format does not change them. The one with "rgba8unorm-srgb" reads the
+        frame from it, too.
         """
         return image if self.is_coarse else self(image)
 
@@ -127,12 +142,27 @@ def _as_rg11b10(image: Array) -> Array:
     return rounded
 
 
+def _as_srgb8(image: Array) -> Array:
+    """Round to the light of the nearest 8-bit level of sRGB; of alpha to the nearest level.
+
+    `image`: ndarray of float64, shape (..., C); A fourth channel is alpha.
+    """
+    light = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 1)
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    share = np.round(255 * encoded) / 255
+    result = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    if image.shape[-1] == 4:
+        result[..., 3] = np.round(255 * light[..., 3]) / 255
+    return result
+
+
 _STORAGES = {
     "rgba8unorm": Storage(0, 1),
     # Clamped, since a blur would spread an infinity over the picture.
     "rgba16float": Storage(-65504, 65504),
     "rgba32float": Storage(-math.inf, math.inf),
-    "rg11b10ufloat": Storage(0, 65024, is_coarse=True),
+    "rg11b10ufloat": Storage(0, 65024, "rg11b10"),
+    "rgba8unorm-srgb": Storage(0, 1, "srgb8"),
 }
 
 

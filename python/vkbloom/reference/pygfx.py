@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .image import BlurInput
+from .image import BlurInput, finite
 from .levels import halved
 from .pyramid import downsample, groups
 from .sampling import Array, weighted_mean
-from .threshold import firefly_weight, luminance, masked
+from .threshold import luminance, masked
 from .upsampling import combine, linear, tent
 
 if TYPE_CHECKING:
@@ -58,7 +58,11 @@ def _level_count(settings: PygfxBloom, size: tuple[int, int]) -> int:
 
 
 def _averaged(image: Array, size: tuple[int, int]) -> Array:
-    return weighted_mean((firefly_weight(luminance(mean)), mean) for _, mean in groups(image, size))
+    """Weight the groups by 1 / (1 + luminance), also of negative ones; 0 where it is undefined."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return finite(
+            weighted_mean((1 / (1 + luminance(mean)), mean) for _, mean in groups(image, size))
+        )
 
 
 def _tent(image: Array, size: tuple[int, int], radius: float) -> Array:

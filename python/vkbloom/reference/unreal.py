@@ -48,7 +48,7 @@ def passes(source: BlurInput, settings: UnrealBloom) -> dict[str, Array]:
         image = source.store(sample(horizontal, (width, height), y_taps=_kernel(k)))
         framebuffers[f"down_{k}"] = image
         total += factor * sample(image, half)
-    sum_of_factors = sum(_factors(settings.radius)) if source.store.high == 1 else 1.0
+    sum_of_factors = sum(_factors(settings.radius)) if source.store.holds_means else 1.0
     framebuffers["up_0"] = source.store(total / sum_of_factors)
     framebuffers["bloom"] = source.store.end(
         sum_of_factors * sample(framebuffers["up_0"], source.size)

@@ -113,7 +113,7 @@ def combine(
         height, width, _ = downs[k].shape
         below = coarse[k] * factor
         total = own[k] * downs[k] + below * upsample(up, (width, height))
-        factor = (abs(own[k]) + abs(below) or 1.0) if store.high == 1 else 1.0
+        factor = (abs(own[k]) + abs(below) or 1.0) if store.holds_means else 1.0
         up = store(total / factor)
         framebuffers[f"up_{k}"] = up
     framebuffers["bloom"] = (end or store.end)(gain * factor * last(up, size))

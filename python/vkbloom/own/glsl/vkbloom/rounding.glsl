@@ -4,6 +4,7 @@
 //   nearest_half(vec3)    the nearest half floats, ties to even; at most 65504
 //   nearest_level(vec3)   the nearest of the levels 0 to 255 of values in 0..1
 //   nearest_ufloat(vec3)  the nearest values of R11G11B10
+//   nearest_srgb(vec3)    of values in 0..1 the light of the nearest levels of 8-bit sRGB
 
 // What to add to a size for its last bit to have the weight of the nearest half float's: the power of
 // two 13 places higher. That of subnormal half floats is one for all.
@@ -39,6 +40,16 @@ uvec3 nearest_half_bits(vec3 value)
 vec3 nearest_level(vec3 value)
 {
     return roundEven(255.0 * clamp(value, 0.0, 1.0));
+}
+
+vec3 nearest_srgb(vec3 value)
+{
+    vec3 light = clamp(value, 0.0, 1.0);
+    vec3 share = mix(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, 12.92 * light,
+                     lessThanEqual(light, vec3(0.0031308)));
+    share = roundEven(255.0 * share) / 255.0;
+    return mix(pow((share + 0.055) / 1.055, vec3(2.4)), share / 12.92,
+               lessThanEqual(share, vec3(0.04045)));
 }
 
 // The nearest floats with 5 bits of exponent and 6 of mantissa (of blue 5), ties to even: what images

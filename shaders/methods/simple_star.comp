@@ -1,0 +1,65 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// Blender's recursive filter along rows, columns or diagonals: each pixel is mixed with one before it,
+// which is mixed already, and one after it (formulas of the compositor of Blender 5.0).
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(STAR_BLOCK);
+#include "lib/storage.glsl"
+
+layout(local_size_x = ROW_INVOCATIONS) in;
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 2) uniform sampler2D before;
+layout(set = 0, binding = 3) uniform writeonly image2D target;
+
+ivec2 size, first, towards;
+int count;
+
+// The first pixel of a line: on the side that it leaves, then at the bottom.
+ivec2 start_of(int line)
+{
+    int side = params.step_x < 0 ? size.x - 1 : 0;
+    if (params.step_x == 0)
+        return ivec2(line, size.y - 1);
+    if (line < size.y)
+        return ivec2(side, line);
+    int along = line - size.y + 1;
+    return ivec2(params.step_x < 0 ? side - along : along, size.y - 1);
+}
+
+vec4 fetch(int at)
+{
+    return at >= 0 && at < count ? texelFetch(source, first + at * towards, 0) : vec4(0.0);
+}
+
+void main()
+{
+    int line = int(gl_GlobalInvocationID.x);
+    vec4 mixed[4];
+    ivec2 place;
+
+    size = textureSize(source, 0);
+    towards = ivec2(params.step_x, params.step_y);
+    int lines = (towards.x != 0 ? size.y : 0) + (towards.y != 0 ? size.x : 0);
+    if (line >= lines - (towards.x != 0 && towards.y != 0 ? 1 : 0))
+        return;
+    first = start_of(line);
+    int across = towards.x > 0 ? size.x - first.x : towards.x < 0 ? first.x + 1 : size.y;
+    count = towards.y != 0 ? min(across, first.y + 1) : across;
+    if (params.backwards != 0) {
+        first += (count - 1) * towards;
+        towards = -towards;
+    }
+    for (int at = 0; at < count; ++at) {
+        int slot = at % params.distance;
+        vec4 ends = fetch(at + params.distance);
+        if (at >= params.distance)
+            ends += mixed[slot];
+        mixed[slot] = stored((1.0 - params.fade) * fetch(at) + 0.5 * params.fade * ends);
+        place = first + at * towards;
+        vec4 value = mixed[slot];
+        if (ADD_OWN != 0)
+            value = stored(value + texelFetch(before, place, 0));
+        imageStore(target, place, value);
+    }
+}
