@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from vkbloom.fields import (
@@ -288,8 +289,8 @@ def _settings_cure(settings: object) -> str:
         return "; give vkbloom.Settings.from_dict(...) of it"
     if not isinstance(settings, str):
         return ""
-    from vkbloom.named_settings import presets  # noqa: PLC0415  costs start-up time
-
+    # The presets are made of the classes that derive from the one here.
+    presets = import_module("vkbloom.named_settings").presets
     if settings not in presets and settings in METHODS:
         kind = METHODS[settings]
         name = kind.__name__
