@@ -55,6 +55,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("grid.toml").write_text(grid)
     (own,) = blocks(ROOT / "docs" / "own_methods.md", "glsl")
     Path("soft.hook").write_text(own)
+    (twin,) = [
+        text for text in blocks(ROOT / "docs" / "own_methods.md", "python") if "def soft" in text
+    ]
+    Path("twin.py").write_text(twin)
     return tmp_path
 
 

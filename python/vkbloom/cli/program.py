@@ -24,6 +24,7 @@ COMMANDS: Final = (
     "explore",
     "grid",
     "fit",
+    "check",
     "compare",
     "adapters",
     "doctor",

@@ -155,8 +155,8 @@ class FitResult:
         radii, profiles = radial_profiles((found, self.target))
         best = np.minimum.accumulate(self.history)
         parts += [
-            _diagram("radial profile", radii, profiles, (self.framebuffer, "target"), "pixels"),
-            _diagram("loss", np.arange(1, len(best) + 1.0), [best], ("best so far",), "calls"),
+            diagram("radial profile", radii, profiles, (self.framebuffer, "target"), "pixels"),
+            diagram("loss", np.arange(1, len(best) + 1.0), [best], ("best so far",), "calls"),
             '</div><code style="color:inherit;background:none;padding:0;white-space:pre-wrap">'
             f"{html.escape(repr(self.settings))}</code></div>",
         ]
@@ -214,7 +214,7 @@ def radial_profiles(
     return middle + 0.5, sums
 
 
-def _diagram(
+def diagram(
     title: str,
     x: NDArray[np.float64],
     lines: Sequence[NDArray[np.float64]],

@@ -124,12 +124,12 @@ def space_of(
     axes = []
     for name in vary:
         if name not in fields:
-            known = ", ".join(one for one in fields if _kind(fields[one]))
+            known = ", ".join(one for one in fields if varied_as(fields[one]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}"
                 f"{did_you_mean(name, fields) or ';'} it can vary {known}"
             )
-        kind = _kind(fields[name])
+        kind = varied_as(fields[name])
         if kind is None:
             raise ValueError(
                 f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
@@ -157,7 +157,7 @@ def _begun(settings: Settings, name: str) -> Any:
     return 0.0 if value is None and name == "threshold" else value
 
 
-def _kind(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
+def varied_as(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
     """Return how a field varies; None if it cannot."""
     match info.kind:
         case "flag":

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_size
+from vkbloom.fields import fields_of
 from vkbloom.fits.fitting import Maker, fit
 from vkbloom.fits.losses import Loss
 from vkbloom.fits.result import FitResult
-from vkbloom.fits.space import Bounds
+from vkbloom.fits.space import Bounds, varied_as
+from vkbloom.registry import METHODS
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
 
@@ -160,6 +162,13 @@ def lights(size: tuple[int, int]) -> NDArray[np.float32]:
 
 def _knobs(settings: Settings) -> tuple[str, ...]:
     names = _KNOBS.get(settings.method, ())
+    if METHODS.is_added(settings.method):
+        shared = fields_of(Settings)
+        names = tuple(
+            name
+            for name, info in fields_of(type(settings)).items()
+            if name not in shared and varied_as(info) is not None
+        )
     threshold = ("threshold",) if settings.threshold is not None else ()
     return tuple(dict.fromkeys((*threshold, *names, "intensity")))
 

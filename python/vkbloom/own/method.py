@@ -121,12 +121,14 @@ class OwnMethod(Settings, metaclass=OwnType):
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return settings_of, (type(self), values)
+        # Not the class: cloudpickle, which Dask uses, would copy what the class holds.
+        kind = type(self)
+        return settings_of, (kind.method, kind.file.source, kind.twin, values)
 
 
-def settings_of(kind: type[OwnMethod], values: dict[str, Any]) -> OwnMethod:
-    """Return settings of a class; for pickle."""
-    return kind(**values)
+def settings_of(name: str, source: Source, twin: Twin | None, values: dict[str, Any]) -> OwnMethod:
+    """Return settings of the class of a text; for pickle."""
+    return class_of(name, source, twin)(**values)
 
 
 def class_of(name: str, source: Source, twin: Twin | None) -> type[OwnMethod]:

@@ -12,6 +12,7 @@ from vkbloom.fields import value_field
 from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import Array
 from vkbloom.psf.sampled import SampledPSF
+from vkbloom.registry import METHODS
 from vkbloom.settings import Settings
 
 __all__ = ["measured"]
@@ -33,6 +34,8 @@ def _read_settings(settings: Any) -> Settings:
 @dataclasses.dataclass(frozen=True)
 class measured(SampledPSF):
     """The bloom of one pixel of 1, computed by `vkbloom.reference`, defined in pixels.
+
+    That of a method that was loaded or registered is rendered.
 
     Parameters
     ----------
@@ -75,6 +78,19 @@ def _spread(psf: measured) -> Array:
     # Values of doubles are not clamped.
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1
-    spread = reference.blur(point, psf.settings, format="rgba32float")
+    if METHODS.is_added(psf.settings.method):
+        spread = _rendered(point, psf.settings)
+    else:
+        spread = reference.blur(point, psf.settings, format="rgba32float")
     spread.flags.writeable = False
     return spread
+
+
+def _rendered(point: Array, settings: Settings) -> Array:
+    """Return the bloom of a method that was loaded or registered, which may have no reference."""
+    from vkbloom.renderer import Renderer  # noqa: PLC0415  as above
+
+    exact = settings.replace(format="rgba32float")
+    with Renderer() as renderer:
+        frames = renderer.apply(point.astype(np.float32), exact, attachments="bloom")
+        return frames["bloom"][..., :3].astype(np.float64)

@@ -334,7 +334,8 @@ def _method(settings: Settings) -> Reference:
         return METHODS.reference(settings.method)
     except KeyError:
         raise ValueError(
-            f"method: {settings.method!r} has no reference in NumPy; register one with it"
+            f"method: {settings.method!r} has no reference in NumPy; give one when it is loaded, "
+            "load_method(file, reference=function), or registered"
         ) from None
 
 

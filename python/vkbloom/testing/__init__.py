@@ -26,12 +26,14 @@ from vkbloom.testing.point_spread import (
     response,
 )
 from vkbloom.testing.probe import Probe
+from vkbloom.testing.programs import command
 from vkbloom.testing.regression import FrameDifferenceWarning, FrameRegression
 from vkbloom.testing.scaled_scene import (
     ResolutionResponse,
     assert_resolution_independent,
     resolution_response,
 )
+from vkbloom.testing.veiling_glare import veiling_glare_index
 from vkbloom.views.diagnosis import Diagnosis, diagnose
 from vkbloom.views.tolerances import Tolerances
 
@@ -57,6 +59,7 @@ __all__ = [
     "assert_stable",
     "assert_superposition",
     "assert_symmetric",
+    "command",
     "diagnose",
     "point_spread",
     "read_frame",
@@ -64,4 +67,5 @@ __all__ = [
     "resolution_response",
     "response",
     "stability",
+    "veiling_glare_index",
 ]

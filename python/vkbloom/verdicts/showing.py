@@ -1,0 +1,200 @@
+"""What was measured of a bloom, as text, as plain values for JSON, and as a page."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.fits.result import diagram
+from vkbloom.psf.sampled import samples
+from vkbloom.testing.law_report import LawRow
+from vkbloom.verdicts.measuring import Verdict, plain
+from vkbloom.views.pictures import picture, png
+
+_STYLE: Final = (
+    "body{font:15px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;"
+    "color-scheme:light dark}td,th{padding:2px 12px 2px 0;vertical-align:top;text-align:left}"
+    "td.n{text-align:right;font-variant-numeric:tabular-nums}tr.no th{color:#c33}"
+    "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
+)
+
+
+def as_text(found: Verdict, *, required: tuple[str, ...] = ()) -> str:
+    """Return tables for a terminal; the laws of `required` are marked."""
+    lines = [f"{found.name}, on {found.device}", ""]
+    width, height = found.size
+    lines.append(f"passes at {width} x {height}{'':<10} ms")
+    for name, seconds in found.passes.items():
+        lines.append(f"  {name:<24}{1000 * seconds:8.3f}")
+    lines.append(f"  {'together':<24}{1000 * sum(found.passes.values()):8.3f}")
+    probe = found.report.probe
+    side = " x ".join(map(str, probe.size))
+    lines += ["", f"laws, on {side} with values up to {probe.value:g}"]
+    lines.append(f"  {'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}")
+    for row in found.rows:
+        mark = " required" if row.name in required else ""
+        lines.append(f"  {row.name:<18} {row.words:<11} {_figures(row)}{mark}".rstrip())
+    lines += ["", "figures", *(f"  {name:<24}{text}" for name, text in figures(found).items())]
+    broken = [row for row in found.rows if not row.held]
+    if broken:
+        lines += ["", "laws that are not held"]
+    for row in broken:
+        lines += [f"  {row.name}: {_one_line(row)}", f"    why: {row.why}"]
+    return "\n".join(lines)
+
+
+def figures(found: Verdict) -> dict[str, str]:
+    """Return the figures as words, by their name."""
+    spread, steady, response = found.spread, found.stability, found.resolution
+    sizes = ", ".join(f"{height}" for _, height in response.sizes)
+    texts = {
+        "gain of flat images": f"{found.report.gain:.4g}",
+        "energy of a pixel": f"{spread.energy:.4g} ({100 * spread.at_border:.2g} % at the border)",
+        "point spread": f"50 % within {spread.r50:g} and 90 % within {spread.r90:g} pixels, "
+        f"peak {spread.peak:.3g}",
+        "moving light": f"ripple {_percent(steady.ripple)}, jitter {steady.jitter:.2g} pixels, "
+        f"flicker {_percent(steady.flicker)}, growth {_percent(steady.growth)}",
+        "radius of 90 %": f"{', '.join(_percent(value) for value in response.r90)} of the height "
+        f"at heights of {sizes}",
+        "veiling glare index": f"{found.veiling_glare_index:.3g} %",
+        "nearest preset": f"{found.nearest[0]}, {_percent(found.nearest[1])} off"
+        if found.nearest[0]
+        else "none: the bloom is black",
+    }
+    if found.twin:
+        texts["from its reference"] = ", ".join(
+            f"{name} {off:.2g}" for name, off in found.twin.items()
+        )
+    return texts
+
+
+def as_values(found: Verdict, required: tuple[str, ...]) -> dict[str, Any]:
+    """Return everything as plain values; what is not a number is None."""
+    spread, steady, response = found.spread, found.stability, found.resolution
+    value: dict[str, Any] = plain(
+        {
+            "name": found.name,
+            "adapter": found.device,
+            "settings": None if found.settings is None else found.settings.to_dict(),
+            "size": found.size,
+            "passes": [{"name": name, "seconds": s} for name, s in found.passes.items()],
+            "laws": {row.name: _values(row) for row in found.rows},
+            "gain": found.report.gain,
+            "energy": spread.energy,
+            "psf": {
+                name: getattr(spread, name)
+                for name in ("r50", "r90", "peak", "at_border", "radii", "encircled")
+            },
+            "stability": {
+                name: getattr(steady, name) for name in ("ripple", "jitter", "flicker", "growth")
+            },
+            "resolution": {
+                name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
+            },
+            "veiling_glare_index": found.veiling_glare_index,
+            "reference": found.twin or None,
+            "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
+            "required": required,
+            "passed": not broken(found, required),
+        }
+    )
+    return value
+
+
+def broken(found: Verdict, required: tuple[str, ...]) -> list[LawRow]:
+    """Return the required laws that are not held."""
+    return [row for row in found.rows if row.name in required and not row.held]
+
+
+def as_page(found: Verdict, pictures: dict[str, NDArray[Any]], required: tuple[str, ...]) -> str:
+    """Return a page with tables, the point spread with its curve, and pictures."""
+    spread = found.spread
+    rows = "".join(
+        f'<tr class="{"yes" if row.held else "no"}"><th scope="row">{row.name}'
+        f"{' (required)' if row.name in required else ''}</th><td>{row.words}</td>"
+        + "".join(f'<td class="n">{text}</td>' for text in _cells(row))
+        + f"<td>{'' if row.held else html.escape(_one_line(row)) + '<br><i>' + row.why + '</i>'}"
+        "</td></tr>"
+        for row in found.rows
+    )
+    times = "".join(
+        f'<tr><th scope="row">{html.escape(name)}</th>'
+        f'<td class="n">{1000 * seconds:.3f} ms</td></tr>'
+        for name, seconds in found.passes.items()
+    )
+    words = "".join(
+        f'<tr><th scope="row">{name}</th><td>{html.escape(text)}</td></tr>'
+        for name, text in figures(found).items()
+    )
+    lit = spread.radii > 0
+    curve = diagram(
+        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
+    )
+    shown = (
+        {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
+    )
+    shown |= {name: png(picture(image, name)) for name, image in pictures.items()}
+    images = "".join(
+        f'<figure><img src="data:image/png;base64,{base64.b64encode(data).decode()}" '
+        f'alt="{name}" width="{_width(name)}"><figcaption>{name}</figcaption></figure>'
+        for name, data in shown.items()
+    )
+    name = html.escape(found.name)
+    width, height = found.size
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom check: {name}</title>'
+        f"<style>{_STYLE}</style><body><h1>{name}</h1><p>On {html.escape(found.device)}.</p>"
+        f"<h2>Pictures</h2>{images}{curve}<h2>Laws</h2><table><thead><tr><th>law</th><th>held</th>"
+        f"<th>off by</th><th>allowed</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
+        f"<h2>Figures</h2><table>{words}</table>"
+        f"<h2>Passes at {width} x {height}</h2><table>{times}</table></body></html>\n"
+    )
+
+
+def _width(name: str) -> int:
+    return 256 if name.startswith("point") else 384
+
+
+def _cells(row: LawRow) -> list[str]:
+    return ["", ""] if math.isnan(row.off) else [f"{row.off:.3g}", f"{row.limit:.3g}"]
+
+
+def _figures(row: LawRow) -> str:
+    off, limit = _cells(row)
+    return f"{off:>9} {limit:>9}"
+
+
+def _one_line(row: LawRow) -> str:
+    return " ".join(row.message.replace("\n  law:", "; law:").split())
+
+
+def _percent(share: float) -> str:
+    return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
+
+
+def _values(row: LawRow) -> dict[str, Any]:
+    return {
+        "held": row.held,
+        "off": float(row.off),
+        "limit": float(row.limit),
+        "law": row.law,
+        "message": row.message,
+        "why": row.why,
+    }
+
+
+def lit_scene(size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the picture of the page: lights of several sizes and colours on dark grey."""
+    width, height = size
+    image = np.full((height, width, 3), 0.02, np.float32)
+    y, x = np.mgrid[:height, :width]
+    for number, value in enumerate(((9, 6, 3), (2, 5, 9), (8, 2, 2), (6, 6, 6))):
+        centre = ((0.2 + 0.2 * number) * width, (0.35 + 0.3 * (number % 2)) * height)
+        inside = np.hypot(x - centre[0], y - centre[1]) < height / (40 - 9 * number)
+        image[inside] = value
+    return image
