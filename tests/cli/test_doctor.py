@@ -17,7 +17,7 @@ import pytest
 import vkbloom
 from tests.processes import python
 from vkbloom import doctor
-from vkbloom.doctor import child, drivers, installation, trial
+from vkbloom.doctor import caches, child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding
 from vkbloom.io import pipeline_cache
 
@@ -480,15 +480,15 @@ def test_nan_is_found(frames: vkbloom.Frames) -> None:
 
 def test_the_cache_of_a_render_is_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
-    assert installation.cache([]) == Finding("pipeline cache", "ok", f"{tmp_path}; no file yet")
+    assert caches.pipelines([]) == Finding("pipeline cache", "ok", f"{tmp_path}; no file yet")
     with vkbloom.Renderer() as renderer:
         trial.render(renderer)
     (file,) = tmp_path.iterdir()
     uuid = file.stem.removeprefix("pipelines-")
     here = f"{file.name} ({file.stat().st_size} bytes, intact, of "
-    finding = installation.cache([uuid])
+    finding = caches.pipelines([uuid])
     assert (finding.status, f"{here}an installed driver)" in finding.found) == ("ok", True)
-    assert f"{here}a driver that is not installed)" in installation.cache([]).found
+    assert f"{here}a driver that is not installed)" in caches.pipelines([]).found
 
 
 def test_a_damaged_cache_is_noted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -498,7 +498,7 @@ def test_a_damaged_cache_is_noted(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     file = tmp_path / f"pipelines-{uuid.hex()}.bin"
     file.write_bytes(file.read_bytes()[:-1])
     (tmp_path / "pipelines-of-mine.bin").touch()
-    finding = installation.cache([])
+    finding = caches.pipelines([])
     assert finding.status == "note"
     assert f"{file.name} is damaged" in finding.found
     assert "pipelines-of-mine.bin is not a file of vkbloom" in finding.found
@@ -508,7 +508,7 @@ def test_a_cache_file_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch, tmp_p
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
     # A folder, as permissions do not stop root.
     (tmp_path / f"pipelines-{'00' * 16}.bin").mkdir()
-    assert "is damaged or cannot be read" in installation.cache([]).found
+    assert "is damaged or cannot be read" in caches.pipelines([]).found
 
 
 @pytest.mark.parametrize("below", ["", "/below", "/far/below"])
@@ -518,7 +518,7 @@ def test_a_cache_folder_that_cannot_be(
     file = tmp_path / "file"
     file.touch()
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", f"{file}{below}")
-    finding = installation.cache([])
+    finding = caches.pipelines([])
     assert finding.status == "note"
     assert "not writable" in finding.found
     assert "VKBLOOM_CACHE_DIR" in finding.advice
@@ -528,13 +528,13 @@ def test_a_cache_folder_of_the_system_that_cannot_be(monkeypatch: pytest.MonkeyP
     monkeypatch.delenv("VKBLOOM_CACHE_DIR", raising=False)
     # Permissions do not stop root, but no folder can be made here.
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/self")
-    finding = installation.cache([])
+    finding = caches.pipelines([])
     assert (finding.status, "not writable" in finding.found) == ("note", True)
 
 
 def test_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
-    finding = installation.cache([])
+    finding = caches.pipelines([])
     assert finding.found == "off: VKBLOOM_CACHE_DIR is empty"
 
 
@@ -542,8 +542,28 @@ def test_examining_the_cache_leaves_nothing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "new"))
-    assert installation.cache([]).status == "ok"
+    assert caches.pipelines([]).status == "ok"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_caches_of_drivers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    adapter = {"name": "llvmpipe", "driver_info": "Mesa 25.0.7 (LLVM 19)"}
+    monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
+    (empty,) = caches.drivers([adapter])
+    assert (empty.topic, empty.status) == ("Mesa's cache", "ok")
+    assert "vkbloom warm" in empty.advice
+    (tmp_path / "mesa_shader_cache_db").mkdir()
+    (tmp_path / "mesa_shader_cache_db" / "index").write_bytes(bytes(12))
+    (filled,) = caches.drivers([adapter])
+    assert filled.found == f"{tmp_path}; 1 files, 12 bytes"
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", "/proc/self/none")
+    (closed,) = caches.drivers([adapter])
+    assert (closed.status, "not writable" in closed.found) == ("note", True)
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "true")
+    (off,) = caches.drivers([adapter])
+    assert "off" in off.found
+    assert [one.topic for one in caches.drivers([{"name": "NVIDIA H100", "driver_info": "580"}])]
 
 
 def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,7 @@ COMMANDS: Final = (
     "compare",
     "adapters",
     "doctor",
+    "warm",
 )
 
 #: The status after Ctrl-C, as shells report it.

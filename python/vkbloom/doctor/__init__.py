@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from vkbloom.doctor import child, drivers, installation
+from vkbloom.doctor import caches, child, drivers, installation
 from vkbloom.doctor.finding import Finding, Status
 
 __all__ = ["Finding", "Report", "Status", "examine"]
@@ -79,7 +79,8 @@ def examine() -> Report:
         *([_chosen(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
         *_validation(loader.value and loader.value["layers"], working[0] if working else None),
-        installation.cache([adapter["driver_uuid"] for adapter in adapters]),
+        caches.pipelines([adapter["driver_uuid"] for adapter in adapters]),
+        *caches.drivers(adapters),
         *installation.extras(),
     ]
     can_render = any(

@@ -1,4 +1,4 @@
-"""Check the installation: environment variables, pipeline cache, extras and GPU device files."""
+"""Check the installation: environment variables, extras and GPU device files."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import os
 import platform
 import re
 import sys
-import tempfile
-from collections.abc import Collection
 from importlib import metadata
 from pathlib import Path
 from typing import Final
@@ -16,7 +14,6 @@ import numpy as np
 
 from vkbloom.doctor.finding import Finding, Status
 from vkbloom.free_memory import ADVICE, address_space_left
-from vkbloom.io import pipeline_cache
 
 # Purpose of each extra; the distributions that it needs are read from the metadata.
 _EXTRAS: Final = {
@@ -83,70 +80,6 @@ def environment() -> list[Finding]:
             f"these variables change the rendering or choose the device: {', '.join(settings)}",
         )
     ]
-
-
-def _why_not_writable(folder: Path) -> str:
-    """Return why no file can be created in a folder; "" if one can."""
-    existing = folder
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir():
-        return f"{existing} is not a folder"
-    try:
-        # The folder is created with its first file; creating it here would leave it behind.
-        with tempfile.TemporaryDirectory(dir=existing):
-            return ""
-    except OSError as error:
-        return f"{existing}: {error.strerror or error}"
-
-
-def cache(driver_uuids: Collection[str]) -> Finding:
-    """Examine the pipeline cache."""
-    topic = "pipeline cache"
-    try:
-        folder = pipeline_cache.folder()
-        if folder is None:
-            return Finding(topic, "note", "off: VKBLOOM_CACHE_DIR is empty")
-        reason = _why_not_writable(folder)
-        files = sorted(folder.glob("pipelines-*.bin")) if folder.is_dir() else []
-        states = [_cache_file(file, driver_uuids) for file in files]
-    except OSError as error:
-        return Finding(
-            topic,
-            "note",
-            f"cannot be examined: {error}",
-            "Set VKBLOOM_CACHE_DIR to a readable and writable folder.",
-        )
-    found = "; ".join([str(folder), *states] if states else [str(folder), "no file yet"])
-    if reason:
-        return Finding(
-            topic,
-            "note",
-            f"{found}; not writable ({reason}): every new process compiles its pipelines again",
-            "Set VKBLOOM_CACHE_DIR to a writable folder, or to an empty value for no cache.",
-        )
-    if any("damaged" in state for state in states):
-        return Finding(
-            topic,
-            "note",
-            found,
-            "Nothing to do: a damaged file is ignored, and the next render of its driver replaces "
-            "it.",
-        )
-    return Finding(topic, "ok", found)
-
-
-def _cache_file(file: Path, driver_uuids: Collection[str]) -> str:
-    """Describe one cache file."""
-    uuid = file.stem.removeprefix("pipelines-")
-    try:
-        is_complete = pipeline_cache.read(bytes.fromhex(uuid)) is not None
-    except ValueError:
-        return f"{file.name} is not a file of vkbloom"
-    if not is_complete:
-        return f"{file.name} is damaged or cannot be read"
-    whose = "an installed driver" if uuid in driver_uuids else "a driver that is not installed"
-    return f"{file.name} ({file.stat().st_size} bytes, intact, of {whose})"
 
 
 def extras() -> list[Finding]:

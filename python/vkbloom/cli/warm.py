@@ -1,0 +1,74 @@
+"""``vkbloom warm``: fill the caches of compiled pipelines before the first call needs them."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from typing import Any, Final
+
+import click
+import numpy as np
+from rich.progress import track
+
+import vkbloom
+from vkbloom.cli.device_options import adapter_option
+from vkbloom.cli.fields import SIZE
+
+_TYPES: Final = ("uint8", "float16", "float32")
+_USUAL_SIZE: Final = (1920, 1080)
+# A single framebuffer may come from a fused pass.
+_KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
+
+
+@click.command()
+@click.option(
+    "--preset",
+    "presets",
+    type=click.Choice(list(vkbloom.presets)),
+    multiple=True,
+    help="Only this preset; repeat it for more [default: all, and the built-in scene]",
+)
+@click.option(
+    "--type",
+    "types",
+    type=click.Choice(_TYPES),
+    multiple=True,
+    help="Only images of this type; repeat it for more [default: all]",
+)
+@click.option(
+    "--size",
+    "sizes",
+    type=SIZE,
+    multiple=True,
+    help="Size of the images to come; repeat it for more [default: 1920x1080]",
+)
+@adapter_option
+def command(
+    presets: tuple[str, ...],
+    types: tuple[str, ...],
+    sizes: tuple[tuple[int, int], ...],
+    adapter: str,
+) -> None:
+    """Compile the pipelines of presets, so that later processes find them in the caches.
+
+    Some pipelines are made for the size of the image: those of convolutions, and of small levels.
+
+    The caches are vkbloom's and the driver's; vkbloom doctor shows their folders. Call it when a
+    container's image is built, or in the step whose caches CI keeps. Mesa's software driver
+    compiles for the CPU that it runs on: another type of CPU does not find these pipelines.
+    """
+    begun, used = time.perf_counter(), time.process_time()
+    named = presets or tuple(vkbloom.presets)
+    calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), named, _KEPT))
+    with vkbloom.Renderer(adapter) as renderer:
+        if not presets:
+            scene = vkbloom.Scene.ufo()
+            for shading in ("forward", "deferred"):
+                for attachments in _KEPT:
+                    renderer.render(scene, shading=shading, attachments=attachments)
+        for size, dtype, channels, preset, attachments in track(calls, "Compiling", transient=True):
+            image = np.zeros((size[1], size[0], channels), dtype)
+            renderer.apply(image, vkbloom.presets[preset], attachments=attachments)
+        name = renderer.info.summary
+    seconds, processor = time.perf_counter() - begun, time.process_time() - used
+    click.echo(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")
