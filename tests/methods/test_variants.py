@@ -72,9 +72,13 @@ BIT_EQUAL = {
 NEARLY_EQUAL = ("unity_urp", "threejs_unreal", "iris_6")
 
 
-# Convolutions have the same passes but for the kernel: one with colours stands for all.
+# Convolutions, and Blender's fog glow, have the same passes but for the kernel: one with colours
+# stands for all.
 PRESETS = [
-    name for name in presets if name == "iris_6" or not isinstance(presets[name], Convolution)
+    name
+    for name in presets
+    if name == "iris_6"
+    or not (isinstance(presets[name], Convolution) or name == "blender_fog_glow")
 ]
 
 
