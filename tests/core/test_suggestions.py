@@ -147,7 +147,7 @@ def test_own_methods(renderer: vkbloom.Renderer) -> None:
 //!SAVE BLOOM
 vec4 hook() { return GLOW_tex(GLOW_pos) * softness; }
 """
-    own = vkbloom.load_method(text, name="soft_one")
+    own: Any = vkbloom.load_method(text, name="soft_one")
     try:
         with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
             own(softnes=1)
