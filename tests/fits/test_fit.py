@@ -22,7 +22,7 @@ from vkbloom import (
     reference,
 )
 from vkbloom.fits.losses import Measure, light, reduced
-from vkbloom.fits.space import space_of
+from vkbloom.fits.space import Axis, space_of
 
 Image = NDArray[Any]
 
@@ -75,6 +75,29 @@ class TestFound:
         assert found.loss < 1e-3
         assert found.start_loss > 0.05
         assert found.settings.replace(**{name: getattr(start, name) for name in changes}) == start
+
+    def test_numbers_by_derivatives(self, renderer: Renderer) -> None:
+        start = Separable(tonemap="exponential")
+        changes = {"blur_scale": 1.7, "intensity": 0.6, "exposure": 0.4}
+        target = target_of(start.replace(**changes), "final")
+        found = vkbloom.fit(IMAGE, target, start, list(changes), renderer=renderer, gradient=True)
+        assert found.loss < 1e-4
+        assert found.calls <= 30
+        for name, value in changes.items():
+            assert getattr(found.settings, name) == pytest.approx(value, rel=0.01)
+
+    def test_what_has_no_derivative_is_named(self, renderer: Renderer) -> None:
+        def fitted(vary: str, image: Any = IMAGE, **given: Any) -> Any:
+            return vkbloom.fit(
+                image, IMAGE, Pyramid(), [vary], gradient=True, renderer=renderer, **given
+            )
+
+        with pytest.raises(ValueError, match="vary: 'levels' of the method pyramid has no deriv"):
+            fitted("levels")
+        with pytest.raises(ValueError, match="loss: 'flip' has no derivative"):
+            fitted("radius", loss="flip")
+        with pytest.raises(ValueError, match="image: gradient=True needs the array"):
+            fitted("radius", renderer.upload(IMAGE))
 
     def test_integers_flags_and_choices(self, renderer: Renderer) -> None:
         truth = Pyramid(levels=3, firefly_filter=True, composite="screen", intensity=0.5)
@@ -355,6 +378,22 @@ class TestParts:
         assert (axis.value(0.0), axis.value(1.0)) == (2.0, 3.0)
         # The start is outside, and moves to the bound.
         assert axis.value(axis.coordinate(1.0)) == 2.0
+
+    def test_slopes_of_losses_are_those_of_differences(self) -> None:
+        generator = np.random.default_rng(0)
+        a, b, direction = generator.random((3, 6, 5, 3))
+        for loss in ("relative", "l2", "log"):
+            measure = Measure(b, cast("Any", loss))
+            ends = [measure.slope(a + step * direction)[0] for step in (-1e-6, 1e-6)]
+            square, slopes = measure.slope(a)
+            assert square == pytest.approx(measure(a) ** 2)
+            assert (slopes * direction).sum() == pytest.approx((ends[1] - ends[0]) / 2e-6)
+
+    def test_slopes_of_axes_are_those_of_differences(self) -> None:
+        for scale in (None, 0.5):
+            axis = Axis(name="threshold", kind="number", low=1.0, high=5.0, scale=scale)
+            ends = [axis.value(0.3 + step) for step in (-1e-6, 1e-6)]
+            assert axis.slope(0.3) == pytest.approx((ends[1] - ends[0]) / 2e-6)
 
     def test_residuals_have_the_loss_as_their_norm(self) -> None:
         generator = np.random.default_rng(0)

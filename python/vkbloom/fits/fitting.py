@@ -7,13 +7,15 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final, overload
+from functools import partial
+from typing import Any, Final, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom.checks import check_image, check_index, import_extra
+from vkbloom.fits.descent import Descent, check_derivatives
 from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
 from vkbloom.fits.search import Search
@@ -45,6 +47,7 @@ def fit(
     bounds: Bounds | None = ...,
     renderer: Renderer | None = ...,
     max_calls: int = ...,
+    gradient: bool = ...,
     progress: bool = ...,
 ) -> FitResult: ...
 @overload
@@ -59,6 +62,7 @@ def fit(
     bounds: Bounds | None = ...,
     renderer: Renderer | None = ...,
     max_calls: int = ...,
+    gradient: bool = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
 def fit(
@@ -72,6 +76,7 @@ def fit(
     bounds: Bounds | None = None,
     renderer: Renderer | None = None,
     max_calls: int = 1000,
+    gradient: bool = False,
     progress: bool = False,
 ) -> FitResult | list[FitResult]:
     """Find the settings that make a given picture of an image.
@@ -105,6 +110,9 @@ def fit(
         Default: a new one.
     max_calls : int
         The most renders of a candidate.
+    gradient : bool
+        Whether to search by the derivatives of `Renderer.vjp`: fewer renders for many fields. The
+        varied fields must have a derivative and the loss must be "relative", "l2" or "log".
     progress : bool
         Whether to show a progress bar.
 
@@ -117,7 +125,8 @@ def fit(
     ------
     ValueError
         A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
-        target has another size or is black; an argument is out of range.
+        target has another size or is black; an argument is out of range; or, with `gradient`, a
+        field or the loss has no derivative, or the image is an `Image`.
     TypeError
         An argument has the wrong type.
     ModuleNotFoundError
@@ -135,10 +144,11 @@ def fit(
     -----
     Images of more than 384 pixels are reduced first, by boxes. There, points that fill the space
     are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
-    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex.
-    Integers and choices are changed one at a time, while the numbers follow. The result is refined
-    at the image's own size. Fields that put few passes out of date are changed first. The same
-    arguments give the same result.
+    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Integers
+    and choices are changed one at a time, while the numbers follow. The result is refined at the
+    image's own size. With `gradient`, the least squares follow from pullbacks, which are no calls,
+    from the start and if needed from a few samples. Fields that put few passes out of date are
+    changed first. The same arguments give the same result.
 
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
@@ -182,6 +192,8 @@ def fit(
         space_of(check_settings(one), names, bounds or {}, brightest, len(wanted))
         for one in candidates
     ]
+    if gradient:
+        check_derivatives(spaces, measured, pixels)
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
         stages = _stages(used, image, pixels, wanted, measured)
@@ -191,7 +203,14 @@ def fit(
         for space, cost in zip(spaces, costs, strict=True):
             with _bar(progress, space.start.method, max_calls) as told:
                 one = _fitted(
-                    used, stages, space, cost, framebuffer, max_calls=max_calls, told=told
+                    used,
+                    stages,
+                    space,
+                    cost,
+                    framebuffer,
+                    max_calls=max_calls,
+                    told=told,
+                    gradient=gradient,
                 )
                 found.append(one)
     found.sort(key=lambda one: one.loss)
@@ -203,6 +222,7 @@ class _Stage:
     """One size of the image, on the device, and its target."""
 
     image: Image
+    pixels: NDArray[Any] | None
     measure: Measure
     factor: int
 
@@ -230,11 +250,12 @@ def _stages(
             f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
             f"{handle.shape[1]} x {handle.shape[0]}"
         )
-    stages = [_Stage(handle, Measure(target, loss), 1)]
+    stages = [_Stage(handle, pixels, Measure(target, loss), 1)]
     factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
     if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
-        small = renderer.upload(reduced(pixels, factor))
-        stages.insert(0, _Stage(small, Measure(reduced(target, factor), loss), factor))
+        small = reduced(pixels, factor)
+        measure = Measure(reduced(target, factor), loss)
+        stages.insert(0, _Stage(renderer.upload(small), small, measure, factor))
     return stages
 
 
@@ -291,6 +312,7 @@ def _fitted(
     *,
     max_calls: int,
     told: Callable[[float], None],
+    gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
     began = time.perf_counter()
@@ -306,10 +328,11 @@ def _fitted(
             )
             return light(frames[framebuffer])
 
-        search = Search(
+        kind: Any = Descent if gradient else Search
+        search = kind(
             space,
             stage.measure,
-            render,
+            partial(_pulled, renderer, stage, framebuffer) if gradient else render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
             told=told,
@@ -341,6 +364,21 @@ def _fitted(
         target=target,
         residual=light(frames[framebuffer]) - target,
     )
+
+
+def _pulled(renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings) -> Any:
+    """Return a framebuffer, and from a cotangent to the derivatives by each field."""
+    frames, pullback = renderer.vjp(cast("Any", stage.pixels), _smaller(settings, stage.factor))
+
+    def back(cotangent: NDArray[np.float64]) -> Any:
+        whole = np.zeros(frames[framebuffer].shape)
+        whole[..., :3] = cotangent
+        found = pullback({framebuffer: whole})
+        if "blur_scale" in found:  # of `_smaller`
+            found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
+        return found
+
+    return light(frames[framebuffer]), back
 
 
 def _smaller(settings: Settings, factor: int) -> Settings:

@@ -54,6 +54,21 @@ class Measure:
         factor = math.ceil(math.sqrt(array.shape[0] * array.shape[1] / _MOST_PIXELS))
         return self._differences(reduced(array, factor), reduced(self.target, factor))
 
+    def slope(self, array: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        """Return the square of the loss of a sum, and its derivative by each value."""
+        differences = self._differences(array, self.target).reshape(array.shape)
+        return float(np.vdot(differences, differences)), 2 * differences * self.scales(array)
+
+    def scales(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivative of each difference by its value."""
+        if self.loss == "relative":
+            return np.full(array.shape, 1 / float(np.linalg.norm(self.target)))
+        scales = np.full(array.shape, 1 / math.sqrt(array.size))
+        if self.loss == "log":
+            bright = array > _DARK * float(self.target.max())
+            scales *= np.where(bright, 1 / (math.log(10) * np.where(bright, array, 1.0)), 0.0)
+        return scales
+
     def _differences(
         self, array: NDArray[np.float64], target: NDArray[np.float64]
     ) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from vkbloom.checks import import_extra
 from vkbloom.fits.losses import Measure
 from vkbloom.fits.space import Point, Space
 
-__all__ = ["Search"]
+__all__ = ["ENOUGH", "Search", "SpentError"]
 
 # Coordinates are from 0 to 1.
 # Steps of finite differences: first large compared with the rounding of half floats, then small.
@@ -27,8 +27,8 @@ _ENDLESS: Final = 100.0
 # Samples for each varied field. Least squares start from _STARTS points, one of them given.
 _SAMPLES: Final = 6
 _STARTS: Final = 5
-# The search ends at _ENOUGH, the loss of rounding to half floats. Below _CLOSE it only polishes.
-_ENOUGH: Final = 2e-5
+#: The search ends at ENOUGH, the loss of rounding to half floats. Below _CLOSE it only polishes.
+ENOUGH: Final = 2e-5
 _CLOSE: Final = 5e-4
 # After a change of integers, choices or one number, numbers are optimized for the best _FOLLOWED.
 _FOLLOWED: Final = 3
@@ -36,7 +36,7 @@ _FOLLOWED: Final = 3
 _LEAPS: Final = 8
 
 
-class _Spent(Exception):
+class SpentError(Exception):
     """The search has made `max_calls` calls."""
 
 
@@ -73,13 +73,13 @@ class Search:
         """Search from some points, the first of which is the start."""
         try:
             losses = [self._loss(point) for point in points]
-            if self.loss <= _ENOUGH:
+            if self.loss <= ENOUGH:
                 return
             starts = [*points, *self._samples()]
             losses += [self._loss(point) for point in starts[len(points) :]]
             self._halve(starts, losses)
             self._polish()
-        except _Spent:
+        except SpentError:
             return
 
     def _halve(self, starts: list[Point], losses: list[float]) -> None:
@@ -91,11 +91,11 @@ class Search:
         reached = []
         for number in list(dict.fromkeys([0, *chosen, *order]))[:_STARTS]:
             reached.append(self._descend(starts[number], _STEPS[0], most=5))
-            if self.loss <= _ENOUGH:
+            if self.loss <= ENOUGH:
                 return
         for _, point in sorted(reached, key=lambda one: one[0])[:2]:
             self._descend(point, _STEPS[0])
-            if self.loss <= _ENOUGH:
+            if self.loss <= ENOUGH:
                 return
 
     def refine(self, points: list[Point]) -> None:
@@ -104,13 +104,13 @@ class Search:
             losses = [self._loss(point) for point in points]
             self._descend(points[int(np.argmin(losses))], _STEPS[0])
             self._polish()
-        except _Spent:
+        except SpentError:
             return
 
     def _polish(self) -> None:
         """Vary integers, choices and single numbers, while the loss improves by one percent."""
         before = np.inf
-        while _ENOUGH < self.loss < 0.99 * before:
+        while ENOUGH < self.loss < 0.99 * before:
             before = self.loss
             self._walk()
             self._descend(self.best, _STEPS[1])
@@ -124,7 +124,7 @@ class Search:
     def _values(self, point: Point) -> NDArray[np.float64]:
         """Render, and keep count."""
         if self._left < 1:
-            raise _Spent
+            raise SpentError
         self._left -= 1
         array = self._render(self._space.settings(point))
         loss = self._measure(array)

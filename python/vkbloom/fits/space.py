@@ -54,6 +54,11 @@ class Axis:
         number = min(max(number, self.low), self.high)
         return round(number) if self.kind == "integer" else number
 
+    def slope(self, coordinate: float) -> float:
+        """Return the derivative of a number's value by its coordinate."""
+        place = min(max(coordinate, 0.0), 1.0) * self._length
+        return self._length * (1.0 if self.scale is None else self.scale * math.exp(place))
+
     def coordinate(self, value: Any) -> float:
         """Return the coordinate of a value, the nearest where it is out of bounds."""
         if self.kind == "choice":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -45,12 +46,12 @@ def vjp(
     if emission is not None:
         given["emission"] = np.array(check_emission(emission, pixels))
     frames = apply(pixels, settings.replace(format="rgba32float"), **given)
+    recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
         for name, part in cotangents.items():
             check_cotangent(name, part, frames)
-        _, back = reference_vjp(pixels, settings, **given)
-        found = back(cotangents)
+        found = recorded()(cotangents)
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
 
     return frames, pullback

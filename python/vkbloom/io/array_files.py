@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
-from vkbloom.io import image_reading, safe_writing
+from vkbloom.io import displayed, image_reading, safe_writing
 from vkbloom.io.expansion import check_expansion
 from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
 from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, check_name, is_exr
 
 __all__ = ["divided", "has_straight", "multiplied", "premultiplied", "read", "write"]
 
-FileEncoding = Literal["none", "linear", "srgb", "gamma22"]
+FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
-_ENCODINGS: Final = ("none", "linear", "srgb", "gamma22")
+_ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
 # The file's number types for floats, in order of preference, by the requested bits.
 _FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
     None: ("half", "float", "uint8"),
@@ -168,6 +168,8 @@ def write(
     bits: int | None = None,
     quality: int | None = None,
     premultiplied: bool = False,
+    primaries: str = "rec709",
+    view: str | None = None,
     metadata: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write an array to an image file.
@@ -181,10 +183,11 @@ def write(
         Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written unchanged. Floats are
         linear light: encoded and clipped to 0..1 in files of integers (PNG, JPEG, ...), unchanged
         in files of floats (OpenEXR, Radiance HDR, TIFF).
-    encoding : {"srgb", "gamma22", "linear", "none"}, optional
+    encoding : {"srgb", "gamma22", "linear", "pq", "hlg", "none"}, optional
         The curve of the file's colours, for floats. Default: "srgb" for files of integers and
-        "linear" for files of floats. "none": the values are encoded already, such as those of a
-        `final` with an `encoding`.
+        "linear" for files of floats. "pq" and "hlg" are those of Rec. ITU-R BT.2100, with 203
+        cd/m2 for a value of 1, as in `Settings`. "none": the values are encoded already, such as
+        those of a `final` with an `encoding`.
     bits : {8, 16, 32}, optional
         Size of a number in the file, for floats. Default: 8 in files of integers, and that of the
         array's dtype in files of floats.
@@ -194,6 +197,14 @@ def write(
     premultiplied : bool, default False
         Whether the array's colours are multiplied by alpha. OpenEXR files have multiplied colours,
         other formats straight ones. Colours are converted if needed.
+    primaries : {"rec709", "rec2020", "p3"}
+        Primaries of the file. Linear floats of Rec. 709 are converted to them by OpenColorIO; with
+        the encoding "none" they only name the colours. PNG has them in a cICP chunk, OpenEXR as
+        chromaticities.
+    view : str, optional
+        A view of OpenColorIO's built-in configuration, such as "ACES 2.0 - SDR 100 nits
+        (Rec.709)", of the first display that has it, or "DISPLAY/VIEW". It replaces `encoding`
+        and `primaries`, and needs linear floats and a file of integers.
     metadata : mapping of str to object, optional
         Metadata from `read`, or attributes by OpenImageIO's names: text, numbers, or sequences of
         them.
@@ -221,10 +232,10 @@ def write(
 
     Notes
     -----
-    Colours are written with the primaries of Rec. 709, as `read` returns them. Other primaries,
-    such as Display P3, cannot be written. If a Display P3 photograph is read and written as PNG or
-    JPEG, the result is a Rec. 709 file, in which colours outside of Rec. 709 are clipped. OpenEXR
-    keeps them as negative components, which OpenColorIO tools can convert.
+    `read` returns colours with the primaries of Rec. 709. A Display P3 photograph that is read and
+    written as PNG keeps its colours with ``primaries="p3"``; without it, colours outside of Rec.
+    709 are clipped. OpenEXR keeps them as negative components. "pq" and "hlg" need 16 bits to show
+    no bands.
 
     Examples
     --------
@@ -247,6 +258,11 @@ def write(
         own = 8 * values.dtype.itemsize
         if bits != own or is_float:
             raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    displayed.check_primaries(primaries)
+    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
+        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
+    if view is not None and (encoding is not None or primaries != "rec709"):
+        raise ValueError("view: it has its own encoding and primaries; leave them out")
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
@@ -255,13 +271,27 @@ def write(
         if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
             values = divided(values) if premultiplied else multiplied(values)
         curve = encoding or ("srgb" if is_integer else "linear")
-        if is_float:
+        if view is not None and not is_integer:
+            raise ValueError(f"view: {target} has linear floats; write a file of integers")
+        named = typed = _typed(oiio, metadata or {})
+        what: tuple[str, str] | str = (primaries, curve)
+        if view is not None:
+            what, values = displayed.viewed(oiio, values, view)
+        elif is_float:
+            if curve != "none":
+                values = displayed.to_primaries(oiio, values, primaries)
             values = encoded(values, curve)
         said: Encoding | None = None if curve == "none" or not is_float else curve
+        if view is not None or primaries != "rec709" or curve in ("pq", "hlg"):
+            # A profile of the source would name other colours.
+            typed = {name: value for name, value in named.items() if name != "ICCProfile"}
+            kind = oiio.ImageOutput.create(str(temporary)).format_name()
+            typed.update(displayed.attributes(oiio, kind, target, what))
+            said = None
         put(
             oiio,
             as_numbers(values, numbers),
-            Picture.of_values(values, numbers, said, _typed(oiio, metadata or {})),
+            Picture.of_values(values, numbers, said, typed),
             temporary,
             target,
             attributes={} if quality is None else {"CompressionQuality": quality},

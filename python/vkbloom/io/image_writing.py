@@ -241,6 +241,25 @@ def _losses(
     return notes
 
 
+def _pq(colours: NDArray[Any]) -> NDArray[Any]:
+    """Inverse EOTF of PQ (Rec. ITU-R BT.2100, table 4); 1 is 203 cd/m2."""
+    power = (np.clip(np.nan_to_num(colours.astype(float)), 0, 1e4 / 203) * 203e-4) ** (2610 / 16384)
+    signal: NDArray[Any] = (3424 / 4096 + 2413 / 128 * power) / (1 + 2392 / 128 * power)
+    return signal ** (2523 / 32)
+
+
+def _hlg(colours: NDArray[Any]) -> NDArray[Any]:
+    """OETF of HLG (Rec. ITU-R BT.2100, table 5); 1 becomes 0.75."""
+    light = np.clip(0.26496 * np.nan_to_num(colours.astype(float)), 0, 1)
+    a, b = 0.17883277, 0.28466892
+    high = a * np.log(np.maximum(12 * light - b, 1e-9)) + 0.5 - a * np.log(4 * a)
+    signal: NDArray[Any] = np.where(light <= 1 / 12, np.sqrt(3 * light), high)
+    return signal
+
+
+_ENCODERS: Final = {"pq": _pq, "hlg": _hlg}
+
+
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
     """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
 
@@ -253,6 +272,8 @@ def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
     colours = made[:, :, : made.shape[2] - (made.shape[2] in (2, 4))]
     if curve == "srgb":
         colours[:] = encode_srgb(colours)
+    elif curve in ("pq", "hlg"):
+        colours[:] = _ENCODERS[curve](colours)
     else:
         colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
     return made
