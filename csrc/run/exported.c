@@ -12,14 +12,21 @@ static bool is_float(enum vkb_format format)
     return format != VKB_FORMAT_RGBA8_UNORM;
 }
 
+// Whether dispatches access images. On a CPU, copies are faster.
+static bool dispatches(const struct vkb_device *device)
+{
+    return device->dispatch && !device->words;
+}
+
 // Whether the rows can be copied to an image as they are.
-static bool is_direct(const struct vkb_input *input)
+static bool is_direct(const struct vkb_device *device, const struct vkb_input *input)
 {
     const ptrdiff_t pixel = (ptrdiff_t)vkb_pixel_size(input->format);
 
-    return input->channels == vkb_formats[input->format].channels && vkb_input_is_contiguous(input)
-        && input->row_stride >= pixel * (ptrdiff_t)input->width && input->row_stride % pixel == 0
-        && input->offset % (size_t)pixel == 0 && input->offset % 4 == 0;
+    return !dispatches(device) && input->channels == vkb_formats[input->format].channels
+        && vkb_input_is_contiguous(input) && input->row_stride >= pixel * (ptrdiff_t)input->width
+        && input->row_stride % pixel == 0 && input->offset % (size_t)pixel == 0
+        && input->offset % 4 == 0;
 }
 
 // The bytes of the memory between which the elements lie.
@@ -58,16 +65,23 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
                     (double)size / (1 << 20));
 }
 
-VkDeviceSize vkb_exported_input_scratch(const struct vkb_input *input)
+VkDeviceSize vkb_exported_input_scratch(const struct vkb_device *device,
+                                        const struct vkb_input *input)
 {
-    return is_direct(input)
+    return dispatches(device) || is_direct(device, input)
              ? 0
              : (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
 }
 
-VkDeviceSize vkb_exported_output_scratch(const struct vkb_output *output)
+bool vkb_exported_dispatches(const struct vkb_device *device, const struct vkb_output *output)
 {
-    return vkb_readback_is_complete(output)
+    return dispatches(device) && output->format != VKB_FORMAT_DEPTH32_FLOAT;
+}
+
+VkDeviceSize vkb_exported_output_scratch(const struct vkb_device *device,
+                                         const struct vkb_output *output)
+{
+    return vkb_exported_dispatches(device, output) || vkb_readback_is_complete(output)
              ? 0
              : (VkDeviceSize)output->width * output->row_count * vkb_pixel_size(output->format);
 }
@@ -97,18 +111,24 @@ static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
     // All add to the same counts.
     vkb_barrier_record(run->device, run->submission->commands.buffer, NULL, true,
                        VKB_ACCESS_DISPATCH_CHANGED, VKB_ACCESS_DISPATCH_CHANGED);
-    return vkb_gather_create(run->device, run->frame->pipelines.cache, &run->frame->gather, error)
+    return vkb_gather_create(run->device, run->frame->pipelines.cache, work.kind,
+                             &run->frame->gather, error)
         && vkb_gather_record(run->device, &run->frame->gather, run->submission->commands.buffer,
                              run->submission->descriptors, &work, error);
 }
 
-static bool gather_input(struct vkb_run *run, const struct vkb_input *input, bool stores,
+static bool gather_input(struct vkb_run *run, const struct vkb_staged_input *staged, bool stores,
                          struct vkb_error *error)
 {
+    const struct vkb_input *input = staged->input;
+    const struct vkb_image *image = &staged->image->image;
     static const uint32_t ones[] = {[1] = 255, [2] = 0x3c00, [4] = 0x3f800000};
     const struct span span = span_of(run->device, input);
     const uint32_t size = (uint32_t)element_size(input->format);
     const struct vkb_gather_work work = {
+        .kind = dispatches(run->device) ? VKB_GATHER_TO_IMAGE : VKB_GATHER_BUFFER,
+        .image = {.imageView = image->view,
+                  .imageLayout = vkb_image_layout(image, VKB_ACCESS_DISPATCH_STORED)},
         .layout =
             {
                 .offset = (int32_t)(input->offset - span.start),
@@ -156,12 +176,18 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
     const struct vkb_input *input = staged->input;
-    const bool direct = is_direct(input), stores = staged->send && !direct;
+    const bool direct = is_direct(run->device, input), stores = staged->send && !direct;
 
     vkb_barrier_record_acquire(run->device, commands, input->exported->buffer.handle);
-    if ((stores || is_float(input->format)) && !gather_input(run, input, stores, error))
+    if (dispatches(run->device))
+        vkb_image_transition(run->device, commands, &staged->image->image,
+                             VKB_ACCESS_DISPATCH_STORED);
+    if ((stores || is_float(input->format)) && !gather_input(run, staged, stores, error))
         return false;
     if (!staged->send)
+        return true;
+    staged->image->content.valid = true;
+    if (dispatches(run->device))
         return true;
     if (stores)
         vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_DISPATCH_STORED,
@@ -169,18 +195,31 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     copy_to_image(run, input, &staged->image->image, direct);
     if (stores)
         free_scratch(run, VKB_ACCESS_COPY_SOURCE);
-    staged->image->content.valid = true;
     return true;
 }
 
-bool vkb_exported_record_output(struct vkb_run *run, const struct vkb_output *output,
-                                struct vkb_error *error)
+static bool gather_image(struct vkb_run *run, struct vkb_image *image, struct vkb_gather_work *work,
+                         struct vkb_error *error)
+{
+    work->kind = VKB_GATHER_FROM_IMAGE;
+    vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                         VKB_ACCESS_DISPATCH_SAMPLED);
+    work->image.imageView = image->view;
+    work->image.imageLayout = vkb_image_layout(image, VKB_ACCESS_DISPATCH_SAMPLED);
+    return vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
+                                &work->image.sampler, error)
+        && gather(run, work, error);
+}
+
+bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
+                                const struct vkb_output *output, struct vkb_error *error)
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
-    const bool complete = vkb_readback_is_complete(output);
+    const bool from_image = vkb_exported_dispatches(run->device, output);
+    const bool copied = !from_image && vkb_readback_is_complete(output);
     const uint32_t size = (uint32_t)element_size(output->format);
     const uint32_t pixel = (uint32_t)vkb_pixel_size(output->format);
-    const struct vkb_gather_work work = {
+    struct vkb_gather_work work = {
         .layout =
             {
                 .row_stride = (int32_t)(output->width * pixel),
@@ -197,7 +236,10 @@ bool vkb_exported_record_output(struct vkb_run *run, const struct vkb_output *ou
         .to = {output->exported->buffer.handle, 0, VK_WHOLE_SIZE},
     };
 
-    if (!complete) {
+    if (from_image) {
+        if (!gather_image(run, image, &work, error))
+            return false;
+    } else if (!copied) {
         vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_COPY_TARGET,
                            VKB_ACCESS_DISPATCH_LOADED);
         if (!gather(run, &work, error))
@@ -205,6 +247,6 @@ bool vkb_exported_record_output(struct vkb_run *run, const struct vkb_output *ou
         free_scratch(run, VKB_ACCESS_DISPATCH_LOADED);
     }
     vkb_barrier_record_release(run->device, commands, output->exported->buffer.handle,
-                               complete ? VKB_ACCESS_COPY_TARGET : VKB_ACCESS_DISPATCH_STORED);
+                               copied ? VKB_ACCESS_COPY_TARGET : VKB_ACCESS_DISPATCH_STORED);
     return true;
 }

@@ -9,8 +9,13 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
                         struct vkb_error *error);
 
 // The bytes of scratch memory that an input or an output needs.
-VkDeviceSize vkb_exported_input_scratch(const struct vkb_input *input);
-VkDeviceSize vkb_exported_output_scratch(const struct vkb_output *output);
+VkDeviceSize vkb_exported_input_scratch(const struct vkb_device *device,
+                                        const struct vkb_input *input);
+VkDeviceSize vkb_exported_output_scratch(const struct vkb_device *device,
+                                         const struct vkb_output *output);
+
+// Whether a dispatch reads the output's image, so that no copy is needed before.
+bool vkb_exported_dispatches(const struct vkb_device *device, const struct vkb_output *output);
 
 // Records the copy of the input to its image, if it is to be sent, and the count of NaN and
 // infinity.
@@ -18,7 +23,7 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
                                struct vkb_error *error);
 
 // Records what follows the copy of an output by its sink: it is handed over to CUDA.
-bool vkb_exported_record_output(struct vkb_run *run, const struct vkb_output *output,
-                                struct vkb_error *error);
+bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
+                                const struct vkb_output *output, struct vkb_error *error);
 
 #endif

@@ -79,14 +79,15 @@ static bool reserve_exported(struct vkb_run *run, const struct vkb_request *requ
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         if (run->inputs[kind].input) {
-            scratch = larger(scratch, vkb_exported_input_scratch(run->inputs[kind].input));
+            scratch =
+                larger(scratch, vkb_exported_input_scratch(run->device, run->inputs[kind].input));
             readback->counted = true;
         }
     for (uint32_t i = 0; i < request_count; ++i)
         for (uint32_t output = 0; output < requests[i].plan->output_count; ++output)
             if (requests[i].outputs[output].exported) {
                 const struct vkb_output *one = &requests[i].outputs[output];
-                scratch = larger(scratch, vkb_exported_output_scratch(one));
+                scratch = larger(scratch, vkb_exported_output_scratch(run->device, one));
                 readback->counted = true;
             }
     if (!readback->counted)
@@ -262,10 +263,12 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         return false;
     for (uint32_t i = 0; i < request->plan->output_count; ++i) {
         struct vkb_cached_image *cached = run->images[request->plan->outputs[i]];
-        vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
-                            &cached->image, &request->outputs[i]);
+        if (!request->outputs[i].exported
+            || !vkb_exported_dispatches(run->device, &request->outputs[i]))
+            vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
+                                &cached->image, &request->outputs[i]);
         if (request->outputs[i].exported
-            && !vkb_exported_record_output(run, &request->outputs[i], error))
+            && !vkb_exported_record_output(run, &cached->image, &request->outputs[i], error))
             return false;
         // A pass that stored to the caller's memory did not write the image.
         cached->content.valid =

@@ -3,20 +3,33 @@
 #include "spirv.h"
 
 enum {
-    BUFFERS = 3,
+    BINDINGS = 3,
     GROUP_SIZE = 128,      // of gather.comp
     MOST_GROUPS = 0xffff,  // along x, which every device can do
 };
 
-static bool create_layouts(const struct vkb_device *device, struct vkb_gather *gather,
-                           struct vkb_error *error)
-{
-    VkDescriptorSetLayoutBinding bindings[BUFFERS];
+#define BUFFER VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
 
-    for (uint32_t i = 0; i < BUFFERS; ++i)
+static const struct kind {
+    const struct vkb_shader *shader;
+    VkDescriptorType types[BINDINGS];
+} kinds[VKB_GATHER_COUNT] = {
+    [VKB_GATHER_BUFFER] = {&vkb_shader_gather_buffer_comp, {BUFFER, BUFFER, BUFFER}},
+    [VKB_GATHER_TO_IMAGE] = {&vkb_shader_gather_to_image_comp,
+                             {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
+    [VKB_GATHER_FROM_IMAGE] = {&vkb_shader_gather_from_image_comp,
+                               {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
+};
+
+static bool create_layouts(const struct vkb_device *device, const struct kind *kind,
+                           struct vkb_gather_pipeline *gather, struct vkb_error *error)
+{
+    VkDescriptorSetLayoutBinding bindings[BINDINGS];
+
+    for (uint32_t i = 0; i < BINDINGS; ++i)
         bindings[i] = (VkDescriptorSetLayoutBinding){
             .binding = i,
-            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+            .descriptorType = kind->types[i],
             .descriptorCount = 1,
             .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
         };
@@ -24,7 +37,7 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_gather *g
                          device->handle,
                          &(VkDescriptorSetLayoutCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                             .bindingCount = BUFFERS,
+                             .bindingCount = BINDINGS,
                              .pBindings = bindings,
                          },
                          NULL, &gather->sets))
@@ -45,9 +58,9 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_gather *g
 }
 
 static bool create_pipeline(const struct vkb_device *device, VkPipelineCache cache,
-                            struct vkb_gather *gather, struct vkb_error *error)
+                            const struct vkb_shader *shader, struct vkb_gather_pipeline *gather,
+                            struct vkb_error *error)
 {
-    const struct vkb_shader *shader = &vkb_shader_gather_comp;
     VkShaderModule module;
 
     if (!VK(error, device->vk.vkCreateShaderModule(
@@ -73,44 +86,55 @@ static bool create_pipeline(const struct vkb_device *device, VkPipelineCache cac
                               },
                           .layout = gather->layout,
                       },
-                      NULL, &gather->pipeline));
+                      NULL, &gather->handle));
     device->vk.vkDestroyShaderModule(device->handle, module, NULL);
     return done;
 }
 
-bool vkb_gather_create(const struct vkb_device *device, VkPipelineCache cache,
-                       struct vkb_gather *gather, struct vkb_error *error)
+static void destroy(const struct vkb_device *device, struct vkb_gather_pipeline *pipeline)
 {
-    if (gather->pipeline)
+    device->vk.vkDestroyPipeline(device->handle, pipeline->handle, NULL);
+    device->vk.vkDestroyPipelineLayout(device->handle, pipeline->layout, NULL);
+    device->vk.vkDestroyDescriptorSetLayout(device->handle, pipeline->sets, NULL);
+    *pipeline = (struct vkb_gather_pipeline){0};
+}
+
+bool vkb_gather_create(const struct vkb_device *device, VkPipelineCache cache,
+                       enum vkb_gather_kind kind, struct vkb_gather *gather,
+                       struct vkb_error *error)
+{
+    struct vkb_gather_pipeline *pipeline = &gather->pipelines[kind];
+
+    if (pipeline->handle)
         return true;
-    vkb_gather_destroy(device, gather);
-    return create_layouts(device, gather, error) && create_pipeline(device, cache, gather, error);
+    destroy(device, pipeline);
+    return create_layouts(device, &kinds[kind], pipeline, error)
+        && create_pipeline(device, cache, kinds[kind].shader, pipeline, error);
 }
 
 void vkb_gather_destroy(const struct vkb_device *device, struct vkb_gather *gather)
 {
-    device->vk.vkDestroyPipeline(device->handle, gather->pipeline, NULL);
-    device->vk.vkDestroyPipelineLayout(device->handle, gather->layout, NULL);
-    device->vk.vkDestroyDescriptorSetLayout(device->handle, gather->sets, NULL);
-    *gather = (struct vkb_gather){0};
+    for (int kind = 0; kind < VKB_GATHER_COUNT; ++kind)
+        destroy(device, &gather->pipelines[kind]);
 }
 
 static void write_set(const struct vkb_device *device, VkDescriptorSet set,
                       const struct vkb_gather_work *work)
 {
-    const VkDescriptorBufferInfo *buffers[BUFFERS] = {&work->from, &work->to, &work->counts};
-    VkWriteDescriptorSet writes[BUFFERS];
+    const VkDescriptorBufferInfo *buffers[BINDINGS] = {&work->from, &work->to, &work->counts};
+    VkWriteDescriptorSet writes[BINDINGS];
 
-    for (uint32_t i = 0; i < BUFFERS; ++i)
+    for (uint32_t i = 0; i < BINDINGS; ++i)
         writes[i] = (VkWriteDescriptorSet){
             .sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
             .dstSet = set,
             .dstBinding = i,
             .descriptorCount = 1,
-            .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+            .descriptorType = kinds[work->kind].types[i],
             .pBufferInfo = buffers[i],
+            .pImageInfo = &work->image,
         };
-    device->vk.vkUpdateDescriptorSets(device->handle, BUFFERS, writes, 0, NULL);
+    device->vk.vkUpdateDescriptorSets(device->handle, BINDINGS, writes, 0, NULL);
 }
 
 bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather *gather,
@@ -119,8 +143,11 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
 {
     const struct vkb_gather_layout *layout = &work->layout;
     const struct VolkDeviceTable *vk = &device->vk;
-    const uint32_t per_group = GROUP_SIZE * 4 / layout->size;
-    const uint64_t count = (uint64_t)layout->width * layout->height * layout->channels;
+    const struct vkb_gather_pipeline *pipeline = &gather->pipelines[work->kind];
+    const bool by_pixel = work->kind == VKB_GATHER_TO_IMAGE;
+    const uint32_t per_group = GROUP_SIZE * (by_pixel ? 1 : 4 / layout->size);
+    const uint64_t count =
+        (uint64_t)layout->width * layout->height * (by_pixel ? 1 : layout->channels);
     const uint32_t groups = (uint32_t)((count + per_group - 1) / per_group);
     const uint32_t rows = (groups + MOST_GROUPS - 1) / MOST_GROUPS;
     VkDescriptorSet set;
@@ -131,16 +158,16 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = pool,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &gather->sets,
+                           .pSetLayouts = &pipeline->sets,
                        },
                        &set)))
         return false;
     write_set(device, set, work);
-    vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, gather->pipeline);
-    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, gather->layout, 0, 1,
+    vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->handle);
+    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->layout, 0, 1,
                                 &set, 0, NULL);
-    vk->vkCmdPushConstants(commands, gather->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof *layout,
-                           layout);
+    vk->vkCmdPushConstants(commands, pipeline->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                           sizeof *layout, layout);
     vk->vkCmdDispatch(commands, (groups + rows - 1) / rows, rows, 1);
     return true;
 }

@@ -1,19 +1,29 @@
-// A dispatch outside of the graph: moves elements from any strides to a dense buffer, and counts
-// NaN and infinity among them.
+// A dispatch outside of the graph: moves elements between images and buffers with any strides, and
+// counts NaN and infinity among them.
 #ifndef VKB_GATHER_H
 #define VKB_GATHER_H
 
 #include "vulkan/memory.h"
 
-// Created at the first use; destroying a zeroed or half-created one is safe.
+enum vkb_gather_kind {
+    VKB_GATHER_BUFFER,
+    VKB_GATHER_TO_IMAGE,
+    VKB_GATHER_FROM_IMAGE,
+    VKB_GATHER_COUNT,
+};
+
+// Created at the first use of each kind; destroying a zeroed or half-created one is safe.
 struct vkb_gather {
-    VkDescriptorSetLayout sets;
-    VkPipelineLayout layout;
-    VkPipeline pipeline;
+    struct vkb_gather_pipeline {
+        VkDescriptorSetLayout sets;
+        VkPipelineLayout layout;
+        VkPipeline handle;
+    } pipelines[VKB_GATHER_COUNT];
 };
 
 bool vkb_gather_create(const struct vkb_device *device, VkPipelineCache cache,
-                       struct vkb_gather *gather, struct vkb_error *error);
+                       enum vkb_gather_kind kind, struct vkb_gather *gather,
+                       struct vkb_error *error);
 void vkb_gather_destroy(const struct vkb_device *device, struct vkb_gather *gather);
 
 // The push constants of gather.comp: strides in bytes, `one` for channels that are not there.
@@ -23,9 +33,12 @@ struct vkb_gather_layout {
     uint32_t size, one, stores, is_float;
 };
 
+// By its kind, `image` stands in place of `from` or `to`.
 struct vkb_gather_work {
+    enum vkb_gather_kind kind;
     struct vkb_gather_layout layout;
     VkDescriptorBufferInfo from, to, counts;
+    VkDescriptorImageInfo image;
 };
 
 // Bytes from the counts of one request to those of the next.

@@ -25,6 +25,8 @@ _CODES = {"uint8": _UINT, "float16": _FLOAT, "float32": _FLOAT}
 _FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
 # CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
 _LEGACY = 1
+# More elements than any memory has.
+_MOST = 1 << 48
 
 
 class DeviceArray:
@@ -304,6 +306,12 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     dtype = _check_dtype(name, code, bits, lanes)
     size = np.dtype(dtype).itemsize
     elements = _contiguous(shape) if strides is None else strides
+    if any(abs(one) >= _MOST for one in elements):
+        # CuPy 14 divides negative strides as if they had no sign.
+        if hasattr(image, "__cuda_array_interface__"):
+            # The capsule has ordered our stream after the producer's work.
+            return _from_interface(image, name)._replace(stream=0)
+        raise ValueError(f"{name}: strides {elements} are out of range; make it contiguous")
     # The producer has ordered our stream after its own work.
     return _Array(capsule, address, shape, tuple(size * one for one in elements), dtype, 0)
 

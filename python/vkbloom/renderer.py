@@ -377,6 +377,9 @@ class Renderer:
             one depends on them. They are not read back.
         out : mapping of str to ndarray, optional
             Arrays to fill, by name. Arrays for the other framebuffers are allocated.
+        device : {"host", "device"}, optional
+            Where the framebuffers go: arrays of NumPy, or `DeviceArray` objects. Default: "device"
+            if an array of the source is on the GPU, else "host".
 
         Returns
         -------
@@ -446,7 +449,8 @@ class Renderer:
             Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
             of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; the field
             `alpha` of the settings selects the treatment of an alpha. NaN and infinity count as 0
-            in the bloom, and stay in ``final`` at their pixels. An `Image` from `upload` is used
+            in the bloom, and stay in ``final`` at their pixels. It may be an array on the GPU with
+            `__dlpack__`, of which a copy is made there. An `Image` from `upload` is used
             with its mask and emission.
         settings : Settings, optional
             Default: ``presets["bevy_natural"]``.
@@ -458,8 +462,8 @@ class Renderer:
         emission : ndarray, optional
             An image of the same shape and dtype from which the bloom is made instead, like the glow
             mesh in a scene. It is added to the image in ``final``.
-        attachments, out
-            As for `render`.
+        attachments, out, device
+            As for `render`. Arrays of `out` may be on the GPU.
 
         Returns
         -------
@@ -588,7 +592,7 @@ class Renderer:
         image
             As for `apply`. An array must not change before the last frame is taken.
         settings_seq : iterable of Settings
-        attachments
+        attachments, device
             As for `apply`.
 
         Yields
@@ -633,11 +637,12 @@ class Renderer:
         Parameters
         ----------
         images : iterable of images
-            Each as for `apply`. Shapes and dtypes may differ. Each image is copied before the next
-            one is taken, so the iterable can fill one array repeatedly.
+            Each as for `apply`, or a batch (N, H, W, C), which is copied at once if it is on the
+            GPU. Shapes and dtypes may differ. Each image is copied before the next one is taken, so
+            the iterable can fill one array repeatedly.
         settings : Settings or sequence of Settings, optional
             For all images, or one for each image. Default: ``presets["bevy_natural"]``.
-        attachments
+        attachments, device
             As for `apply`.
 
         Yields
@@ -782,7 +787,7 @@ class Renderer:
 
         Parameters
         ----------
-        scene, size, shading, time, attachments
+        scene, size, shading, time, attachments, device
             As for `render`.
         settings_seq : iterable of Settings
 

@@ -52,7 +52,9 @@ def bloom(
     ----------
     image : Tensor, shape (..., H, W, C)
         Linear light with 3 or 4 channels, of float16, float32 or float64. Those of float64 are
-        computed in NumPy by `vkbloom.reference`, all others by the renderer.
+        computed in NumPy by `vkbloom.reference`, all others by the renderer. Tensors of CUDA stay
+        on their GPU; only a mask, which is checked there, and the derivatives take the way through
+        the host.
     settings : Settings
         `Settings.format` is not read: the bloom buffers are "rgba32float".
     mask : Tensor, shape (..., H, W), optional
@@ -60,7 +62,7 @@ def bloom(
     emission : Tensor, optional
         Of the image's shape and dtype.
     renderer : Renderer, optional
-        Default: one that this module opens at the first call.
+        Default: one that this module opens at the first call, for tensors of CUDA on their GPU.
     channels_first : bool
         Whether image, emission and result have the shape (..., C, H, W).
 
@@ -231,6 +233,11 @@ def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
         raise ValueError(f"image: the shape {shape} is not {order} with 3 or 4 channels")
     if not image.is_floating_point():
         raise TypeError(f"image: {image.dtype} has no derivative; give floats of linear light")
+    if image.dtype == torch.bfloat16:
+        raise TypeError(
+            "image: dtype torch.bfloat16 is not one of floats that NumPy has, float16, "
+            "float32, float64; convert it: image.float()"
+        )
     if emission is not None and (emission.shape, emission.dtype) != (image.shape, image.dtype):
         raise ValueError(
             f"emission: {tuple(emission.shape)} of {emission.dtype} is not the image's "
@@ -275,6 +282,12 @@ _opening: Final = threading.Lock()
 @functools.cache
 def _own_renderer() -> Renderer:
     return Renderer()
+
+
+@functools.cache
+def _renderer_on(index: int) -> Renderer:
+    """Return this module's renderer on the GPU with PyTorch's number."""
+    return Renderer(f"uuid:{torch.cuda.get_device_properties(index).uuid}")
 
 
 def _renderer(number: int) -> Renderer:
@@ -336,6 +349,8 @@ def _bloom(  # noqa: PLR0917
     settings: str,
     renderer: int,
 ) -> Any:
+    if image.is_cuda and image.dtype != torch.float64:
+        return _on_device(image, mask, emission, values, names, settings, renderer)
     final = np.empty(image.shape, _dtype(image))
     for index, arrays, one in _each(image, mask, emission, values, names, settings):
         given = dict(arrays)
@@ -348,6 +363,36 @@ def _bloom(  # noqa: PLR0917
             )
             final[index] = frames["final"]
     return torch.from_numpy(final).to(image.device)
+
+
+def _on_device(  # noqa: PLR0917
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    text: str,
+    number: int,
+) -> Any:
+    """Run the operator without the host; a batch without masks changes the context once."""
+    settings = _replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
+    settings = settings.replace(format="rgba32float")
+    renderer = _renderer(number) if number != _OWN else _renderer_on(image.device.index)
+    images = image.detach().reshape(-1, *image.shape[-3:])
+    if mask is None and emission is None:
+        frames = renderer.apply_each(images, settings, attachments="final")
+    else:
+        masks, emissions = (
+            [None] * len(images) if one is None else one.detach().reshape(-1, *one.shape[-sides:])
+            for one, sides in ((mask, 2), (emission, 3))
+        )
+        frames = (
+            renderer.apply(one, settings, mask=masks[i], emission=emissions[i], attachments="final")
+            for i, one in enumerate(images)
+        )
+    finals = [torch.from_dlpack(one["final"]) for one in frames]
+    final = finals[0] if len(finals) == 1 else torch.stack(finals)
+    return final.reshape(image.shape)
 
 
 def _dtype(tensor: Any) -> Any:

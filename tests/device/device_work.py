@@ -9,6 +9,7 @@ import ctypes
 import functools
 import gc
 import json
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +23,7 @@ from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable
 
 VALIDATION = "validated" in sys.argv
+ADAPTER = os.environ.get("VKBLOOM_TEST_NAME") or "software"
 
 _get = ctypes.pythonapi.PyCapsule_GetPointer
 _get.restype, _get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
@@ -240,7 +242,7 @@ def recycling(renderer: Any) -> None:
 
 
 def lifetime(renderer: Any) -> None:
-    other: Any = Renderer("software")
+    other: Any = Renderer(ADAPTER)
     with other:
         image = picture(24, 16)
         final = other.apply(OnDevice(image))["final"]
@@ -297,7 +299,7 @@ WORK = (layouts, streams, sequences, places, capsules, recycling, lifetime, erro
 
 def main() -> None:
     wrong = {}
-    with Renderer("software", validation=VALIDATION) as renderer:
+    with Renderer(ADAPTER, validation=VALIDATION) as renderer:
         for work in WORK:
             try:
                 work(renderer)

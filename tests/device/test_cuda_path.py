@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.core.builds import ROOT
+from tests.core.test_lesser_devices import layer, run  # noqa: F401  a fixture
 from tests.device import stand_in
 from tests.processes import python
 from vkbloom import AdapterInfo
@@ -26,6 +28,20 @@ def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None
         cwd=ROOT,
         **stand_in.variables(folder, software),
     )
+    check(done, folder)
+
+
+def test_dispatches_access_images(
+    folder: Path,
+    software: AdapterInfo,
+    layer: Path,  # noqa: F811
+) -> None:
+    """The same on an adapter that is not a CPU, as GPUs do it."""
+    program = ("-m", "tests.device.device_work", "validated")
+    check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
+
+
+def check(done: subprocess.CompletedProcess[str], folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {}
     left = (folder / "left").read_text().split()

@@ -160,6 +160,32 @@ def read(
     return pixels, facts
 
 
+def _check_conversions(
+    values: NDArray[Any],
+    encoding: str | None,
+    bits: int | None,
+    primaries: str,
+    view: str | None,
+) -> None:
+    """Raise ValueError for conversions of `write` that the values cannot have."""
+    is_float = values.dtype.kind == "f"
+    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
+        raise ValueError(
+            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
+            if is_float
+            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
+        )
+    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
+        own = 8 * values.dtype.itemsize
+        if bits != own or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    displayed.check_primaries(primaries)
+    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
+        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
+    if view is not None and (encoding is not None or primaries != "rec709"):
+        raise ValueError("view: it has its own encoding and primaries; leave them out")
+
+
 def write(
     path: str | os.PathLike[str],
     array: NDArray[Any],
@@ -248,12 +274,7 @@ def write(
         raise TypeError(f"metadata: {metadata!r} is not a mapping of names to values")
     values = _checked(array)
     is_float = values.dtype.kind == "f"
-    _check_encoding(values, encoding, bits, is_float=is_float)
-    displayed.check_primaries(primaries)
-    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
-        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
-    if view is not None and (encoding is not None or primaries != "rec709"):
-        raise ValueError("view: it has its own encoding and primaries; leave them out")
+    _check_conversions(values, encoding, bits, primaries, view)
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
@@ -288,22 +309,6 @@ def write(
             attributes={} if quality is None else {"CompressionQuality": quality},
         )
     return target
-
-
-def _check_encoding(
-    values: NDArray[Any], encoding: str | None, bits: int | None, *, is_float: bool
-) -> None:
-    """Raise ValueError for an encoding or bits that do not fit the array."""
-    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
-        raise ValueError(
-            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
-            if is_float
-            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
-        )
-    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
-        own = 8 * values.dtype.itemsize
-        if bits != own or is_float:
-            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
 
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:
