@@ -41,6 +41,29 @@ static int is_wanted(PyObject *names, const char *name)
     return wanted;
 }
 
+// Raises ValueError with the framebuffers that there are, and the one that may be meant.
+static void raise_unknown(const struct vkb_graph *graph, PyObject *name)
+{
+    PyObject *module = PyImport_ImportModule("vkbloom.suggestions");
+    PyObject *known = module ? PyList_New(0) : NULL;
+    for (uint32_t i = 0; known && i < graph->image_count; ++i) {
+        if (!graph->images[i].framebuffer)
+            continue;
+        PyObject *one = PyUnicode_FromString(graph->images[i].name);
+        if (!one || PyList_Append(known, one))
+            Py_CLEAR(known);
+        Py_XDECREF(one);
+    }
+    PyObject *text = known ? PyObject_CallMethod(module, "unknown", "sOO",
+                                                 "attachments: unknown framebuffer", name, known)
+                           : NULL;
+    if (text)
+        PyErr_SetObject(PyExc_ValueError, text);
+    Py_XDECREF(text);
+    Py_XDECREF(known);
+    Py_XDECREF(module);
+}
+
 static bool check_names(const struct vkb_graph *graph, PyObject *names)
 {
     for (Py_ssize_t i = 0, count = names == Py_None ? 0 : PyTuple_Size(names); i < count; ++i) {
@@ -53,12 +76,7 @@ static bool check_names(const struct vkb_graph *graph, PyObject *names)
             continue;
         if (PyErr_Occurred())
             return false;
-        char list[1024] = "";
-        for (image = 0; image < graph->image_count; ++image)
-            if (graph->images[image].framebuffer && strlen(list) + VKB_NAME_SIZE + 2 < sizeof list)
-                strcat(strcat(list, *list ? ", " : ""), graph->images[image].name);
-        PyErr_Format(PyExc_ValueError, "attachments: unknown framebuffer %R; available: %s", name,
-                     list);
+        raise_unknown(graph, name);
         return false;
     }
     return true;

@@ -126,6 +126,16 @@ def _kinds(annotation: str) -> list[tuple[str, _Test]]:
     return kinds
 
 
+def _message(name: str, value: object, shown: list[str]) -> str:
+    what = " or ".join(dict.fromkeys(one for one in shown if one != "None"))
+    cure = ""
+    if "a Settings" in shown:
+        from vkbloom.settings import settings_cure  # noqa: PLC0415  settings import this module
+
+        cure = settings_cure(value)
+    return f"{name}: {reprlib.repr(value)} is not {what}{cure}"
+
+
 def checked(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Make a function raise TypeError for an argument of another type than its annotation names.
 
@@ -142,8 +152,7 @@ def checked(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
             accepted = kinds.get(name)
             if accepted and not any(test(value) for _, test in accepted):
-                what = " or ".join(dict.fromkeys(shown for shown, _ in accepted))
-                raise TypeError(f"{name}: {reprlib.repr(value)} is not {what}")
+                raise TypeError(_message(name, value, [shown for shown, _ in accepted]))
         return function(*args, **kwargs)
 
     return call

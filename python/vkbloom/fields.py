@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Final, Literal, Self
 
 from vkbloom import _core
 from vkbloom.checks import check_above, check_integer, check_number, check_size
+from vkbloom.suggestions import did_you_mean, lacking
 
 __all__ = [
     "FieldInfo",
@@ -142,7 +143,10 @@ class FieldInfo:
             of = ""
             if self.narrowed and issubclass(self.owner, Record):
                 of = f", which the {self.owner._class_key} {self.owner._class_name()} has"
-            raise ValueError(f"{self.name}: {value!r} is not one of {', '.join(self.choices)}{of}")
+            near = did_you_mean(value, self.choices) if isinstance(value, str) else ""
+            raise ValueError(
+                f"{self.name}: {value!r} is not one of {', '.join(self.choices)}{of}{near}"
+            )
         # Not with str(), which returns an enum's own name.
         return self.choices[self.choices.index(value)]
 
@@ -241,6 +245,20 @@ def check_fields(record: Any) -> None:
             object.__setattr__(record, name, info.check(value))
 
 
+class _ConstructorSignature:
+    """The signature of a class's ``__init__``."""
+
+    def __get__(self, _: object, owner: type[Any]) -> inspect.Signature:
+        signature = inspect.signature(owner.__init__)
+        return signature.replace(parameters=[*signature.parameters.values()][1:])
+
+
+def _unknown(kind: type[Record], name: str, unknown: list[str]) -> str:
+    """Return the text of an error for fields that a class lacks."""
+    others = {other: fields_of(one) for other, one in kind._classes().items()}
+    return lacking(name, unknown, fields_of(kind), others)
+
+
 class Record:
     """Base class of settings, stages of glare and point-spread functions.
 
@@ -251,6 +269,18 @@ class Record:
     _class_key: ClassVar[str]
     #: The beginning of error messages about the fields.
     _subject: ClassVar[str]
+
+    #: The constructor's, since `inspect` would show the arguments of `__new__`.
+    __signature__ = _ConstructorSignature()
+
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        """Raise TypeError for a field that the class lacks, with the field that was meant."""
+        if values and dataclasses.is_dataclass(cls):
+            known = fields_of(cls)
+            if not known.keys() >= values.keys():
+                unknown = [name for name in values if name not in known]
+                raise TypeError(_unknown(cls, cls.__name__, unknown))
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -336,7 +366,8 @@ class Record:
         name = fields.get(key, own)
         if not isinstance(name, str) or name not in classes:
             load = "; load its file with vkbloom.load_method" if "sha256" in fields else ""
-            raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}{load}")
+            near = did_you_mean(name, classes)
+            raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}{load or near}")
         if own not in (None, name):
             raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
         values = {field: value for field, value in fields.items() if field != key}
@@ -344,10 +375,7 @@ class Record:
         declared = fields_of(classes[name])
         unknown = [field for field in values if field not in declared]
         if unknown:
-            raise ValueError(
-                f"{cls._subject}: {name} has no {', '.join(map(repr, unknown))}; "
-                f"it has {', '.join(declared)}"
-            )
+            raise ValueError(f"{cls._subject}: {_unknown(classes[name], name, unknown)}")
         lacking = [
             field
             for field, info in declared.items()

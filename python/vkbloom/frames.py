@@ -14,6 +14,7 @@ from vkbloom.argument_types import checked
 from vkbloom.checks import import_extra
 from vkbloom.device_arrays import DeviceArray, on_host
 from vkbloom.framebuffers import dimensions
+from vkbloom.suggestions import unknown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -122,8 +123,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         try:
             return self._arrays[name]
         except KeyError:
-            held = ", ".join(self._arrays) or "none"
-            raise KeyError(f"unknown framebuffer {name!r}; available: {held}") from None
+            raise KeyError(unknown("unknown framebuffer", name, self._arrays)) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._arrays)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from vkbloom.glare.base import check_glare
 from vkbloom.glare.dirt import Dirt
 from vkbloom.glare.flares import Ghosts, Halo
 from vkbloom.glare.streaks import Streaks
+from vkbloom.suggestions import Named, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -114,23 +115,24 @@ def _blender_streaks(
 
 _URP_SCALE = 1.25**1.5
 
-#: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``.
-#:
-#: - ``"filament_flare"``: google/filament, flare.mat @ 523a261b1052, Options.h @ 044f3ebdf780.
-#: - ``"three_lensflare"``: mrdoob/three.js, examples/jsm/tsl/display/LensflareNode.js
-#:   @ 0a0cd97338d3.
-#: - ``"urp_flare"``: Unity-Technologies/Graphics, LensFlareScreenSpaceCommon.hlsl @ 0e4ca4d79b2c,
-#:   ScreenSpaceLensFlare.cs @ 2309d2c2fde8, with an intensity of 1; regular and reversed flares.
-#: - ``"unreal_flare"``: formulas of Unreal Engine's PostProcessLensFlares.cpp, without the bokeh.
-#: - ``"blender_ghosts"``, ``"blender_streaks"``: formulas of the Glare node of Blender 5,
-#:   node_composite_glare.cc, types Ghosts and Streaks, with their defaults.
-#: - ``"anamorphic"``: a long horizontal streak.
-#: - ``"godot_dirt"``: godotengine/godot, tonemap.glsl @ 001c8c9c24dc, with the default strength of
-#:   the environment's glow map. The picture of the dirt is generated.
-glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
-    {
-        "filament_flare": _filament(),
-        "three_lensflare": (
+
+class NamedGlare(NamedTuple):
+    """Stages, what they look like, and whose they are."""
+
+    stages: tuple[Glare, ...]
+    what: str
+    whose: str
+
+
+#: The glares by name.
+GLARES: Final[Mapping[str, NamedGlare]] = {
+    "filament_flare": NamedGlare(
+        _filament(),
+        "four ghosts and a halo of what is above 10",
+        "google/filament, flare.mat @ 523a261b1052, Options.h @ 044f3ebdf780",
+    ),
+    "three_lensflare": NamedGlare(
+        (
             Ghosts(
                 scales=tuple(0.25 * ghost - 1 for ghost in range(4)),
                 threshold=0.5,
@@ -138,13 +140,31 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
                 radius=1,
             ),
         ),
-        "urp_flare": (
-            Ghosts(scales=(1 / _URP_SCALE, -1 / _URP_SCALE), falloff=0, vignette=1, intensity=0.1),
-        ),
-        "unreal_flare": _unreal(),
-        "blender_ghosts": _blender_ghosts(),
-        "blender_streaks": _blender_streaks(),
-        "anamorphic": (
+        "four ghosts of what is above 0.5, near the centre",
+        "mrdoob/three.js, LensflareNode.js @ 0a0cd97338d3",
+    ),
+    "urp_flare": NamedGlare(
+        (Ghosts(scales=(1 / _URP_SCALE, -1 / _URP_SCALE), falloff=0, vignette=1, intensity=0.1),),
+        "a regular and a reversed copy of what glows, with the intensity 1",
+        "Unity URP, LensFlareScreenSpaceCommon.hlsl @ 0e4ca4d79b2c",
+    ),
+    "unreal_flare": NamedGlare(
+        _unreal(),
+        "eight tinted ghosts, without the bokeh",
+        "Unreal Engine, PostProcessLensFlares.cpp (formulas)",
+    ),
+    "blender_ghosts": NamedGlare(
+        _blender_ghosts(),
+        "eight ghosts of what is above 1",
+        "Blender 5, Glare node, Ghosts (formulas)",
+    ),
+    "blender_streaks": NamedGlare(
+        _blender_streaks(),
+        "a star of four streaks of what is above 1",
+        "Blender 5, Glare node, Streaks (formulas)",
+    ),
+    "anamorphic": NamedGlare(
+        (
             Streaks(
                 directions=1,
                 threshold=1,
@@ -155,8 +175,20 @@ glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
                 halvings=1,
             ),
         ),
-        "godot_dirt": (Dirt(strength=0.8, mode="lerp"),),
-    }
+        "a long horizontal streak of what is above 1",
+        "vkbloom, after anamorphic lenses",
+    ),
+    "godot_dirt": NamedGlare(
+        (Dirt(strength=0.8, mode="lerp"),),
+        "generated dirt on the lens, lit by the bloom, with the strength 0.8",
+        "Godot, glow map of tonemap.glsl @ 001c8c9c24dc",
+    ),
+}
+
+#: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
+#: ``docs/glare.md`` list what they are, with their sources.
+glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
+    Named("glare", {name: one.stages for name, one in GLARES.items()})
 )
 
 
@@ -164,6 +196,7 @@ def read_glare(glare: object) -> tuple[Glare, ...]:
     """Return the stages of settings: those of a name in `glares`, or of `check_glare`."""
     if isinstance(glare, str):
         if glare not in glares:
-            raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}")
+            near = did_you_mean(glare, glares)
+            raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}{near}")
         return glares[glare]
     return check_glare(glare)

@@ -22,6 +22,7 @@ from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings
 from vkbloom.sources import batch_sources, image_kind, image_source, is_image, scene_source
+from vkbloom.suggestions import unknown
 from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
@@ -362,7 +363,7 @@ class Renderer:
         ----------
         scene : Scene
         settings : Settings, optional
-            Default: ``Separable()``, the forward system's method.
+            Default: ``presets["tutorial"]``, which is ``Separable()``.
         size : (int, int)
             Width and height of the frame in pixels.
         shading : {"forward", "deferred"}
@@ -455,7 +456,7 @@ class Renderer:
             `__dlpack__`, of which a copy is made there. An `Image` from `upload` is used
             with its mask and emission.
         settings : Settings, optional
-            By default ``Separable()``.
+            Default: ``presets["bevy_natural"]``.
         mask : ndarray, shape (H, W), optional
             The parts that glow, 0 to 1, with the image's size: uint8 (read as value / 255), bool,
             float16 or float32. It is reduced bilinearly like the image, and multiplies the
@@ -518,7 +519,7 @@ class Renderer:
         >>> glow[16, 16, 0].item(), glow[16, 48, 0].item()
         (10.0, 0.0)
         """
-        settings = check_settings(settings)
+        settings = check_settings(settings, of_image=True)
         source = image_source(image, mask, emission, self._core)
         return self._run_one(source, settings, check_attachments(attachments), out, device)
 
@@ -577,7 +578,7 @@ class Renderer:
         """
         from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
 
-        return vjp(self.apply, image, check_settings(settings), mask, emission)
+        return vjp(self.apply, image, check_settings(settings, of_image=True), mask, emission)
 
     @checked
     def apply_many(
@@ -645,7 +646,7 @@ class Renderer:
             GPU. Shapes and dtypes may differ. Each image is copied before the next one is taken, so
             the iterable can fill one array repeatedly.
         settings : Settings or sequence of Settings, optional
-            For all images, or one for each image. Default: ``Separable()``.
+            For all images, or one for each image. Default: ``presets["bevy_natural"]``.
         attachments, device
             As for `apply`.
 
@@ -694,12 +695,10 @@ class Renderer:
                 "call apply or pass a list"
             )
         if settings is not None and not isinstance(settings, Settings):
-            if not isinstance(settings, abc.Sequence):
-                raise TypeError(
-                    f"settings: {settings!r} is not a Settings or a sequence of Settings"
-                )
+            if not isinstance(settings, abc.Sequence) or isinstance(settings, str):
+                check_settings(settings)
             settings = [
-                check_settings(one, f"settings[{place}]") for place, one in enumerate(settings)
+                check_settings(one, f"settings[{number}]") for number, one in enumerate(settings)
             ]
             if isinstance(images, abc.Sized) and len(images) != len(settings):
                 raise ValueError(
@@ -707,9 +706,10 @@ class Renderer:
                 )
         if self.closed:
             raise ValueError("the renderer is closed")
-        self._check_names(image_source(_ANY_IMAGE), settings or check_settings(None), names)
+        chosen = settings or check_settings(None, of_image=True)
+        self._check_names(image_source(_ANY_IMAGE), chosen, names)
         sources = _sources(images, self._core)
-        work = requests.uploaded(self._core, _paired(sources, settings or check_settings(None)))
+        work = requests.uploaded(self._core, _paired(sources, chosen))
         results = requests.run(work, self._core, names, alone=True, place=self._placed(device))
         return (self._frames_of(one, result) for one, result in results)
 
@@ -846,7 +846,7 @@ class Renderer:
         source : Scene or an image
             As for `render` and `apply`.
         settings : Settings, optional
-            By default ``Separable()``.
+            Default: ``presets["bevy_natural"]`` for an image, ``presets["tutorial"]`` for a scene.
         size : (int, int), optional
             Width and height of a scene's frame. Default: (1280, 720). Not for an image.
         shading : {"forward", "deferred"}
@@ -889,7 +889,7 @@ class Renderer:
         """
         from vkbloom.plans import Pass, Plan, framebuffers  # noqa: PLC0415  costs start-up time
 
-        settings = check_settings(settings)
+        settings = check_settings(settings, of_image=is_image(source))
         names = check_attachments(attachments)
         kind: str = shading
         dtype = channels = None
@@ -947,7 +947,8 @@ class Renderer:
             Several images add the dimension "image" before all others, with a mapping's keys as
             labels. They must have the same shape and dtype.
         settings : Settings, optional
-            The settings that the axes change. Default: ``Separable()``.
+            The settings that the axes change. Default: ``presets["bevy_natural"]`` for images,
+            ``presets["tutorial"]`` for a scene.
         axes : mapping of str to sequence
             Values by settings field, or by "time" for a scene. The axis "preset" has names of
             `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of
@@ -1092,7 +1093,7 @@ class Renderer:
     ) -> Iterator[Frames]:
         place = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
-        if not isinstance(settings_seq, abc.Iterable):
+        if not isinstance(settings_seq, abc.Iterable) or isinstance(settings_seq, str):
             raise TypeError(f"settings_seq: {settings_seq!r} is not an iterable of Settings")
         if self.closed:
             raise ValueError("the renderer is closed")
@@ -1125,9 +1126,7 @@ class Renderer:
         kinds = {_NUMBER.sub("#", name) for name in found}
         for name in names or ():
             if found and _NUMBER.sub("#", name) not in kinds:
-                raise ValueError(
-                    f"attachments: unknown framebuffer {name!r}; available: {', '.join(found)}"
-                )
+                raise ValueError(unknown("attachments: unknown framebuffer", name, found))
 
     def _run_work(
         self,

@@ -7,7 +7,9 @@ declared once for the shaders, the core and Python.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any, ClassVar, Literal, Self, get_args
 
 from vkbloom.fields import (
@@ -21,6 +23,7 @@ from vkbloom.fields import (
 )
 from vkbloom.glare.base import Glare, replaced_stages, stage_field_of
 from vkbloom.registry import METHODS
+from vkbloom.suggestions import nearest
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -259,11 +262,40 @@ def check_shading(shading: str) -> Shading:
     return shading
 
 
-def check_settings(settings: Settings | None, name: str = "settings") -> Settings:
-    """Return the settings, `Separable()` for None; raise TypeError for anything else."""
-    if settings is None:
-        default: Settings = METHODS["separable"]()
-        return default
-    if not isinstance(settings, Settings):
-        raise TypeError(f"{name}: {settings!r} is not a Settings")
+@functools.cache
+def _defaults(method: str) -> Settings:
+    # Always the same object, since a renderer keeps the plan of the last one.
+    settings: Settings = METHODS[method]()
     return settings
+
+
+def check_settings(
+    settings: Settings | None, name: str = "settings", *, of_image: bool = False
+) -> Settings:
+    """Return the settings; raise TypeError for what is not a Settings or None.
+
+    None: the preset "tutorial", or with `of_image` "bevy_natural".
+    """
+    if settings is None:
+        return _defaults("bevy" if of_image else "separable")
+    if not isinstance(settings, Settings):
+        raise TypeError(f"{name}: {settings!r} is not a Settings{settings_cure(settings)}")
+    return settings
+
+
+def settings_cure(settings: object) -> str:
+    """Return what to give instead of an object that is not a Settings; "" if that is unknown."""
+    if isinstance(settings, type) and issubclass(settings, Settings):
+        return f"; give {settings.__name__}(), an object of the class"
+    if isinstance(settings, Mapping):
+        return "; give vkbloom.Settings.from_dict(...) of it"
+    if not isinstance(settings, str):
+        return ""
+    # The presets are made of the classes that derive from the one here.
+    presets = import_module("vkbloom.named_settings").presets
+    if settings not in presets and settings in METHODS:
+        kind = METHODS[settings]
+        name = kind.__name__
+        return f"; give {name}()" if METHODS.is_added(settings) else f"; give vkbloom.{name}()"
+    near = nearest(settings, presets)
+    return f"; give vkbloom.presets[{near!r}]" if near else f"; presets: {', '.join(presets)}"

@@ -158,7 +158,7 @@ class Surface:
             As for `Renderer.render` and `Renderer.apply`. An image for many frames is best
             uploaded once (`Renderer.upload`).
         settings : Settings, optional
-            By default ``Separable()``.
+            Default: as for `Renderer.apply` and `Renderer.render`.
         shading, time
             Of a scene, as for `Renderer.render`.
         size : (int, int), optional
@@ -197,7 +197,7 @@ class Surface:
         >>> def play(surface, scene, settings):
         ...     return [surface.present(scene, settings, time=step / 90) for step in range(90)]
         """
-        settings = check_settings(settings)
+        settings = check_settings(settings, of_image=is_image(source))
         width, height = self.size
         if min(width, height) < 1:
             return False

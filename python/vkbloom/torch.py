@@ -94,7 +94,7 @@ def bloom(
     >>> vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=2), channels_first=True).shape
     torch.Size([2, 3, 16, 16])
     """
-    settings = check_settings(settings)
+    settings = check_settings(settings, of_image=True)
     return _call(
         image,
         settings,
@@ -151,7 +151,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         channels_first: bool = False,
     ) -> None:
         super().__init__()
-        self._start = check_settings(settings)
+        self._start = check_settings(settings, of_image=True)
         self._names = (learn,) if isinstance(learn, str) else tuple(learn)
         self._renderer = renderer
         self._channels_first = channels_first

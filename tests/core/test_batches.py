@@ -504,7 +504,7 @@ def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
     assert "final" in ran
     assert again == {}
     for (array,) in (first, second):
-        np.testing.assert_array_equal(array, renderer.apply(image)["final"])
+        np.testing.assert_array_equal(array, renderer.apply(image, Separable())["final"])
 
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:

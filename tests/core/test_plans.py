@@ -178,7 +178,8 @@ def test_a_plan_cannot_be_changed(renderer: Renderer, plain: Any) -> None:
 
 
 def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
-    assert renderer.plan(plain).settings == Separable()
+    assert renderer.plan(plain).settings == presets["bevy_natural"]
+    assert renderer.plan(scene).settings == presets["tutorial"]
     assert renderer.plan(scene).size == (1280, 720)
 
 
@@ -340,7 +341,7 @@ def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> N
 
 
 def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
-    plan = renderer.plan(plain)
+    plan = renderer.plan(plain, Separable())
     table = plan._repr_html_()
     assert table.count("<tr>") == 1 + len(plan.passes)
     for one in plan.passes:

@@ -85,7 +85,7 @@ def test_a_final_that_comes_again_is_kept(
     finals = []
     runs = []
     for _ in range(5):
-        frames = renderer.apply(image, attachments=("final",))
+        frames = renderer.apply(image, Separable(), attachments=("final",))
         finals.append(frames["final"].copy())
         runs.append(list(frames.timings))
         # It is the caller's alone.

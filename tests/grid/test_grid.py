@@ -122,7 +122,7 @@ class TestPasses:
         axes: dict[str, list[Any]] = {
             list(AXES)[number]: list(AXES.values())[number] for number in order
         }
-        dataset = new_renderer().grid(image, None, axes, attachments="all")
+        dataset = new_renderer().grid(image, Separable(), axes, attachments="all")
         assert list(dataset["final"].dims[:4]) == list(axes)
         points = math.prod(map(len, axes.values()))
         assert dataset.attrs["passes_run"] == fewest(DEPENDS, axes)
@@ -131,7 +131,7 @@ class TestPasses:
     def test_one_requested_framebuffer_runs_no_further_pass(
         self, new_renderer: Callable[[], Renderer], image: Any
     ) -> None:
-        dataset = new_renderer().grid(image, None, AXES)
+        dataset = new_renderer().grid(image, Separable(), AXES)
         points = math.prod(map(len, AXES.values()))
         # Several passes may run as one.
         assert points <= dataset.attrs["passes_run"] <= fewest(DEPENDS, AXES)
@@ -268,7 +268,7 @@ class TestWholeSettings:
     def test_floats_become_the_largest_of_their_dtypes(self, renderer: Renderer) -> None:
         half = np.random.default_rng(4).random((8, 12, 3)).astype(np.float16)
         formats: Any = ["rgba16float", "rgba32float"]
-        grid = renderer.grid(half, None, {"format": formats}, attachments=("bloom",))
+        grid = renderer.grid(half, Separable(), {"format": formats}, attachments=("bloom",))
         assert grid["bloom"].dtype == np.float32
         for name in formats:
             expected = renderer.apply(half, Separable(format=name))["bloom"]
@@ -326,7 +326,7 @@ class TestDataset:
             "direct": [False, True],
             "weights": [(0.5, 0.25), (1.0,)],
         }
-        dataset = renderer.grid(image, None, axes)
+        dataset = renderer.grid(image, Separable(), axes)
         assert np.isnan(dataset["threshold"].values[0])
         assert list(dataset["tonemap"].values) == ["none", "agx"]
         assert list(dataset["bloom_size"].values) == ["none", "[8, 4]"]
@@ -351,7 +351,7 @@ class TestDataset:
 
     def test_xarray_selects(self, renderer: Renderer, image: Any) -> None:
         dataset = renderer.grid(
-            image, None, {"blur_scale": [0.5, 1.1, 2.0], "tonemap": ["none", "aces"]}
+            image, Separable(), {"blur_scale": [0.5, 1.1, 2.0], "tonemap": ["none", "aces"]}
         )
         chosen = dataset["final"].sel(blur_scale=1.0, method="nearest").sel(tonemap="aces")
         expected = renderer.apply(image, Separable(blur_scale=1.1, tonemap="aces"))["final"]
@@ -392,7 +392,7 @@ class TestRefusals:
         self, renderer: Renderer, image: Any, arguments: Any, kind: type[Exception], message: str
     ) -> None:
         with pytest.raises(kind, match=message):
-            renderer.grid(image, None, **arguments)
+            renderer.grid(image, Separable(), **arguments)
 
     @pytest.mark.parametrize("source", [None, "a.png", [], [np.zeros(3)], 3], ids=str)
     def test_sources(self, renderer: Renderer, source: Any) -> None:
@@ -457,7 +457,7 @@ class TestRefusals:
             return np.zeros(1 + int(frames.settings.exposure))
 
         with pytest.raises(ValueError, match=r"n: \(2,\) float64 at exposure=1"):
-            renderer.grid(image, None, {"exposure": [0, 1]}, reduce={"n": growing})
+            renderer.grid(image, Separable(), {"exposure": [0, 1]}, reduce={"n": growing})
 
     def test_an_error_on_the_way_leaves_the_renderer_usable(
         self, renderer: Renderer, image: Any
@@ -468,7 +468,7 @@ class TestRefusals:
             return 0.0
 
         with pytest.raises(ZeroDivisionError):
-            renderer.grid(image, None, {"exposure": [0, 1, 2]}, reduce={"n": failing})
+            renderer.grid(image, Separable(), {"exposure": [0, 1, 2]}, reduce={"n": failing})
         assert renderer.apply(image)["final"].shape == image.shape
 
 
@@ -481,8 +481,8 @@ class TestReduce:
             return frames["bloom"].std(axis=(0, 1))[:3]
 
         axes = {"blur_scale": [1.0, 2.0]}
-        beside = renderer.grid(image, None, axes, reduce={"spread": spread})
-        alone = renderer.grid(image, None, axes, attachments=(), reduce={"spread": spread})
+        beside = renderer.grid(image, Separable(), axes, reduce={"spread": spread})
+        alone = renderer.grid(image, Separable(), axes, attachments=(), reduce={"spread": spread})
         assert set(beside) == {"final", "spread"}
         assert set(alone) == {"spread"}
         assert alone["spread"].dims == ("blur_scale", "spread_dim_0")
@@ -532,7 +532,10 @@ class TestReduce:
     ) -> None:
         with pytest.raises(ValueError, match=told):
             renderer.grid(
-                image, None, {"blur_scale": [1.0]}, reduce={"s": reductions.SSIM(against=against)}
+                image,
+                Separable(),
+                {"blur_scale": [1.0]},
+                reduce={"s": reductions.SSIM(against=against)},
             )
 
 
@@ -543,7 +546,7 @@ class TestExtras:
     ) -> None:
         monkeypatch.setitem(sys.modules, missing, None)
         with pytest.raises(ModuleNotFoundError, match=rf"{missing}: pip install vkbloom\[grid\]"):
-            vkbloom.grid_to_zarr(image, None, {"exposure": [0]}, tmp_path / "a.zarr")
+            vkbloom.grid_to_zarr(image, Separable(), {"exposure": [0]}, tmp_path / "a.zarr")
         assert not (tmp_path / "a.zarr").exists()
 
     def test_importing_the_package_needs_none(self) -> None:
@@ -569,7 +572,7 @@ class TestProgress:
     def test_silent_without_a_terminal(
         self, renderer: Renderer, image: Any, capfd: pytest.CaptureFixture[str]
     ) -> None:
-        renderer.grid(image, None, {"exposure": [0, 1]}, progress=True)
+        renderer.grid(image, Separable(), {"exposure": [0, 1]}, progress=True)
         assert capfd.readouterr() == ("", "")
 
     def test_a_terminal_sees_passes(

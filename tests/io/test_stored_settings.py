@@ -33,7 +33,7 @@ class TestSettings:
             (vkbloom.Settings, {}, ValueError, "method: None is not one of separable, pyramid"),
             (vkbloom.Settings, {"method": "x"}, ValueError, "method: 'x' is not one of separable"),
             (vkbloom.Pyramid, {"method": "separable"}, ValueError, "is not the 'pyramid' of Pyr"),
-            (vkbloom.Pyramid, {"offset": 1}, ValueError, "pyramid has no 'offset'; it has bloom"),
+            (vkbloom.Pyramid, {"offset": 1}, ValueError, "'offset', which dual_kawase has"),
             (vkbloom.Pyramid, {"levels": 99}, ValueError, "levels: 99 is out of range"),
             (vkbloom.Pyramid, [1], TypeError, "fields: a mapping is needed, not list"),
         ],

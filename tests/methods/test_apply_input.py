@@ -86,9 +86,9 @@ def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
     image = VIEWS[view](picture(22, 15, 4, dtype))
     before = image.copy()
     plain = np.array(image, dtype=dtype, order="C")
-    frames = renderer.apply(image)
+    frames = renderer.apply(image, Separable())
     # The device sees no difference between a view and a copy, to the byte.
-    repeated = renderer.apply(plain)
+    repeated = renderer.apply(plain, Separable())
     assert repeated.timings == {}
     assert_same(frames, repeated)
     assert_matches_reference(frames, plain, Separable())
@@ -99,8 +99,8 @@ def test_subclasses_and_memory_maps(renderer: Renderer, tmp_path: Any) -> None:
     image = picture(5, 6, 3, "float32")
     mapped = np.memmap(tmp_path / "image.raw", np.float32, "w+", shape=image.shape)
     mapped[:] = image
-    frames = renderer.apply(mapped)
-    assert_same(frames, renderer.apply(image))
+    frames = renderer.apply(mapped, Separable())
+    assert_same(frames, renderer.apply(image, Separable()))
     assert {type(array) for array in frames.values()} == {np.ndarray}
 
 
@@ -210,10 +210,14 @@ def test_special_counts_follow_the_image(renderer: Renderer, dtype: str) -> None
     counts = (int(np.isnan(special).sum()), int(np.isinf(special).sum()))
     plain = picture(23, 17, 3, dtype)
     for image, expected in [(special, counts), (special, counts), (plain, (0, 0))] * 2:
-        info = renderer.apply(image).info
+        info = renderer.apply(image, Separable()).info
         assert (info["nan"], info["inf"]) == expected
     image = picture(23, 17, 3, "uint8")
-    assert renderer.apply(image).info["nan"] == renderer.apply(image).info["inf"] == 0
+    assert (
+        renderer.apply(image, Separable()).info["nan"]
+        == renderer.apply(image, Separable()).info["inf"]
+        == 0
+    )
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
@@ -296,13 +300,13 @@ def test_alpha_is_untouched(
 
 def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8", seed=8)
-    whole = renderer.apply(image)
-    frames = renderer.apply(image, attachments=["final", "glow", "final"])
+    whole = renderer.apply(image, Separable())
+    frames = renderer.apply(image, Separable(), attachments=["final", "glow", "final"])
     assert list(frames) == ["glow", "final"]
     for name, array in frames.items():
         assert_array_equal(array, whole[name])
-    assert list(renderer.apply(image, attachments="bloom")) == ["bloom"]
-    assert list(renderer.apply(image, attachments=())) == []
+    assert list(renderer.apply(image, Separable(), attachments="bloom")) == ["bloom"]
+    assert list(renderer.apply(image, Separable(), attachments=())) == []
 
 
 @pytest.mark.parametrize(
@@ -324,34 +328,34 @@ def test_unknown_attachment(renderer: Renderer, settings: Settings, name: str) -
 def test_attachments_of_the_wrong_type(renderer: Renderer) -> None:
     wrong: Any = (1,)
     with pytest.raises(TypeError, match="attachments"):
-        renderer.apply(picture(4, 4, 3, "uint8"), attachments=wrong)
+        renderer.apply(picture(4, 4, 3, "uint8"), Separable(), attachments=wrong)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_out_is_filled_in_place(renderer: Renderer, dtype: str) -> None:
     image = picture(12, 9, 3, dtype, seed=9)
     out = {"bloom": np.zeros((9, 12, 4), dtype), "final": np.zeros((9, 12, 3), dtype)}
-    frames = renderer.apply(image, out=out)
+    frames = renderer.apply(image, Separable(), out=out)
     assert list(frames) == ["glow", "blur_vertical", "bloom", "final"]
     for name, array in out.items():
         assert frames[name] is array
     assert_matches_reference(frames, image, Separable())
-    assert_same(frames, renderer.apply(image))
+    assert_same(frames, renderer.apply(image, Separable()))
 
 
 def test_out_of_a_repeated_image_is_filled(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8", seed=10)
-    expected = renderer.apply(image)["final"]
+    expected = renderer.apply(image, Separable())["final"]
     out = {"final": np.zeros_like(image)}
-    frames = renderer.apply(image, out=out)
+    frames = renderer.apply(image, Separable(), out=out)
     assert frames.timings == {}
     assert_array_equal(out["final"], expected)
 
 
 def test_out_can_be_the_image_itself(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "float32", seed=11)
-    expected = renderer.apply(image.copy())["final"]
-    renderer.apply(image, out={"final": image})
+    expected = renderer.apply(image.copy(), Separable())["final"]
+    renderer.apply(image, Separable(), out={"final": image})
     assert_array_equal(image, expected)
 
 
@@ -373,42 +377,42 @@ def test_out_that_does_not_fit(renderer: Renderer, array: Image) -> None:
     image = picture(12, 9, 3, "uint8")
     before = array.copy()
     with pytest.raises(ValueError, match="out: final"):
-        renderer.apply(image, out={"final": array})
+        renderer.apply(image, Separable(), out={"final": array})
     assert_array_equal(array, before)
-    assert_matches_reference(renderer.apply(image), image, Separable())
+    assert_matches_reference(renderer.apply(image, Separable()), image, Separable())
 
 
 def test_out_of_the_other_byte_order(renderer: Renderer) -> None:
     out = {"final": np.zeros((9, 12, 3), np.dtype(np.float32).newbyteorder())}
     with pytest.raises(ValueError, match="out: final"):
-        renderer.apply(picture(12, 9, 3, "float32"), out=out)
+        renderer.apply(picture(12, 9, 3, "float32"), Separable(), out=out)
 
 
 def test_out_that_is_no_array(renderer: Renderer) -> None:
     wrong: Any = {"final": bytearray(9 * 12 * 3)}
     with pytest.raises(TypeError, match="out: final"):
-        renderer.apply(picture(12, 9, 3, "uint8"), out=wrong)
+        renderer.apply(picture(12, 9, 3, "uint8"), Separable(), out=wrong)
 
 
 def test_out_that_shares_memory(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8")
     whole = np.zeros((18, 12, 4), np.uint8)
     with pytest.raises(ValueError, match=r"^out: glow and bloom must not share memory"):
-        renderer.apply(image, out={"glow": whole[:9], "bloom": whole[4:13]})
-    expected = renderer.apply(image)
-    renderer.apply(image, out={"glow": whole[:9], "bloom": whole[9:]})
+        renderer.apply(image, Separable(), out={"glow": whole[:9], "bloom": whole[4:13]})
+    expected = renderer.apply(image, Separable())
+    renderer.apply(image, Separable(), out={"glow": whole[:9], "bloom": whole[9:]})
     assert_array_equal(whole[:9], expected["glow"])
     assert_array_equal(whole[9:], expected["bloom"])
 
 
 def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8", seed=12)
-    first = renderer.apply(image)
+    first = renderer.apply(image, Separable())
     kept = {name: array.copy() for name, array in first.items()}
-    second = renderer.apply(image)
+    second = renderer.apply(image, Separable())
     for array in second.values():
         array[:] = 1
-    renderer.apply(picture(12, 9, 3, "uint8", seed=13))
+    renderer.apply(picture(12, 9, 3, "uint8", seed=13), Separable())
     for name, array in first.items():
         assert_array_equal(array, kept[name], err_msg=name)
 
@@ -416,7 +420,7 @@ def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
 def test_framebuffers_outlive_the_renderer() -> None:
     image = picture(12, 9, 3, "float16", seed=14)
     with Renderer() as renderer:
-        frames = renderer.apply(image)
+        frames = renderer.apply(image, Separable())
     assert_matches_reference(frames, image, Separable())
 
 
@@ -512,12 +516,12 @@ def test_render_many_runs_what_changed(renderer: Renderer, scene: Scene) -> None
 )
 def test_image_of_the_wrong_type(renderer: Renderer, image: Any) -> None:
     with pytest.raises(TypeError, match="image"):
-        renderer.apply(image)
+        renderer.apply(image, Separable())
 
 
 def test_dtype_error_names_what_is_taken(renderer: Renderer) -> None:
     with pytest.raises(TypeError, match=r"int32.*uint8, float16, float32"):
-        renderer.apply(np.zeros((4, 4, 3), np.int32))
+        renderer.apply(np.zeros((4, 4, 3), np.int32), Separable())
 
 
 @pytest.mark.parametrize(
@@ -540,9 +544,9 @@ def test_dtype_error_names_what_is_taken(renderer: Renderer) -> None:
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_image_of_the_wrong_shape(renderer: Renderer, dtype: str, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="image"):
-        renderer.apply(np.zeros(shape, dtype))
+        renderer.apply(np.zeros(shape, dtype), Separable())
     image = picture(4, 4, 3, dtype)
-    assert_matches_reference(renderer.apply(image), image, Separable())
+    assert_matches_reference(renderer.apply(image, Separable()), image, Separable())
 
 
 def test_masked_images(renderer: Renderer) -> None:
@@ -550,15 +554,20 @@ def test_masked_images(renderer: Renderer) -> None:
     image = picture(5, 6, 3, "float32")
     masked = np.ma.masked_greater(image, float(np.median(image)))
     with pytest.raises(ValueError, match=r"^image: some values are masked"):
-        renderer.apply(masked)
-    assert_same(renderer.apply(masked.filled(0)), renderer.apply(np.where(masked.mask, 0, image)))
-    assert_same(renderer.apply(np.ma.masked_invalid(image)), renderer.apply(image))
+        renderer.apply(masked, Separable())
+    assert_same(
+        renderer.apply(masked.filled(0), Separable()),
+        renderer.apply(np.where(masked.mask, 0, image), Separable()),
+    )
+    assert_same(
+        renderer.apply(np.ma.masked_invalid(image), Separable()), renderer.apply(image, Separable())
+    )
 
 
 def largest_side(renderer: Renderer) -> int:
     """Return the limit that the error of a far too large image names."""
     with pytest.raises(ValueError, match=r"40000000 x 1 is out of .* range, 1 to") as caught:
-        renderer.apply(np.broadcast_to(np.uint8(0), (1, 40_000_000, 3)))
+        renderer.apply(np.broadcast_to(np.uint8(0), (1, 40_000_000, 3)), Separable())
     return int(str(caught.value).split("1 to ")[1].split()[0])
 
 
@@ -569,7 +578,7 @@ def test_too_large(renderer: Renderer) -> None:
     pixel = np.broadcast_to(np.uint8(9), (1, 1, 3))
     for shape in ((1, limit + 1, 3), (limit + 1, 1, 3), (limit + 1, limit + 1, 3)):
         with pytest.raises(ValueError, match=rf"1 to {limit}"):
-            renderer.apply(np.broadcast_to(pixel, shape))
+            renderer.apply(np.broadcast_to(pixel, shape), Separable())
     with pytest.raises(ValueError, match=rf"1 to {limit}"):
         renderer.apply(pixel, Separable(bloom_size=(1, limit + 1)))
 
@@ -607,18 +616,18 @@ def test_closed_renderer() -> None:
     renderer.close()
     renderer.close()
     with pytest.raises(ValueError, match="closed"):
-        renderer.apply(image)
+        renderer.apply(image, Separable())
     with pytest.raises(ValueError, match="closed"):
         next(frames)
 
 
 def test_failed_call_keeps_the_previous_framebuffers(renderer: Renderer) -> None:
     image = picture(8, 8, 3, "uint8", seed=18)
-    renderer.apply(image)
+    renderer.apply(image, Separable())
     with pytest.raises(ValueError, match="attachments"):
-        renderer.apply(255 - image, attachments=("nothing",))
+        renderer.apply(255 - image, Separable(), attachments=("nothing",))
     with pytest.raises(ValueError, match="out"):
-        renderer.apply(255 - image, out={"final": np.zeros((8, 8, 4), np.uint8)})
-    again = renderer.apply(image)
+        renderer.apply(255 - image, Separable(), out={"final": np.zeros((8, 8, 4), np.uint8)})
+    again = renderer.apply(image, Separable())
     assert again.timings == {}
     assert_matches_reference(again, image, Separable())

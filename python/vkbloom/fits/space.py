@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import check_number
 from vkbloom.fields import FieldInfo, fields_of
 from vkbloom.settings import Settings
+from vkbloom.suggestions import did_you_mean
 
 __all__ = ["Axis", "Bounds", "Point", "Space", "space_of"]
 
@@ -130,7 +131,8 @@ def space_of(
         if name not in fields:
             known = ", ".join(one for one in fields if varied_as(fields[one]))
             raise ValueError(
-                f"vary: the method {settings.method} has no field {name!r}; it can vary {known}"
+                f"vary: the method {settings.method} has no field {name!r}"
+                f"{did_you_mean(name, fields) or ';'} it can vary {known}"
             )
         kind = varied_as(fields[name])
         if kind is None:

@@ -15,6 +15,7 @@ from vkbloom.checks import check_time
 from vkbloom.fields import fields_of, plain_value
 from vkbloom.named_settings import presets
 from vkbloom.settings import Settings, check_settings, field_info
+from vkbloom.suggestions import did_you_mean
 
 __all__ = ["WHOLE", "Axis", "image_axis", "read_axes"]
 
@@ -133,7 +134,7 @@ def read_axes(
             "and vary fields by further axes"
         )
     bases = [one for axis in whole.values() for one in settings_of(axis)] or [
-        check_settings(settings)
+        check_settings(settings, of_image=not has_time)
     ]
     found: list[Axis] = []
     for name, values in axes.items():
@@ -147,9 +148,10 @@ def read_axes(
         for base in bases:
             fields = fields_of(type(base))
             if name not in fields and not name.startswith("glare."):
+                near = did_you_mean(name, [*fields, *WHOLE, "time"])
                 raise ValueError(
                     f"axes: {name!r} is not a field of the method {base.method}"
-                    f"{' or time' if has_time else ''}: {', '.join(fields)}"
+                    f"{' or time' if has_time else ''}{near or ':'} {', '.join(fields)}"
                 )
         # `replace` checks each value and converts it to the type that the settings store.
         listed = _sequence(name, values)

@@ -181,7 +181,11 @@ def ask(
     if names == () and not reductions:
         raise ValueError("attachments: there are neither attachments nor reductions; request some")
     grid = Grid(
-        checked, check_settings(settings), found, "all" if names is None else names, reductions
+        checked,
+        check_settings(settings, of_image=not checked.has_time),
+        found,
+        "all" if names is None else names,
+        reductions,
     )
     grid.references()
     return grid

@@ -27,7 +27,8 @@ class ArrayValue:
             given = np.asarray(plain)
             # An array of Python objects raises for complex numbers by itself.
             is_complex = given.dtype.kind == "c"
-            values = np.array(given.real, np.float32, order="C")
+            with np.errstate(over="ignore"):  # Infinity is refused by its own message.
+                values = np.array(given.real, np.float32, order="C")
         except (TypeError, ValueError, OverflowError) as error:
             kind = ValueError if isinstance(error, OverflowError) else type(error)
             what = type(array).__name__
