@@ -9,9 +9,12 @@ import os
 import re
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+
+from vkbloom.checks import as_float
 
 __all__ = ["checked"]
 
@@ -37,11 +40,11 @@ def _raises_nothing(convert: Callable[[Any], Any]) -> _Test:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, float | np.floating) or (
-        not isinstance(value, str | bytes | np.complexfloating)
-        and getattr(value, "ndim", 0) == 0
-        and _raises_nothing(float)(value)
-    )
+    try:
+        as_float("", value)
+    except TypeError:
+        return False
+    return True
 
 
 def _is_text_path(value: Any) -> bool:
@@ -84,7 +87,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     ),
 }
 #: Classes, found by name so that this module imports none of them.
-_CLASSES = ("Renderer", "Settings", "Probe", "Scene", "Camera", "PSF", "Dataset", "Tolerances")
+_CLASSES = ("Renderer", "Settings", "Probe", "Camera", "PSF", "Dataset", "Tolerances")
 # The type of the items of a sequence, or of the keys of a mapping.
 _ITEM = re.compile(r"(?:Sequence|tuple|Mapping)\[(\w+)")
 
@@ -130,9 +133,8 @@ def _message(name: str, value: object, shown: list[str]) -> str:
     what = " or ".join(dict.fromkeys(one for one in shown if one != "None"))
     cure = ""
     if "a Settings" in shown:
-        from vkbloom.settings import settings_cure  # noqa: PLC0415  settings import this module
-
-        cure = settings_cure(value)
+        # Settings import this module.
+        cure = import_module("vkbloom.settings").settings_cure(value)
     return f"{name}: {reprlib.repr(value)} is not {what}{cure}"
 
 

@@ -31,6 +31,7 @@ __all__ = [
     "check_size",
     "check_time",
     "import_extra",
+    "on_another_device",
 ]
 
 #: The largest 32-bit float; the device computes in 32-bit floats.
@@ -254,14 +255,19 @@ def _viewed(
         return np.asarray(memoryview(image))  # type: ignore[arg-type]
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
         if _is_on_device(image):
-            raise TypeError(
-                f"{name}: {type(image).__name__} is on another device; copy it to the CPU: "
-                f"{name}.cpu() for PyTorch, {name}.get() for CuPy"
-            ) from None
+            raise TypeError(on_another_device(image, name)) from None
         raise TypeError(
             f"{name}: an array is needed, not {type(image).__name__}"
             + (f"; NumPy: {error}" if is_viewed else "")
         ) from None
+
+
+def on_another_device(image: object, name: str) -> str:
+    """Return the message for an array that the renderer cannot read."""
+    return (
+        f"{name}: {type(image).__name__} is on another device; copy it to the CPU: "
+        f"{name}.cpu() for PyTorch, {name}.get() for CuPy"
+    )
 
 
 def _is_on_device(image: object) -> bool:

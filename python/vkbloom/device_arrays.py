@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from vkbloom import _core
+from vkbloom.checks import on_another_device
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -360,10 +361,15 @@ def take(image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (
 
     `sides`: The numbers of dimensions that it may have.
     """
+    try:
+        core.cuda()
+    except _core.Error as error:
+        if type(error) is not _core.Error:
+            raise
+        raise TypeError(f"{on_another_device(image, name)} ({error})") from None
     if isinstance(image, DeviceArray) or hasattr(image, "__dlpack__"):
         array = _from_dlpack(image, name, core)
     else:
-        core.cuda()
         array = _from_interface(image, name)
     shape = array.shape
     if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in (3, 4)):
