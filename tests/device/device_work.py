@@ -161,7 +161,7 @@ def places(renderer: Any) -> None:
     first = renderer.apply(OnDevice(image))
     second = renderer.apply(first["final"])
     same(second, renderer.apply(first["final"].numpy()))
-    out, other = OnDevice(np.zeros_like(image)), np.zeros((16, 24, 4), image.dtype)
+    out, other = OnDevice(np.zeros_like(image)), np.zeros(*renderer.plan(image).outputs["bloom"])
     frames = renderer.apply(OnDevice(image), out={"final": out, "bloom": other})
     np.testing.assert_array_equal(out.array, renderer.apply(image)["final"])
     assert frames["bloom"] is other
