@@ -82,7 +82,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     "DTypeLike": ("a dtype", _raises_nothing(np.dtype)),
     "type": ("a class", lambda value: isinstance(value, type)),
     **dict.fromkeys(
-        ("Literal", "Shading", "Place", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
+        ("Literal", "Place", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
         ("a str", _is_str),
     ),
 }
@@ -133,6 +133,7 @@ def _message(name: str, value: object, shown: list[str]) -> str:
     what = " or ".join(dict.fromkeys(one for one in shown if one != "None"))
     cure = ""
     if "a Settings" in shown:
+        what = "a Settings"
         # Settings import this module.
         cure = import_module("vkbloom.settings").settings_cure(value)
     return f"{name}: {reprlib.repr(value)} is not {what}{cure}"

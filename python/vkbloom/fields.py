@@ -115,7 +115,12 @@ class FieldInfo:
             return None
         checked = value
         if self.read is not None:
-            checked = self.read(value)
+            try:
+                checked = self.read(value)
+            except (TypeError, ValueError) as error:
+                if self.name in str(error):
+                    raise
+                raise type(error)(f"{self.name}: {error}") from error
         elif self.kind == "choice":
             checked = self._choice(value)
         elif self.kind == "size":

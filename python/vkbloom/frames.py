@@ -174,7 +174,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         --------
         >>> image = np.full((16, 16, 3), 0.5, np.float32)
         >>> with vkbloom.Renderer("software") as renderer:
-        ...     dataset = renderer.apply(image).to_xarray()
+        ...     dataset = renderer.apply(image, vkbloom.Separable()).to_xarray()
         >>> dataset["bloom"].dims
         ('y', 'x', 'glow_channel')
         >>> float(dataset["final"].sel(channel="r").mean().round(3)) > 0.5
@@ -258,7 +258,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         >>> import tempfile
         >>> image = np.full((16, 16, 3), 100, np.uint8)
         >>> with vkbloom.Renderer("software") as renderer:
-        ...     frames = renderer.apply(image)
+        ...     frames = renderer.apply(image, vkbloom.Separable())
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in frames.save(f"{folder}/out.png")]
         ['out_glow.png', 'out_blur_vertical.png', 'out_bloom.png', 'out_final.png']

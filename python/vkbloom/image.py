@@ -38,7 +38,7 @@ class Image:
     >>> with vkbloom.Renderer("software") as renderer:
     ...     image = renderer.upload(array)
     ...     array[:] = 1.0
-    ...     final = renderer.apply(image)["final"]
+    ...     final = renderer.apply(image, vkbloom.Separable())["final"]
     >>> image
     <vkbloom.Image of 160 x 90 pixels, 3 channels, float16>
     >>> float(final.max())

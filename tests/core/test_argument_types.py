@@ -81,6 +81,7 @@ NEEDED: dict[str, Any] = {
     "vary": ["intensity"],
     "psf": GAUSSIAN,
     "bloom": blurred,
+    "argv": ["true"],
     "path": "a.png",
     "base": "a.gltf",
     "store": "a.zarr",

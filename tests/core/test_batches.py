@@ -373,7 +373,7 @@ def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) 
         renderer.apply_many(wrong, [Separable()])
     with pytest.raises(TypeError, match="attachments"):
         renderer.apply_many(picture(4, 4, 3, seed=19), [Separable()], attachments=wrong)
-    with pytest.raises(TypeError, match="shading"):
+    with pytest.raises(ValueError, match="shading"):
         renderer.render_many(scene, [Separable()], shading=wrong)
     with pytest.raises(TypeError):
         renderer.apply_many(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]

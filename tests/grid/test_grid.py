@@ -497,7 +497,7 @@ class TestReduce:
         same = reductions.PSNR(against={"blur_scale": 1.0})
         fixed = reductions.PSNR(against={"image": 0, "exposure": 0.0, "blur_scale": 4.0})
         dataset = renderer.grid(
-            images, None, axes, attachments=(), reduce={"same": same, "fixed": fixed}
+            images, Separable(), axes, attachments=(), reduce={"same": same, "fixed": fixed}
         )
         for place in np.ndindex(2, 2, 3):
             exposure, scale = axes["exposure"][place[1]], axes["blur_scale"][place[2]]
@@ -512,7 +512,9 @@ class TestReduce:
 
     def test_few_frames_to_compare_with_are_held(self, renderer: Renderer, image: Any) -> None:
         reduce = {"p": reductions.PSNR(against={"blur_scale": 1.0})}
-        grid = ask_for(image, {"exposure": [0, 1, 2], "blur_scale": [1, 2]}, reduce=reduce)
+        grid = ask_for(
+            image, {"exposure": [0, 1, 2], "blur_scale": [1, 2]}, Separable(), reduce=reduce
+        )
         layout = lay_out(grid, renderer)
         filler = Filler(grid, layout, renderer)
         for block in blocks(grid.shape, (1, 2), layout.ranking):

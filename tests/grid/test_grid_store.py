@@ -53,7 +53,7 @@ def make(store: Any, **changes: Any) -> Any:
         "attachments": ("final", "bloom"),
         **changes,
     }
-    settings = arguments.pop("settings", None)
+    settings = arguments.pop("settings", Separable())
     axes = arguments.pop("axes", AXES)
     return grid_to_zarr(arguments.pop("source", source()), settings, axes, store, **arguments)
 
@@ -73,7 +73,7 @@ def copy(undisturbed: Path, tmp_path: Path) -> Path:
 class TestWhole:
     def test_store_equals_the_grid_in_memory(self, undisturbed: Path, renderer: Renderer) -> None:
         expected = renderer.grid(
-            source(), None, AXES, attachments=("final", "bloom"), reduce=REDUCE
+            source(), Separable(), AXES, attachments=("final", "bloom"), reduce=REDUCE
         )
         found = xr.open_zarr(undisturbed)
         assert set(found) == {*expected, "done"}

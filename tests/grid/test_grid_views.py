@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.framebuffers import noise
-from vkbloom import Renderer, contact_sheet, reductions, response_curves
+from vkbloom import Renderer, Separable, contact_sheet, reductions, response_curves
 from vkbloom.grid.selection import select
 
 xr = pytest.importorskip("xarray")
@@ -30,7 +30,7 @@ def dataset(renderer: Renderer) -> Any:
         "mean": reductions.Mean(),
         "energy": reductions.EncircledEnergy(radii=(2, 4)),
     }
-    return renderer.grid(image, None, axes, attachments=("final", "bloom"), reduce=reduce)
+    return renderer.grid(image, Separable(), axes, attachments=("final", "bloom"), reduce=reduce)
 
 
 def pixels(png: bytes, tmp_path: Path) -> Any:
@@ -127,7 +127,7 @@ class TestSelect:
     ) -> None:
         image = noise(6, 8, 3, dtype="uint8")
         grid = renderer.grid(
-            image, None, {"blur_scale": [0.5, 1.0], axis: values}, attachments=["final"]
+            image, Separable(), {"blur_scale": [0.5, 1.0], axis: values}, attachments=["final"]
         )
         found = select(grid, {axis: at}, ("blur_scale",))
         assert found.identical(grid.isel({axis: place}))
@@ -148,7 +148,7 @@ class TestSelect:
     def test_values_that_are_not_there(
         self, renderer: Renderer, axis: str, values: Any, at: Any
     ) -> None:
-        grid = renderer.grid(noise(6, 8, 3, dtype="uint8"), None, {axis: values})
+        grid = renderer.grid(noise(6, 8, 3, dtype="uint8"), Separable(), {axis: values})
         with pytest.raises(ValueError, match=f"at: {axis} has no value {re.escape(repr(at))}"):
             select(grid, {axis: at}, ())
 

@@ -112,10 +112,7 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
         raise TypeError(f"glare: {glare!r} is not a sequence of stages")
     found = []
     for one in glare:
-        try:
-            stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"glare: {error}") from None
+        stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
         if not isinstance(stage, Glare):
             raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
         found.append(stage)

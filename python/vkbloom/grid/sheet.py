@@ -78,7 +78,9 @@ def contact_sheet(
     >>> image = np.zeros((16, 16, 4), np.uint8)
     >>> image[8, 8] = 255
     >>> with vkbloom.Renderer("software") as renderer:
-    ...     grid = renderer.grid(image, axes={"blur_scale": [1.0, 2.0], "loops": [1, 2]})
+    ...     grid = renderer.grid(
+    ...         image, vkbloom.Separable(), {"blur_scale": [1.0, 2.0], "loops": [1, 2]}
+    ...     )
     >>> sheet = vkbloom.contact_sheet(grid, width=64)
     >>> sheet[1:4]
     b'PNG'

@@ -20,10 +20,7 @@ __all__ = ["measured"]
 
 def _read_settings(settings: Any) -> Settings:
     if isinstance(settings, Mapping):
-        try:
-            settings = Settings.from_dict(settings)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"settings: {error}") from None
+        settings = Settings.from_dict(settings)
     if not isinstance(settings, Settings):
         raise TypeError(f"settings: {settings!r} is not a Settings")
     if settings.threshold is not None:
