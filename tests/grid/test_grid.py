@@ -157,9 +157,8 @@ class TestPasses:
         self, new_renderer: Callable[[], Renderer], image: Any
     ) -> None:
         # Where the bloom is off, a blur costs nothing.
-        grid = ask_for(
-            image, {"intensity": [0.5, 1.0], "blur_scale": [1, 2], "bloom": [False, True]}
-        )
+        axes = {"intensity": [0.5, 1.0], "blur_scale": [1, 2], "bloom": [False, True]}
+        grid = ask_for(image, axes, Separable())
         layout = lay_out(grid, new_renderer())
         assert layout.ranking.index(0) > layout.ranking.index(1)
 
