@@ -20,7 +20,7 @@ from vkbloom.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
 from vkbloom.frames import Frames
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
-from vkbloom.settings import Settings, Shading, check_settings
+from vkbloom.settings import Settings, Shading, check_settings, check_shading
 from vkbloom.sources import batch_sources, image_kind, image_source, is_image, scene_source
 from vkbloom.suggestions import unknown
 from vkbloom.version import installed_version
@@ -894,7 +894,10 @@ class Renderer:
         kind: str = shading
         dtype = channels = None
         if is_image(source):
-            for name, is_given in (("size", size is not None), ("shading", shading != "forward")):
+            for name, is_given in (
+                ("size", size is not None),
+                ("shading", check_shading(shading) != "forward"),
+            ):
                 if is_given:
                     raise ValueError(f"{name}: the source is not a scene; leave the argument out")
             kind, (shape, dtype) = "image", image_kind(source, "source")

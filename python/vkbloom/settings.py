@@ -257,7 +257,7 @@ def no_knee(method: str) -> Any:
 
 def check_shading(shading: str) -> Shading:
     """Return the shading; raise ValueError if there is no shading of that name."""
-    if shading not in SHADINGS:
+    if not isinstance(shading, str) or shading not in SHADINGS:
         raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
     return shading
 

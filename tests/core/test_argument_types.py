@@ -81,7 +81,7 @@ NEEDED: dict[str, Any] = {
     "vary": ["intensity"],
     "psf": GAUSSIAN,
     "bloom": blurred,
-    "argv": ["true"],
+    "argv": ["true", "{input}", "{output}"],
     "path": "a.png",
     "base": "a.gltf",
     "store": "a.zarr",

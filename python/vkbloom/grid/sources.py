@@ -225,8 +225,8 @@ def read_source(
         return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
         ("size", size is not None),
-        ("shading", shading != "forward"),
-        ("time", time != 0.0),
+        ("shading", check_shading(shading) != "forward"),
+        ("time", check_time(time) != 0.0),
     ):
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_number
 from vkbloom.io.array_files import read, write
 from vkbloom.testing.probe import Bloom
@@ -30,6 +31,7 @@ COARSE_ERROR: Final = 0.018
 _LAST_WORDS: Final = 300  # characters of a failed program's output that an error quotes
 
 
+@checked
 def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0) -> Bloom:
     """Make a bloom for the laws out of a program.
 

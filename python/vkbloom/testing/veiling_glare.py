@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+from vkbloom.argument_types import checked
 from vkbloom.checks import check_number, check_size
 from vkbloom.testing.probe import Bloom, Probe
 
 __all__ = ["veiling_glare_index"]
 
 
+@checked
 def veiling_glare_index(
     bloom: Bloom,
     *,
