@@ -77,7 +77,7 @@ class TestTranslate:
         assert int((lights((1920, 1080))[..., 0] == 6).sum()) == 36**2
 
     def test_refused(self, renderer: Renderer) -> None:
-        with pytest.raises(TypeError, match="to: 'kino' is not a Settings or a class of settings"):
+        with pytest.raises(TypeError, match="to: 'kino' is not a Settings"):
             vkbloom.translate(Pyramid(), cast("Any", "kino"), renderer=renderer)
         with pytest.raises(ValueError, match="vary: the method urp has no field 'levels'"):
             vkbloom.translate(Pyramid(), UrpBloom, size=SIZE, vary=["levels"], renderer=renderer)

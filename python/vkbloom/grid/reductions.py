@@ -360,7 +360,8 @@ class PSNR(Comparing):
     >>> with vkbloom.Renderer("software") as renderer:
     ...     grid = renderer.grid(
     ...         image,
-    ...         axes={"blur_scale": [1.0, 2.0]},
+    ...         vkbloom.Separable(),
+    ...         {"blur_scale": [1.0, 2.0]},
     ...         reduce={"psnr": PSNR(against={"blur_scale": 1.0})},
     ...     )
     >>> np.isinf(grid["psnr"].values)
