@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
 import re
@@ -119,8 +120,10 @@ def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Sour
     if on_cuda(images):
         yield from batch_sources(images, core)
         return
-    for place, image in enumerate(images):
-        source = image_source(image, core=core, name=f"images[{place}]")
+    # Not by enumerate(), which keeps a reference to the image.
+    places = itertools.count()
+    for image in images:
+        source = image_source(image, core=core, name=f"images[{next(places)}]")
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield source
