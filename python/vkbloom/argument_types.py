@@ -80,6 +80,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     "MovingBloom": ("callable", callable),
     "Loss": ("a loss", lambda value: _is_str(value) or callable(value)),
     "DTypeLike": ("a dtype", _raises_nothing(np.dtype)),
+    "Renderer": ("a Renderer", lambda value: callable(getattr(value, "apply", None))),
     "type": ("a class", lambda value: isinstance(value, type)),
     **dict.fromkeys(
         ("Literal", "Place", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
@@ -87,7 +88,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     ),
 }
 #: Classes, found by name so that this module imports none of them.
-_CLASSES = ("Renderer", "Settings", "Probe", "Camera", "PSF", "Dataset", "Tolerances")
+_CLASSES = ("Settings", "Probe", "Camera", "PSF", "Dataset", "Tolerances")
 # The type of the items of a sequence, or of the keys of a mapping.
 _ITEM = re.compile(r"(?:Sequence|tuple|Mapping)\[(\w+)")
 

@@ -45,7 +45,9 @@ def use_handles(renderer: Renderer) -> None:
                 renderer.apply(image, Pyramid(levels=2))["final"],
             )
     for _ in range(2):
-        for image, frames in zip(images, renderer.apply_each(iter(images)), strict=True):
+        for image, frames in zip(
+            images, renderer.apply_each(iter(images), Separable()), strict=True
+        ):
             tolerance.assert_matches_reference(frames, image, Separable())
 
 

@@ -404,7 +404,7 @@ image = np.random.default_rng(3).random((16, 24, 3), dtype=np.float32)
 renderer = vkbloom.Renderer(validation=True)
 # Exit handlers of a GPU's driver may crash or hang in a child: docs/robustness.md, Forks.
 leaves = sys.argv[1] == "leave" or (renderer.info.type != "cpu" and sys.argv[1] != "exit")
-right = renderer.apply(image)["final"]
+right = renderer.apply(image, vkbloom.Separable())["final"]
 batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
 next(batches); next(batches)
 child = os.fork()
@@ -425,7 +425,7 @@ if child == 0:
         assert not renderer.closed
         try:
             with vkbloom.Renderer(validation=True) as own:
-                np.testing.assert_array_equal(own.apply(image)["final"], right)
+                np.testing.assert_array_equal(own.apply(image, vkbloom.Separable())["final"], right)
         except vkbloom.Error as error:
             # Drivers of GPUs may open no device after a fork.
             assert renderer.info.type != "cpu" and '"spawn"' in str(error), error
@@ -446,7 +446,7 @@ if child == 0:
 _, status = os.waitpid(child, 0)
 assert status == 0, status
 np.testing.assert_array_equal(list(batches)[-1]["final"], right)
-np.testing.assert_array_equal(renderer.apply(image)["final"], right)
+np.testing.assert_array_equal(renderer.apply(image, vkbloom.Separable())["final"], right)
 renderer.close()
 print("parent done")
 """

@@ -41,7 +41,7 @@ def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
     settings: Settings,
-    vary: Sequence[str],
+    vary: str | Sequence[str],
     *,
     framebuffer: str = ...,
     loss: Loss = ...,
@@ -56,7 +56,7 @@ def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
     settings: Sequence[Settings],
-    vary: Sequence[str],
+    vary: str | Sequence[str],
     *,
     framebuffer: str = ...,
     loss: Loss = ...,
@@ -71,7 +71,7 @@ def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
     settings: Settings | Sequence[Settings],
-    vary: Sequence[str],
+    vary: str | Sequence[str],
     *,
     framebuffer: str = "final",
     loss: Loss = "relative",
@@ -94,7 +94,7 @@ def fit(
     settings : Settings or sequence of Settings
         Where the search starts, and the fields that stay as they are. Of several, such as presets
         of several engines, each is searched by itself.
-    vary : sequence of str
+    vary : str or sequence of str
         The fields to find: numbers, integers, flags and choices.
     framebuffer : str
         The framebuffer to compare. ``final`` is the picture with its bloom, ``bloom`` the bloom
@@ -229,7 +229,7 @@ class _Stage:
     factor: int
 
 
-def _checked_names(vary: Sequence[str]) -> tuple[str, ...]:
+def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
     names = (vary,) if isinstance(vary, str) else tuple(vary)
     if not names:
         raise ValueError("vary: there are no fields; name at least one")
