@@ -108,13 +108,15 @@ def named(
     plan: _core.Plan, arrays: tuple[NDArray[Any] | _core.Exported, ...], place: Place = "host"
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of a plan's outputs by name."""
-    return {
-        # Annotated as arrays of NumPy, which they are unless the caller asked for others.
-        name: cast("NDArray[Any]", DeviceArray(array, shape, dtype))
-        if place == "viewed" or isinstance(array, _core.Exported)
-        else array
-        for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True)
-    }
+    frames: dict[str, NDArray[Any]] = {}
+    # Not a comprehension, for the reason above: `place` would be a cell.
+    for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True):
+        if place == "viewed" or isinstance(array, _core.Exported):
+            # Annotated as arrays of NumPy, which they are unless the caller asked for others.
+            frames[name] = cast("NDArray[Any]", DeviceArray(array, shape, dtype))
+        else:
+            frames[name] = array
+    return frames
 
 
 class Work(NamedTuple):
