@@ -1,4 +1,4 @@
-"""``vkbloom explore``: serve the explorer of `vkbloom.explore` without a notebook."""
+"""``vkbloom explore``: explore the bloom of an image or a scene in a browser."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
+from vkbloom.cli.terminal import tell_device
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
 
@@ -42,8 +43,8 @@ _LARGEST_PORT: Final = 65535
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
-@glow_options
 @live_options(image_has_size=False)
+@glow_options
 def command(
     *,
     image: NDArray[Any] | None,
@@ -87,7 +88,7 @@ def command(
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.
             new_viewer()
-        click.echo(f"Rendering on {renderer.info.summary}")
+        tell_device(renderer)
         try:
             return asyncio.run(_serve(new_viewer, port, opens))
         except KeyboardInterrupt:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.image_files import read_picture
+from vkbloom.cli.terminal import note
 from vkbloom.io.array_files import premultiplied
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour
@@ -26,7 +27,10 @@ Array = NDArray[Any]
 
 
 def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--mask`` and ``--emission``, the arguments of `vkbloom.Renderer.apply`."""
+    """Add ``--mask`` and ``--emission``, the arguments of `vkbloom.Renderer.apply`.
+
+    The command's settings are known before: `settings_options` stands above.
+    """
 
     @click.option(
         "--mask",
@@ -43,8 +47,15 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "pass of emissive materials. It is decoded like the image.",
     )
     @functools.wraps(command)
-    def run(**arguments: object) -> object:
-        return command(**arguments)
+    def run(
+        *, mask: str | None, emission: str | None, settings: vkbloom.Settings, **rest: object
+    ) -> object:
+        if mask is not None and emission is None and settings.composite == "mix":
+            note(
+                "the composite mix takes light from what the mask lets glow, which is seen as a "
+                "step at the mask's edge; --composite add or --preset photo adds the bloom without"
+            )
+        return command(mask=mask, emission=emission, settings=settings, **rest)
 
     return run
 

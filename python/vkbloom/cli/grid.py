@@ -28,16 +28,17 @@ from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
 from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom.cli.image_files import (
+    expand_option,
     input_colour_option,
     layer_option,
-    note,
     read_picture,
     subimage_option,
 )
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
-from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
-from vkbloom.cli.settings_options import default_preset, settings_options
+from vkbloom.cli.settings_options import DEFAULT_PRESETS, settings_options
+from vkbloom.cli.terminal import detail_device, is_quiet, note, say
 from vkbloom.grid.image_folder import FileForm, GridFiles
 from vkbloom.grid.layout import Grid, Layout, ask
 from vkbloom.grid.parts import WHOLE, Part, read_part
@@ -120,13 +121,17 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
     help="Format of image files: png, exr, tif, ...",
 )
 @click.option(
-    "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
+    "--resume/--no-resume",
+    default=True,
+    show_default=True,
+    help="Continue an interrupted grid, and render damaged points again; without, a grid that is "
+    "there is an error.",
 )
 @click.option(
     "--part",
     metavar="I/N",
     callback=_part,
-    help="Render part I of N, from 1, of the same grid; implies --resume. Other processes may "
+    help="Render part I of N, from 1, of the same grid; with --resume. Other processes may "
     "render other parts at the same time. auto/N takes I, and auto also N, from the environment of "
     "a job array, such as SLURM_ARRAY_TASK_ID.",
 )
@@ -150,10 +155,11 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
 @click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
 @subimage_option
 @layer_option
-@glow_options
+@expand_option
 @device_options
 @scene_options
 @settings_options
+@glow_options
 def command(
     *,
     images: tuple[str, ...],
@@ -177,6 +183,7 @@ def command(
     raw: bool,
     subimage: int,
     layer: str | None,
+    expand: float | None,
     mask: str | None,
     emission: str | None,
     adapter: str,
@@ -186,9 +193,10 @@ def command(
 ) -> None:
     """Render all combinations of the axes' values.
 
-    The source is a scene, or each IMAGE, read as vkbloom apply reads it. The points of the grid
-    are rendered in the order that runs the fewest passes. A store can be opened while it is
-    written. --resume continues a grid that was killed, and gives the same result.
+    The source is a scene, or each IMAGE, read as vkbloom apply reads it: files of integers (JPEG,
+    PNG) start from the preset photo and are expanded, except with an axis of presets. The points of
+    the grid are rendered in the order that runs the fewest passes. A store can be opened while it
+    is written. The same call again continues a grid that was killed, and gives the same result.
     """
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
@@ -197,7 +205,12 @@ def command(
     chunks = axis_options.chunk_counts(chunk_words)
     begun, axes = _begun_and_axes(axis_words, settings, len(images))
     reduce = axis_options.named_reductions(reduce_words, settings)
-    pictures = [read_picture(one, subimage, input_colour, layer=layer, raw=raw) for one in images]
+    if "preset" in axes and not given("expand"):
+        expand = None
+    pictures = [
+        read_picture(one, subimage, input_colour, layer=layer, raw=raw, expand=expand)
+        for one in images
+    ]
     requested = _source(images, pictures, scene), begun, axes
     shared: dict[str, Any] = {
         "size": size,
@@ -262,19 +275,19 @@ class _Output:
             resume=self.resume,
             part=self.part,
             on_mended=note,
-            progress=True,
+            progress=not is_quiet(),
             **options,
         )
         self._tell(points, dataset.attrs["passes_run"], dataset.attrs["passes_saved"])
         if self.sheet:
             safe_writing.write_file(Path(self.sheet), vkbloom.contact_sheet(dataset))
-            click.echo(f"wrote {self.sheet}")
+            say(f"wrote {self.sheet}")
         if self.curves:
             kind = Path(self.curves).suffix[1:].lower()
             drawn = io.BytesIO()
             vkbloom.response_curves(dataset).savefig(drawn, format=kind)
             safe_writing.write_file(Path(self.curves), drawn.getvalue())
-            click.echo(f"wrote {self.curves}")
+            say(f"wrote {self.curves}")
 
     def write_images(self, grid: Grid, pictures: Sequence[Picture], **device: Any) -> None:
         """Render into image files."""
@@ -287,12 +300,12 @@ class _Output:
             files.prepare(resume=self.resume)
             return files
 
-        tally = render_grid(grid, prepared, progress=True, **device)
+        tally = render_grid(grid, prepared, progress=not is_quiet(), **device)
         self._tell(math.prod(grid.shape), tally.ran, tally.saved)
 
     def _tell(self, points: int, ran: int, saved: int) -> None:
         which = f"part {self.part[0]}/{self.part[1]} of " if self.part else ""
-        click.echo(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
+        say(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
 
 
 def _begun_and_axes(
@@ -304,7 +317,7 @@ def _begun_and_axes(
     axes = axis_options.axis_values(words, settings)
     if "preset" not in axes:
         return settings, axes
-    if settings != vkbloom.presets[default_preset(image_count > 0)]:
+    if settings not in map(vkbloom.presets.get, DEFAULT_PRESETS):
         raise click.UsageError(
             "--axis preset sets all settings; leave out options of settings, and vary fields by "
             "further axes"
@@ -317,6 +330,7 @@ def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
     corners = (tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape))
     points = [point for point in map(grid.point, dict.fromkeys(corners)) if point.settings.bloom]
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
+        detail_device(renderer)
         zero = [
             no_bloom.is_without(frames)
             for _, frames in visit(renderer, grid.source, points, ("bloom",))
