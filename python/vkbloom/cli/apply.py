@@ -23,7 +23,7 @@ import vkbloom
 from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
-from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
+from vkbloom.cli.glow_options import accompanying, glow_options, note_step, uploaded
 from vkbloom.cli.image_files import (
     COLOURS,
     check_input_colour,
@@ -97,9 +97,9 @@ from vkbloom.large_files import finished, is_large
 @expand_option
 @subimage_option
 @layer_option
+@glow_options
 @device_options
 @settings_options
-@glow_options
 def command(
     *, sources: tuple[str, ...], out: str | None, adapter: str, validation: bool, **given: Any
 ) -> None:
@@ -136,6 +136,7 @@ def command(
                     run.large_file(*pair)
             else:
                 run.sequence([*group])
+    note_step(options.settings, options.mask, options.emission)
     if len(work) > 1:
         say(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
 

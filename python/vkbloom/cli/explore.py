@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    note_step,
+    refuse_glow_of_scene,
+)
 from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
 from vkbloom.cli.terminal import tell_device
@@ -43,8 +48,8 @@ _LARGEST_PORT: Final = 65535
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
-@live_options(image_has_size=False)
 @glow_options
+@live_options(image_has_size=False)
 def command(
     *,
     image: NDArray[Any] | None,
@@ -73,6 +78,7 @@ def command(
     if image is not None:
         looked_at = image
         glow = accompanying(mask, emission)(image)
+        note_step(settings, mask, emission)
     else:
         refuse_glow_of_scene(mask, emission)
         looked_at = scene()

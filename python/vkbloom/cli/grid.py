@@ -26,7 +26,12 @@ from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    note_step,
+    refuse_glow_of_scene,
+)
 from vkbloom.cli.image_files import (
     expand_option,
     input_colour_option,
@@ -156,10 +161,10 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
 @subimage_option
 @layer_option
 @expand_option
+@glow_options
 @device_options
 @scene_options
 @settings_options
-@glow_options
 def command(
     *,
     images: tuple[str, ...],
@@ -224,6 +229,8 @@ def command(
         grid = ask(*requested, **shared)
         check_chunks(grid, chunks)
     output.check_shape(grid.shape)
+    if begun is not None:
+        note_step(begun, mask, emission)
     if not workers and not scheduler:
         _note_no_bloom(grid, adapter, validation)
     with _client(workers, scheduler) as client:
