@@ -59,7 +59,7 @@ def commands() -> Iterator[Any]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the files that pages name."""
     monkeypatch.chdir(tmp_path)
-    # To find the nearest of all presets takes half a minute, and frames of full size are long timed.
+    # To find the nearest of all presets takes half a minute, to time large frames three seconds.
     monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
     timed = measuring.pass_times
     monkeypatch.setattr(measuring, "pass_times", lambda one, of, _: timed(one, of, (64, 36), 1))
