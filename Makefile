@@ -1,5 +1,7 @@
 # make demo: installs what is missing, renders the built-in scene into out/.
 # make test: installs what the tests need, runs all tests. Both are quick the second time.
+# make exhaustive: the same with every case of the tests that otherwise take a few (tests/exhaustive.py),
+#   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
 # make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
@@ -15,7 +17,7 @@ CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) \
 WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # One thread of lavapipe in each of them: with more they take a quarter more time from each other.
-test check sanitize: export LP_NUM_THREADS := 1
+test exhaustive check sanitize: export LP_NUM_THREADS := 1
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
@@ -23,13 +25,14 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test check docs bench engines wheels lint format sanitize clean
+.PHONY: demo test exhaustive check docs bench engines wheels lint format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
 	$(PYTHON) examples/demo.py --out out
 
-test: build/stamp/core build/stamp/test
+exhaustive: export VKBLOOM_EXHAUSTIVE := 1
+test exhaustive: build/stamp/core build/stamp/test
 	$(PYTHON) -m pytest $(PARALLEL)
 
 # Changed files: those that differ from the last commit, and untracked ones.

@@ -91,6 +91,10 @@ class Methods(Registry):
             del self._sources[name]
             self._references.pop(name, None)
 
+    def has_reference(self, name: str) -> bool:
+        """Return whether the method is there in NumPy."""
+        return isinstance(self._sources.get(name), str) or name in self._references
+
     def reference(self, name: str) -> Reference:
         """Return a method in NumPy; raise KeyError if there is none."""
         if isinstance(self._sources.get(name), str):

@@ -398,7 +398,7 @@ def test_wrong_mask_emission_or_alpha_is_refused(
 ) -> None:
     with pytest.raises(error, match=message):
         renderer.apply(IMAGE, **kwargs)
-    assert not renderer.apply(IMAGE)["bloom"][..., :3].any()
+    assert not renderer.apply(IMAGE, Separable())["bloom"][..., :3].any()
 
 
 @pytest.mark.parametrize("alpha", ["max", "blur"])

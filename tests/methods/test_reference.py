@@ -411,9 +411,9 @@ def test_wrong_arguments() -> None:
 @pytest.mark.parametrize("settings", [None, "kino", {"threshold": 1.0}], ids=repr)
 def test_wrong_settings(settings: Any) -> None:
     for call in (reference.apply, reference.passes, reference.blur):
-        with pytest.raises(TypeError, match=r"^settings must be vkbloom\.Settings, not "):
+        with pytest.raises(TypeError, match=r"^settings: .* is not a Settings"):
             call(flat(1.0), settings)
-    with pytest.raises(TypeError, match=r"^settings must be "):
+    with pytest.raises(TypeError, match=r"^settings: "):
         reference.gain(settings)
     with pytest.raises(TypeError, match=r"^settings must be "):
         reference.composite(flat(1.0), flat(1.0), settings)

@@ -192,7 +192,7 @@ def _maker(kind: Any) -> str:
     from vkbloom.own.method import OwnType, own_name  # noqa: PLC0415  needed by few pages
 
     if not isinstance(kind, OwnType):
-        return str(kind.__name__)
+        return f"vkbloom.{kind.__name__}"
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
     name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'

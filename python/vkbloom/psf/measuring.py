@@ -35,7 +35,7 @@ def _read_settings(settings: Any) -> Settings:
 class measured(SampledPSF):
     """The bloom of one pixel of 1, computed by `vkbloom.reference`, defined in pixels.
 
-    That of a method that was loaded or registered is rendered.
+    That of a method without a reference, such as a loaded one, is rendered.
 
     Parameters
     ----------
@@ -78,16 +78,16 @@ def _spread(psf: measured) -> Array:
     # Values of doubles are not clamped.
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1
-    if METHODS.is_added(psf.settings.method):
-        spread = _rendered(point, psf.settings)
-    else:
+    if METHODS.has_reference(psf.settings.method):
         spread = reference.blur(point, psf.settings, format="rgba32float")
+    else:
+        spread = _rendered(point, psf.settings)
     spread.flags.writeable = False
     return spread
 
 
 def _rendered(point: Array, settings: Settings) -> Array:
-    """Return the bloom of a method that was loaded or registered, which may have no reference."""
+    """Return the bloom of a method without a reference."""
     from vkbloom.renderer import Renderer  # noqa: PLC0415  as above
 
     exact = settings.replace(format="rgba32float")

@@ -1,0 +1,27 @@
+"""What the usual run takes a part of. VKBLOOM_EXHAUSTIVE=1 (make exhaustive) takes all of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import Final, TypeVar
+
+#: Whether this run takes everything.
+EXHAUSTIVE: Final = os.environ.get("VKBLOOM_EXHAUSTIVE", "0") not in ("", "0")
+
+T = TypeVar("T")
+
+
+def some(cases: Iterable[T], count: int) -> list[T]:
+    """Return `count` cases, the first, the last and evenly between; all in an exhaustive run."""
+    every = list(cases)
+    if EXHAUSTIVE or count >= len(every):
+        return every
+    if count == 1:
+        return every[:1]
+    return [every[round(i * (len(every) - 1) / (count - 1))] for i in range(count)]
+
+
+def examples(usual: int) -> int:
+    """Return the number of examples of a hypothesis test; eight times as many when exhaustive."""
+    return 8 * usual if EXHAUSTIVE else usual
