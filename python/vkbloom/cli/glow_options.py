@@ -47,9 +47,9 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _MASK(_EMISSION(command))
 
 
-def note_step(settings: vkbloom.Settings, mask: str | None, emission: str | None) -> None:
-    """Print a note that a mask's edge is seen in a mix."""
-    if mask and not emission and settings.bloom and settings.composite == "mix":
+def note_step(settings: vkbloom.Settings | None, mask: str | None, emission: str | None) -> None:
+    """Print a note that a mask's edge is seen in a mix. None: settings that are not known."""
+    if mask and not emission and settings and settings.bloom and settings.composite == "mix":
         note(
             "the composite mix takes light from what the mask lets glow, which is seen as a step "
             "at the mask's edge; --composite add or --preset photo adds the bloom without"

@@ -83,8 +83,8 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
 )
 @click.option(
     FILE_OPTION,
-    "options_file",
     metavar="FILE",
+    expose_value=False,
     help="A TOML or YAML file with options by their long names. It may have the tables settings, "
     "camera, axes, reduce and chunks, and the list images. Options on the command line override "
     "it.",
@@ -170,7 +170,6 @@ def command(
     images: tuple[str, ...],
     out: str,
     axis_words: tuple[str, ...],
-    options_file: str | None,
     size: tuple[int, int] | None,
     time: float,
     shading: Shading,
@@ -210,12 +209,9 @@ def command(
     chunks = axis_options.chunk_counts(chunk_words)
     begun, axes = _begun_and_axes(axis_words, settings, len(images))
     reduce = axis_options.named_reductions(reduce_words, settings)
-    if "preset" in axes and not given("expand"):
-        expand = None
-    pictures = [
-        read_picture(one, subimage, input_colour, layer=layer, raw=raw, expand=expand)
-        for one in images
-    ]
+    # The presets of an axis differ in whether they expand.
+    expand = expand if "preset" not in axes or given("expand") else None
+    pictures = _pictures(images, subimage, input_colour, layer=layer, raw=raw, expand=expand)
     requested = _source(images, pictures, scene), begun, axes
     shared: dict[str, Any] = {
         "size": size,
@@ -223,14 +219,12 @@ def command(
         "time": time,
         "attachments": _names(attachments),
         "reduce": reduce,
-        **_glows(pictures, mask, emission, input_colour, raw=raw),
+        **_glows(pictures, mask, emission, begun, colour=input_colour, raw=raw),
     }
     with as_wrong_use():
         grid = ask(*requested, **shared)
         check_chunks(grid, chunks)
     output.check_shape(grid.shape)
-    if begun is not None:
-        note_step(begun, mask, emission)
     if not workers and not scheduler:
         _note_no_bloom(grid, adapter, validation)
     with _client(workers, scheduler) as client:
@@ -376,6 +370,12 @@ def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> 
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)
 
 
+def _pictures(
+    images: Sequence[str], subimage: int, colour: Colour | None, **options: Any
+) -> list[Picture]:
+    return [read_picture(one, subimage, colour, **options) for one in images]
+
+
 def _source(
     images: Sequence[str], pictures: Sequence[Picture], scene: Callable[[], vkbloom.Scene]
 ) -> Any:
@@ -392,12 +392,14 @@ def _glows(
     pictures: Sequence[Picture],
     mask: str | None,
     emission: str | None,
-    colour: Colour | None,
+    settings: vkbloom.Settings | None,
     *,
+    colour: Colour | None,
     raw: bool,
 ) -> dict[str, Any]:
     """Return the arguments `mask` and `emission` of a grid of images."""
     if pictures:
+        note_step(settings, mask, emission)
         return accompanying(mask, emission, colour, raw=raw)(pictures[0].pixels)
     refuse_glow_of_scene(mask, emission)
     return {}

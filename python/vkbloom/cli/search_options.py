@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Final, get_args
 
 import click
 from rich.console import Console
@@ -31,67 +31,20 @@ def search_options(
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
-        @click.option(
-            "--vary",
-            metavar="NAME,...",
-            default=vary,
-            show_default=True,
-            help="The settings to find: numbers, switches and choices"
-            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
-        )
-        @click.option(
-            "--bounds",
-            metavar="NAME=LOW:HIGH",
-            multiple=True,
-            help="A narrower range for one of these settings; may be repeated.",
-        )
-        @click.option(
-            "--loss",
-            type=click.Choice(get_args(LossName)),
-            default=loss,
-            show_default=True,
-            help="The figure to minimize. relative: norm of the difference divided by the norm of "
-            "the target; l2: root mean square of the difference; log: the same for logarithms; "
-            "flip: mean FLIP.",
-        )
-        @click.option(
-            "--max-calls",
-            metavar="N",
-            type=click.IntRange(min=1),
-            default=max_calls,
-            show_default=True,
-            help="Limit of the renders of each search.",
-        )
-        @click.option(
-            "--max-loss",
-            metavar="X",
-            type=click.FloatRange(min=0),
-            help="Exit status 1 if the smallest loss is larger [default: any loss is status 0]",
-        )
-        @click.option(
-            "-o",
-            "--out",
-            metavar="REPORT",
-            type=click.Path(),
-            help="Write the pictures, radial profiles and losses as an HTML file.",
-        )
-        @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
         @functools.wraps(command)
         def run(
             *,
             vary: str | None,
             bounds: tuple[str, ...],
-            loss: LossName,
-            max_calls: int,
             max_loss: float | None,
             out: str | None,
             as_json: bool,
             **rest: Any,
         ) -> Any:
             search: dict[str, Any] = {
-                "loss": loss,
+                "loss": rest.pop("loss"),
                 "bounds": axis_bounds(bounds),
-                "max_calls": max_calls,
+                "max_calls": rest.pop("max_calls"),
                 "progress": Console(stderr=True).is_terminal and not is_quiet(),
             }
             if vary is not None:
@@ -100,9 +53,66 @@ def search_options(
             told = functools.partial(_tell, max_loss=max_loss, out=out, as_json=as_json)
             return command(search=search, told=told, **rest)
 
+        for option in reversed((*_of_search(vary, loss, max_calls), *_OF_RESULTS)):
+            run = option(run)
         return run
 
     return add
+
+
+def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, ...]:
+    """Return the options of what is searched and how, with these defaults."""
+    return (
+        click.option(
+            "--vary",
+            metavar="NAME,...",
+            default=vary,
+            show_default=True,
+            help="The settings to find: numbers, switches and choices"
+            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
+        ),
+        click.option(
+            "--bounds",
+            metavar="NAME=LOW:HIGH",
+            multiple=True,
+            help="A narrower range for one of these settings; may be repeated.",
+        ),
+        click.option(
+            "--loss",
+            type=click.Choice(get_args(LossName)),
+            default=loss,
+            show_default=True,
+            help="The figure to minimize. relative: norm of the difference divided by the norm of "
+            "the target; l2: root mean square of the difference; log: the same for logarithms; "
+            "flip: mean FLIP.",
+        ),
+        click.option(
+            "--max-calls",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=max_calls,
+            show_default=True,
+            help="Limit of the renders of each search.",
+        ),
+    )
+
+
+_OF_RESULTS: Final = (
+    click.option(
+        "--max-loss",
+        metavar="X",
+        type=click.FloatRange(min=0),
+        help="Exit status 1 if the smallest loss is larger [default: any loss is status 0]",
+    ),
+    click.option(
+        "-o",
+        "--out",
+        metavar="REPORT",
+        type=click.Path(),
+        help="Write the pictures, radial profiles and losses as an HTML file.",
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
+)
 
 
 def _tell(
