@@ -39,7 +39,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.program import given as was_given
 from vkbloom.cli.sequences import PIPE, check_targets, pairs
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.cli.terminal import detail, is_quiet, note, say, tell_device
+from vkbloom.cli.terminal import detail, hides_progress, note, say, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import premultiplied
@@ -206,8 +206,7 @@ class _Run:
         self._folder = folder
         self._renderer = renderer
         self._several = several
-        # None: shown where standard error is a terminal.
-        self._hidden = True if sys.stderr is None or is_quiet() else None
+        self._hidden = hides_progress()
 
     def is_by_rows(self, name: str) -> bool:
         """Whether a file is read and written in bands of rows."""
