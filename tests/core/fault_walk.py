@@ -191,7 +191,7 @@ def own_passes(renderer: Renderer) -> Arrays:
     return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
 
 
-def on_device(renderer: Renderer) -> Arrays:
+def on_device(renderer: Any) -> Arrays:
     """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before."""
     images = np.stack([picture(*SIZE, dtype="float16", seed=seed) for seed in range(3)])
     settings = vkbloom.Separable(threshold=0.3)
@@ -419,6 +419,7 @@ def workloads(stride: int) -> list[str]:
 
 def main(stride: int, names: list[str]) -> None:
     # Objects that a process creates once must exist before the count.
+    own_settings()
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:
