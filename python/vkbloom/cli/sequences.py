@@ -13,7 +13,7 @@ from typing import Final
 
 import click
 
-from vkbloom.cli.image_files import note
+from vkbloom.cli.terminal import note
 from vkbloom.io.image_reading import readable_extensions
 
 __all__ = ["PIPE", "check_targets", "is_terminal", "pairs"]
