@@ -6,6 +6,7 @@
 # make docs: builds the documentation into build/docs; a warning is a failure.
 # make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
+# make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
 #   which comes as packages of Debian 13 that are unpacked, not installed.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
@@ -27,7 +28,8 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test exhaustive check docs bench engines libplacebo wheels lint format sanitize clean
+.PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo wheels lint format \
+	sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -64,6 +66,11 @@ bench: build/stamp/core build/stamp/peers
 engines: build/stamp/core build/engines/blender/done build/engines/pygfx/done
 	$(PYTHON) tools/engines/compare.py blender=build/engines/blender/bin/python \
 	    pygfx=build/engines/pygfx/bin/python $(ENGINES)
+
+# Takes the engines through all laws, in about a hundred runs of each.
+engine-laws: build/stamp/core build/engines/blender/done build/engines/pygfx/done
+	$(PYTHON) tools/engines/laws.py blender=build/engines/blender/bin/python \
+	    pygfx=build/engines/pygfx/bin/python
 
 # bpy is for one version of Python.
 build/engines/blender/done: PACKAGES := bpy==5.0.1 numpy==1.26.4

@@ -37,7 +37,7 @@ CELLS = (
 
 def wait(page: Page, code: str) -> None:
     """Wait until the picture of some settings is shown."""
-    page.locator(".vkb-foot code", has_text=code).wait_for(timeout=20_000)
+    page.locator(".vkb-foot code", has_text=code).wait_for(timeout=60_000)
     page.wait_for_timeout(500)
 
 

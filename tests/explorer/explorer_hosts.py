@@ -77,6 +77,8 @@ def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str
     settings.mkdir(parents=True)
     (settings / "themes.jupyterlab-settings").write_text('{"adaptive-theme": true}')
     (settings / "notification.jupyterlab-settings").write_text('{"fetchNews": "false"}')
+    # jsonschema does without this module, which compiles grammars for five seconds.
+    (folder / "rfc3987_syntax.py").write_text("raise ImportError")
     token = secrets.token_hex()
     variables = {
         **os.environ,
@@ -88,7 +90,7 @@ def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str
         "IPYTHONDIR": str(folder / "ipython"),
         "JUPYTER_TOKEN": token,
         # The kernel runs elsewhere, and has to find the package that runs here.
-        "PYTHONPATH": str(Path(vkbloom.__file__).parents[1]),
+        "PYTHONPATH": os.pathsep.join((str(Path(vkbloom.__file__).parents[1]), str(folder))),
         **environment,
     }
     options = ["--no-browser", "--allow-root", "--ip=127.0.0.1", "--port=0"]

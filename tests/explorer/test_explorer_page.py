@@ -96,24 +96,31 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
     return picture.shape[1], picture.shape[0]
 
 
-def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]) -> None:
+def assert_shows(
+    picture: NDArray[np.uint8], renderer: Renderer, scene: Scene, settings: Any
+) -> None:
+    expected = renderer.render(scene, settings, size_of(picture), attachments="final")["final"]
+    assert np.array_equal(picture, expected[:, :, :3])
+
+
+def test_the_controls_on_its_own_page(
+    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
+) -> None:
     """Move the controls, and compare each picture with the renderer's."""
 
-    def assert_shows(settings: Any, name: str = "final", **options: Any) -> None:
-        picture = shown()
-        expected = renderer.render(scene, settings, box, attachments=[name], **options)[name]
-        assert np.array_equal(picture, expected[:, :, :3])
+    def shown() -> NDArray[np.uint8]:
+        return see(page, tmp_path)
 
     box = size_of(shown())
     assert abs(box[0] / box[1] - ASPECT[0] / ASPECT[1]) < 0.01
-    assert_shows(Separable())
+    assert_shows(shown(), renderer, scene, Separable())
 
     field(page, "blur_scale").fill("0.1")
     wait_for_code(page, "vkbloom.Separable(blur_scale=0.1)")
-    assert_shows(Separable(blur_scale=0.1))
+    assert_shows(shown(), renderer, scene, Separable(blur_scale=0.1))
     field(page, "bloom").uncheck()
     wait_for_code(page, "vkbloom.Separable(bloom=False, blur_scale=0.1)")
-    assert_shows(Separable(bloom=False))
+    assert_shows(shown(), renderer, scene, Separable(bloom=False))
 
     page.get_by_label("method").select_option("pyramid")
     field(page, "bloom").check()
@@ -125,7 +132,7 @@ def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]
     settings = Pyramid(levels=3, tonemap="aces", exposure=1, threshold=0.5)
     code = 'vkbloom.Pyramid(threshold=0.5, tonemap="aces", exposure=1.0, levels=3)'
     wait_for_code(page, code)
-    assert_shows(settings)
+    assert_shows(shown(), renderer, scene, settings)
 
     # The half on the right is B's: A as it began, without bloom.
     page.get_by_label("wipe A | B").check()
@@ -139,13 +146,7 @@ def drive(page: Page, renderer: Renderer, scene: Scene, shown: Callable[[], Any]
         # B's picture comes on its own.
         assert time.monotonic() < deadline
     page.get_by_label("wipe A | B").uncheck()
-    assert_shows(settings)
-
-
-def test_the_controls_on_its_own_page(
-    page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
-) -> None:
-    drive(page, renderer, scene, lambda: see(page, tmp_path))
+    assert_shows(shown(), renderer, scene, settings)
 
 
 def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
@@ -622,7 +623,10 @@ def test_jupyterlab(
 ) -> None:
     page = run_cell(browser, lab, "light")
     assert_is_readable(page, "light")
-    drive(page, renderer, scene, lambda: read(page, tmp_path))
+    assert_shows(read(page, tmp_path), renderer, scene, Separable())
+    field(page, "blur_scale").fill("0.1")
+    wait_for_code(page, "vkbloom.Separable(blur_scale=0.1)")
+    assert_shows(read(page, tmp_path), renderer, scene, Separable(blur_scale=0.1))
     # Code sees what the page shows, and changes it.
     cell = page.locator(".jp-CodeCell .cm-content").nth(1)
     cell.click()

@@ -1,4 +1,4 @@
-"""Compare own methods with libplacebo: python tools/libplacebo/compare.py APPLY FOLDER [--page PAGE].
+"""Compare own methods with libplacebo: python tools/libplacebo/compare.py APPLY FOLDER.
 
 APPLY is the program that build.sh makes. FOLDER has user shaders. Each file that libplacebo runs is
 loaded and run by vkbloom under validation; the table says the largest difference over the largest
@@ -45,7 +45,7 @@ class Row(NamedTuple):
     difference: float | None
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """What libplacebo says about a file that it does not run."""
 
 
@@ -54,10 +54,12 @@ def drawn(apply: str, file: Path, image: Array, frames: int, values: Mapping[str
     height, width = image.shape[:2]
     command = [apply, str(file), str(width), str(height), str(frames)]
     command += [f"{name}={value}" for name, value in values.items()]
-    done = subprocess.run(command, input=image.tobytes(), capture_output=True, timeout=SECONDS)
+    done = subprocess.run(
+        command, check=False, input=image.tobytes(), capture_output=True, timeout=SECONDS
+    )
     if done.returncode:
         lines = done.stderr.decode(errors="replace").splitlines()
-        raise Refused(next((line for line in lines if "error" in line), lines[-1]))
+        raise RefusedError(next((line for line in lines if "error" in line), lines[-1]))
     width, height = np.frombuffer(done.stdout[:8], np.int32)
     return np.frombuffer(done.stdout[8:], np.float32).reshape(height, width, 4)
 
@@ -93,7 +95,7 @@ def compared(apply: str, folder: Path, file: Path, renderer: vkbloom.Renderer) -
     try:
         want = drawn(apply, file, image, FRAMES, {})
         theirs = "unchanged" if np.array_equal(want, image) else "drawn"
-    except Refused as refused:
+    except RefusedError as refused:
         want, theirs = None, f"refused: {refused}"
     start = time.perf_counter()
     try:

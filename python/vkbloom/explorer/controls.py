@@ -25,11 +25,15 @@ _LAST: Final = ("exposure", "tonemap")
 # Numbers of methods that are rarely changed.
 _RARE: Final = (
     "clamp_max",
+    "jitter",
     "low_frequency_boost_curvature",
     "luminance_cap",
     "max_mip_dimension",
+    "maximum",
+    "saturation",
     "scale_x",
     "scale_y",
+    "smoothness",
     "white",
 )
 # Fields that keep their values on the page when another preset or method is selected.

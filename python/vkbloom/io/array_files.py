@@ -326,20 +326,18 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
         values = np.asarray(array)
     except (TypeError, ValueError) as error:
         raise TypeError(f"array: an array is needed; NumPy: {error}") from None
-    if values.dtype == np.float64:
-        values = values.astype(np.float32)
-    if values.dtype.name not in PIXEL_TYPES:
+    if values.dtype.name not in (*PIXEL_TYPES, "float64"):
         raise TypeError(
             f"array: dtype {values.dtype} is not one of uint8, uint16, float16, float32, float64"
         )
-    values = values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.ndim == 2:
         values = values[:, :, None]
     if values.ndim != 3 or not 1 <= values.shape[2] <= 4 or 0 in values.shape:
         raise ValueError(
             f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
         )
-    return values
+    kept = np.float32 if values.dtype.name == "float64" else values.dtype.newbyteorder("=")
+    return values.astype(kept, copy=False)
 
 
 def _numbers(
