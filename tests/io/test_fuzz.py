@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from tests.processes import output
 from vkbloom.scene import skybox
 
 RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
+GLSLANG = pytest.mark.skipif(
+    not any(map(shutil.which, ("glslangValidator", "glslang"))), reason="needs glslang"
+)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space of Linux")
 
 
@@ -25,6 +29,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address s
         "faces",
         "equirectangular",
         "pipelines",
+        pytest.param("own", marks=GLSLANG),
         "zarr",
         "images",
         "toml",
