@@ -18,7 +18,7 @@ These are measured after a collection and a trim of the heap, as the median of s
 - ``descriptors`` and ``threads``.
 
 Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``, COUNT renderers
-(default 1000, at least 50)
+(default 1000, at least 100)
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ ENVIRONMENT = {
     "LP_NUM_THREADS": "0",
 }
 
-ROUNDS = 5
-WARM_UP = 10
+ROUNDS = 10
+WARM_UP = 20
 SIZES = ("heap", "data", "code", "descriptors", "threads")
 
 
@@ -123,7 +123,7 @@ def growth(
 def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
     """Return the growth for one more frame of a renderer that stays open, `count` of them.
 
-    Of 100 and more, each round has all settings in all sizes, so that it ends as it began.
+    Of 200 and more, each round has all settings in all sizes, so that it ends as it began.
     """
     sizes = [(64, 36), (33, 57), (1, 1), (120, 8)]
     settings = [
@@ -175,8 +175,8 @@ def measure(count: int) -> dict[str, dict[str, float]]:
 
     return {
         "renderer": renderer_growth(count),
-        "validated": renderer_growth(max(count // 5, 50), validation=True),
-        "frame": growth(frame, max(count // 4, 25)),
+        "validated": renderer_growth(max(count // 5, 100), validation=True),
+        "frame": growth(frame, max(count // 4, 50)),
         "open": frame_growth(scene, 2 * count),
     }
 

@@ -128,11 +128,11 @@ Measured = dict[str, dict[str, float]]  # what tools/renderer_memory.py prints
 
 @pytest.fixture(scope="module")
 def grown() -> Measured:
-    """What 50 renderers and 100 frames leave behind."""
+    """What 100 renderers and 200 frames leave behind."""
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
     tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
-    measured: Measured = json.loads(output(tool, "50"))
+    measured: Measured = json.loads(output(tool, "100"))
     return measured
 
 
