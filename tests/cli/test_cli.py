@@ -82,15 +82,17 @@ def test_every_command_has_help(name: str) -> None:
     assert result.stderr == ""
 
 
-def test_version_option_prints_the_version() -> None:
-    assert vkb("--version").stdout == f"program {vkbloom.__version__}\n"
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_version_option_prints_the_version(option: str) -> None:
+    assert vkb(option).stdout == f"program {vkbloom.__version__}\n"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ((), "Missing command"),
-        (("rendr",), "No such command 'rendr'"),
+        (("rendr",), "No such command 'rendr'; did you mean 'render'?"),
+        (("zzz",), "No such command 'zzz' (see"),
         (("render",), "Missing option '-o'"),
         (("render", "-o", "x.png", "--nonsense"), "--nonsense"),
         (("render", "-o", "-"), "give --out a file or a folder"),
@@ -217,6 +219,9 @@ def test_the_default_is_the_renderers() -> None:
         ("--tonemap agx --exposure -1.5", {"tonemap": "agx", "exposure": -1.5}),
         ("--loops 3 --first-tap 0 --texel x", {"loops": 3, "first_tap": 0, "texel": "x"}),
         ("--glare none", {"glare": ()}),
+        ("--glare Streaks", {"glare": vkbloom.Streaks()}),
+        ("--glare Anamorphic", {"glare": vkbloom.glares["anamorphic"]}),
+        ("--tonemap ACES", {"tonemap": "aces"}),
         ("--glare anamorphic+halo", {"glare": (*vkbloom.glares["anamorphic"], vkbloom.Halo())}),
         (
             "--glare ghosts:scales=[1,-2],tints=[[1,0,0],[0,1,0]],falloff=3",
@@ -242,6 +247,8 @@ def test_options_become_settings(arguments: str, changes: dict[str, Any]) -> Non
 def test_options_change_a_preset() -> None:
     changed = settings_from("--preset", "outline", "--blur-strength", "2")
     assert changed == vkbloom.presets["outline"].replace(blur_strength=2.0)
+    assert settings_from("--preset", "Kino") == vkbloom.presets["kino"]
+    assert settings_from("--method", "Pyramid") == vkbloom.Pyramid()
 
 
 @pytest.mark.parametrize(
@@ -268,7 +275,13 @@ def test_options_change_a_preset() -> None:
         ("--streaks 17", "'--streaks': 17 is not in the range"),
         ("--tonemap filmic", "'--tonemap': 'filmic' is not one of 'none'"),
         ("--threshold high", "'--threshold': 'high' is not float|none"),
-        ("--method box", "'--method': 'box'"),
+        ("--method box", "'--method': unknown method 'box'; available: separable"),
+        ("--method Pyramids", "unknown method 'Pyramids'; did you mean 'pyramid'? available"),
+        ("--preset kinno", "'--preset': unknown preset 'kinno'; did you mean 'kino'? available"),
+        ("--treshold 1", "No such option '--treshold'; did you mean '--threshold'?"),
+        ("--glare Streks", "godot_dirt; did you mean 'streaks'?"),
+        ("--psf spenser", "; did you mean 'spencer'?"),
+        ("--attachments finl", "'finl'; did you mean 'final'? available: glow"),
         ("--size 48", "'--size': '48' is not WxH"),
         ("--size 0x8", "size: (0, 8) is out of range"),
         ("--time nan", "time: nan is out of range"),
@@ -339,25 +352,28 @@ def test_the_help_of_an_option_is_the_fields_docstring() -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["apply", "render", "grid", "explore"])
-def test_the_help_groups_options_by_method(name: str) -> None:
-    sections: dict[str, str] = {}
-    title = ""
-    for line in vkb(name, "--help").output.splitlines():
-        if line.endswith(":") and not line.startswith(" "):
-            title = line[:-1]
-        sections[title] = sections.get(title, "") + line + "\n"
-    of_methods = {f"Settings of the method {method}" for method in METHODS}
-    # HDRP and others have a section only where a field is theirs alone.
-    assert len(of_methods & set(sections)) > len(METHODS) / 2
-    for option, title in {
-        "--adapter": "Options",
-        "--threshold": "Settings of every method",
-        "--levels": "Settings of several methods",
-        "--blur-scale": "Settings of the method separable",
-        "--firefly-filter": "Settings of the method pyramid",
-    }.items():
-        assert [one for one in sections if f"\n  {option} " in sections[one]] == [title]
+def options_in(text: str) -> set[str]:
+    """Return the options that a part of a help describes."""
+    return set(re.findall(r"^  (?:-\w, )?(--[a-z-]+)", text, re.M))
+
+
+@pytest.mark.parametrize("name", ["apply", "render", "grid", "explore", "translate"])
+def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
+    general = vkb(name, "--help").output
+    assert {"--adapter", "--threshold", "--quiet"} <= options_in(general)
+    assert not {"--blur-scale", "--levels"} & options_in(general)
+    assert f"{name} --method NAME --help lists those of:" in general
+    forms = (("--method", "kino"), ("--method=Kino",), ("--preset", "kino"))
+    for words in forms if name == "apply" else forms[:1]:
+        text = vkb(name, *words, "--help").output
+        names, described = text.split("Settings of the method kino:")
+        # Kino's bloom is always added.
+        fields = [one for one in fields_of(vkbloom.KinoBloom).values() if one.name != "composite"]
+        assert options_in(described) == {f"--{one.option.replace('_', '-')}" for one in fields}
+        assert "--adapter" in names
+        assert "[default 2.5]" in described
+        # A screen of 50 lines also has the call and the prompt.
+        assert len(text.splitlines()) < 50
 
 
 def test_given_none_differs_from_the_default() -> None:

@@ -77,3 +77,33 @@ def test_wrong_use(files: tuple[str, str], words: list[str], message: str) -> No
     done = CliRunner().invoke(program, ["fit", *files, *words])
     assert done.exit_code == 2
     assert message in done.stderr
+
+
+def test_translate(renderer: vkbloom.Renderer) -> None:
+    words = ("--preset", "Kino", "--intensity", "0.5", "--size", "64x48", "--max-calls", "12")
+    result = CliRunner().invoke(program, ["translate", *words, "--to", "Pyramid", "--json"])
+    assert result.exit_code == 0, result.stderr
+    (found,) = json.loads(result.stdout)
+    settings = vkbloom.presets["kino"].replace(intensity=0.5)
+    size, most = (64, 48), 12
+    expected = vkbloom.translate(
+        settings, vkbloom.Pyramid(), size=size, max_calls=most, renderer=renderer
+    )
+    assert vkbloom.Settings.from_dict(found["settings"]) == expected.settings
+    assert found["loss"] == expected.loss < expected.start_loss
+    assert (found["loss_name"], found["verdict"]) == ("log", expected.verdict)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--to", "kino"), "give what to translate: --preset NAME or --method NAME"),
+        (("--preset", "kino"), "Missing option '--to'"),
+        (("--preset", "kino", "--to", "pyramids"), "'pyramids'; did you mean 'pyramid'?"),
+        (("--preset", "kino", "--to", "pyramid", "--vary", "levls"), "did you mean 'levels'?"),
+    ],
+)
+def test_translate_of_nothing_or_to_nothing(words: tuple[str, ...], told: str) -> None:
+    result = CliRunner().invoke(program, ["translate", *words])
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert told in result.stderr

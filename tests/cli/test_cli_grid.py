@@ -88,7 +88,8 @@ class TestAxes:
             ("blur_scale=1,99", "blur_scale: 99.0 is out of range"),
             ("loops=1:2:4", "is not an integer"),
             ("blur_scale=1:2", "a range is FIRST:LAST:COUNT"),
-            ("preset=kino,non", "unknown preset 'non'"),
+            ("preset=kino,fimalent", "unknown preset 'fimalent'; did you mean 'filament'?"),
+            ("blur-sale=1", "has no field 'blur_sale'; did you mean 'blur_scale'?"),
         ],
     )
     def test_wrong_use_is_one_line(self, tmp_path: Path, word: str, told: str) -> None:
@@ -139,18 +140,18 @@ class TestStores:
         assert set(found) == {"done", "psnr"}
         assert list(found["image"].values) == [str(image_file), str(tmp_path / "b.exr")]
 
-    def test_resumed_only_when_asked(self, tmp_path: Path, image_file: Path) -> None:
+    def test_resumed_by_the_same_call(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
         done(*words)
         (tmp_path / "a.zarr" / "final" / "c.0.0.0.0").write_bytes(b"")
-        again = run(*words)
+        again = run(*words, "--no-resume")
         assert again.exit_code == 1
         assert "resume it" in again.stderr
-        mended = run(*words, "--resume")
+        mended = run(*words)
         assert mended.exit_code == 0
         assert "c.0.0.0.0 was damaged" in mended.stderr
         assert "exposure=0..1" in mended.stderr
-        other = run(*words, "--resume", "--intensity", "0.5")
+        other = run(*words, "--intensity", "0.5")
         assert other.exit_code == 1
         assert "settings.intensity: 0.15 in the store, 0.5 requested" in other.stderr
 
@@ -341,6 +342,26 @@ class TestImageFiles:
             load(out / "001_000_final.png").pixels, load(tmp_path / "one.png").pixels
         )
 
+    @pytest.mark.parametrize(
+        ("axis", "points"),
+        [
+            ("intensity=0.5,1", [("--intensity", "0.5"), ("--intensity", "1")]),
+            ("preset=Kino,photo", [("--preset", "kino"), ("--preset", "photo", "--expand", "1")]),
+        ],
+    )
+    def test_photographs_as_apply_has_them(
+        self, tmp_path: Path, axis: str, points: list[tuple[str, ...]]
+    ) -> None:
+        image = np.full((12, 16, 3), 20, np.uint8)
+        image[4:8, 5:9] = 255
+        photo = vkbloom.write(tmp_path / "photo.png", image)
+        assert run(photo, "--axis", axis, "-o", tmp_path / "files").exit_code == 0
+        for index, words in enumerate(points):
+            one = tmp_path / "one.png"
+            CliRunner().invoke(program, ["apply", str(photo), str(one), *words])
+            found = load(tmp_path / "files" / f"00{index}_final.png").pixels
+            np.testing.assert_array_equal(found, load(one).pixels)
+
     def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "files"
         done(
@@ -366,13 +387,13 @@ class TestImageFiles:
         names = sorted(path.name for path in out.iterdir())
         before = load(out / "001_final.exr").pixels
         (out / "001_final.exr").unlink()
-        assert "already has a grid" in run(*words).stderr
-        assert "passes run 0" not in done(*words, "--resume")
+        assert "already has a grid" in run(*words, "--no-resume").stderr
+        assert "passes run 0" not in done(*words)
         assert sorted(path.name for path in out.iterdir()) == names
         # (Not the bytes of the file, which has the time of its writing in it.)
         np.testing.assert_array_equal(load(out / "001_final.exr").pixels, before)
         assert "passes run 0" in done(*words, "--resume")
-        other = run(*words, "--resume", "--knee", "0.5")
+        other = run(*words, "--knee", "0.5")
         assert other.exit_code == 1
         assert "settings.knee" in other.stderr
 

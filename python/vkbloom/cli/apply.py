@@ -23,14 +23,13 @@ import vkbloom
 from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
-from vkbloom.cli.glow_options import accompanying, glow_options, uploaded
+from vkbloom.cli.glow_options import accompanying, glow_options, note_step, uploaded
 from vkbloom.cli.image_files import (
     COLOURS,
     check_input_colour,
     expand_option,
     input_colour_option,
     layer_option,
-    note,
     read_picture,
     silenced,
     subimage_option,
@@ -40,6 +39,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.program import given as was_given
 from vkbloom.cli.sequences import PIPE, check_targets, pairs
 from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.terminal import detail, hides_progress, note, say, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import premultiplied
@@ -105,40 +105,19 @@ def command(
 ) -> None:
     """Add bloom to the image IN and write the result to OUT.
 
-    OpenImageIO reads and writes the files; the extension selects the format: OpenEXR, Radiance HDR,
-    PNG, JPEG, TIFF and others. IN and OUT may be folders; the names of the files are kept. They may
-    be patterns of numbers (f.%04d.exr, f.####.exr) or - for a pipe. IN may also be a glob, or
-    several files.
+    The extension selects the format: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and others. IN and OUT
+    may be folders, patterns of numbers (f.%04d.exr, f.####.exr) or - for a pipe. IN may also be a
+    glob, or several files.
 
-    Without --preset and --method, files of integers (JPEG, PNG) start from the preset photo, whose
-    bloom is added, and their highlights are expanded; see --expand. Files of floats start from
-    bevy_natural. Further options change the settings.
+    Without --preset and --method, files of integers (JPEG, PNG) start from the preset photo, and
+    their highlights are expanded; files of floats start from bevy_natural. Further options change
+    the settings.
 
     Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
-    with Rec. 709 colours. The decoding uses the ICC profile, the cICP chunk or the gamma of the
-    file, or sRGB if it has none. Files of floats are linear; half stays half, and float stays
-    float. --input-colour overrides this.
-
-    OUT has the number type of IN, or the closest one that its format supports: a PNG of a float
-    image has 8 bits. Integers are encoded to sRGB and clipped to 0..1. Floats (as in OpenEXR and
-    Radiance HDR) are written linear. --output-colour overrides this. With --encoding, the values
-    are already encoded and not converted again. EXIF, resolution and a JPEG's chroma subsampling
-    are kept.
-
-    --mask limits what glows. --emission glows instead of the image. Both apply to each IN.
-
-    Alpha does not change, unless --alpha is given. With --alpha max or blur, straight colours are
-    multiplied by alpha before, and divided by it afterwards. Grey images become RGB and grey again.
-    If the data window of an OpenEXR file is smaller than its display window, the rest is black. A
-    larger data window is used completely, and is kept if the format of OUT supports it. Images are
-    rotated according to the orientation in the file. The first part of a file with several parts is
-    read, or the part of --subimage. --layer selects one of several layers. Channels other than R,
-    G, B and A are ignored.
-
-    Pictures of at least 16 million pixels are read and written in bands of rows, except from a
-    pipe. --half holds them in half floats.
-
-    OUT is replaced when the new file is complete. A call that fails leaves no partial file.
+    with Rec. 709 colours. Files of floats are linear. OUT has the number type of IN, or the closest
+    one of its format. Integers are encoded to sRGB and clipped to 0..1. Floats (as in OpenEXR and
+    Radiance HDR) are written linear. Alpha does not change, unless --alpha is given. OUT is
+    replaced when the new file is complete. See docs/command-line.md.
     """
     options = _Options(**given)
     inputs, target = _arguments(sources, out)
@@ -148,7 +127,8 @@ def command(
         @functools.cache
         def renderer() -> vkbloom.Renderer:
             opened = stack.enter_context(opened_renderer(adapter, validation))
-            _say(f"Rendering on {opened.info.summary}", target)
+            # Standard output may have the picture.
+            tell_device(opened, err=target == PIPE)
             return opened
 
         run = _Run(options, target, Path(folder), renderer, several=len(work) > 1)
@@ -158,8 +138,9 @@ def command(
                     run.large_file(*pair)
             else:
                 run.sequence([*group])
+    note_step(options.settings, options.mask, options.emission)
     if len(work) > 1:
-        click.echo(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
+        say(f"wrote {len(work)} images, {work[0][1]} to {work[-1][1]}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -225,8 +206,7 @@ class _Run:
         self._folder = folder
         self._renderer = renderer
         self._several = several
-        # None: shown where standard error is a terminal.
-        self._hidden = None if sys.stderr is not None else True
+        self._hidden = hides_progress()
 
     def is_by_rows(self, name: str) -> bool:
         """Whether a file is read and written in bands of rows."""
@@ -267,7 +247,7 @@ class _Run:
         for text in notes:
             note(text)
         if not self._several:
-            click.echo(f"wrote {target}")
+            say(f"wrote {target}")
 
     def sequence(self, files: list[tuple[str, str]]) -> None:
         """Add bloom to files one after the other; read and write others meanwhile."""
@@ -288,6 +268,8 @@ class _Run:
             for (picture, frames), (name, target) in zip(bar, files, strict=True):
                 for text in no_bloom.notes(frames, picture.pixels):
                     note(f"{name}: {text}" if self._several else text)
+                seconds = sum(frames.timings.values())
+                detail(f"{name}: {1e3 * seconds:.2f} ms on the device")
                 kept = no_bloom.only(frames, options.names)
                 write_next(functools.partial(self._write, picture, kept, target))
 
@@ -330,7 +312,7 @@ class _Run:
             sys.stdout.buffer.write(file.read_bytes())
         elif not self._several:
             for path in written:
-                click.echo(f"wrote {path}")
+                say(f"wrote {path}")
 
 
 @contextlib.contextmanager
@@ -390,11 +372,6 @@ def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], st
     if len(sources) < 2:
         raise click.UsageError("Missing argument 'OUT'.")
     return [*sources[:-1]], sources[-1]
-
-
-def _say(text: str, out: str) -> None:
-    """Print a line on standard output, or on standard error if the picture is on the former."""
-    click.echo(text, err=out == PIPE)
 
 
 def _piped_in(folder: Path) -> str:

@@ -15,6 +15,7 @@ from vkbloom.cli.image_files import read
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.fields import FieldInfo, fields_of
 from vkbloom.settings import field_info
+from vkbloom.suggestions import did_you_mean
 
 __all__ = ["REDUCTIONS", "axis_bounds", "axis_values", "chunk_counts", "named_reductions"]
 
@@ -28,6 +29,7 @@ REDUCTIONS: Final[Mapping[str, type[reductions.Reduction]]] = {
 }
 
 _PRESET: Final = "preset"
+_PRESETS: Final = fields.NameOf(_PRESET, vkbloom.presets)
 _RANGE_PARTS: Final = (3, 4)
 _MOST_DIGITS: Final = 18
 # Number of values of all axes together.
@@ -46,8 +48,8 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     for word in words:
         name, _, text = word.partition("=")
         if name.strip() == _PRESET:
-            named = [preset_named(one.strip()) for one in text.split(",")]
-            types = {**_types_of(named), _PRESET: click.STRING}
+            named = [vkbloom.presets[_converted(_PRESETS, word, one)] for one in text.split(",")]
+            types = {**_types_of(named), _PRESET: _PRESETS}
             lacking = "not all of these presets have the field"
     found: dict[str, Sequence[Any]] = {}
     for word in words:
@@ -59,20 +61,12 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
         if not sign or not text:
             raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
         if name not in types:
-            raise click.UsageError(f"--axis: {lacking} {name!r}")
+            raise click.UsageError(f"--axis: {lacking} {name!r}{did_you_mean(name, types)}")
         if name in found:
             raise click.UsageError(f"--axis: {name} is given twice; list all values in one")
         room = _MOST_VALUES - sum(map(len, found.values()))
         found[name] = _values(word, text, types[name], room)
     return found
-
-
-def preset_named(name: str) -> vkbloom.Settings:
-    """Return the settings of a preset, or raise click.UsageError."""
-    try:
-        return vkbloom.presets[name]
-    except KeyError as error:
-        raise click.UsageError(f"--axis {_PRESET}: {error.args[0]}") from None
 
 
 def _type_of(info: FieldInfo) -> click.ParamType[Any] | None:
@@ -101,10 +95,15 @@ def _values(word: str, text: str, kind: click.ParamType[Any] | None, room: int) 
         raise click.UsageError(
             f"--axis {word}: values of this field cannot be written here; use Renderer.grid"
         )
+    return [_converted(kind, word, part) for part in values]
+
+
+def _converted(kind: click.ParamType[Any], word: str, part: str) -> Any:
+    """Return one value of the axis `word`, or raise click.UsageError."""
     try:
-        return [kind.convert(part.strip(), None, None) for part in values]
+        return kind.convert(part.strip(), None, None)
     except click.BadParameter as error:
-        hint = "; a range is FIRST:LAST:COUNT" if ":" in text else ""
+        hint = "; a range is FIRST:LAST:COUNT" if ":" in part else ""
         raise click.UsageError(f"--axis {word}: {error.message}{hint}") from error
 
 
@@ -166,6 +165,7 @@ def named_reductions(
         if kind not in REDUCTIONS:
             raise click.UsageError(
                 f"--reduce {word}: {kind!r} is not one of {', '.join(REDUCTIONS)}"
+                f"{did_you_mean(kind, REDUCTIONS)}"
             )
         arguments: dict[str, Any] = {"attachment": attachment} if attachment else {}
         is_comparing = issubclass(REDUCTIONS[kind], reductions.Comparing)

@@ -1,4 +1,4 @@
-"""``vkbloom check``: measure what a bloom is worth."""
+"""``vkbloom check``: measure a bloom by every law."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from rich.console import Console
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.image_files import note
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.terminal import detail_device, is_quiet, note, say
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
 from vkbloom.own.method import OwnMethod
+from vkbloom.suggestions import did_you_mean
 from vkbloom.testing.law_report import LAWS
 from vkbloom.testing.programs import Program
 from vkbloom.verdicts import measuring, showing, subjects
@@ -61,7 +62,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     names = [name.strip().replace("-", "_").removeprefix("assert_") for name in text.split(",")]
     for name in filter(None, names):
         if name not in _NAMES:
-            raise click.BadParameter(f"{name!r} is not one of {', '.join(_NAMES)}")
+            raise click.BadParameter(
+                f"{name!r} is not one of {', '.join(_NAMES)}{did_you_mean(name, _NAMES)}"
+            )
     return tuple(dict.fromkeys(_NAMES[name] for name in names if name))
 
 
@@ -151,7 +154,9 @@ def command(
     The exit status is 1 if a law of --require is not held, or was not tested.
     """
     _check_choice(file, program, twin)
-    with opened_renderer(adapter, validation) as renderer, Console(stderr=True).status("") as bar:
+    console = Console(stderr=True, quiet=is_quiet())
+    with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
+        detail_device(renderer)
         if program is None:
             name = click.get_current_context().params["preset"] or settings.method
             if twin is not None:
@@ -185,7 +190,7 @@ def command(
     else:
         click.echo(showing.as_text(found, required=require))
     if page is not None:
-        click.echo(f"wrote {page}", err=as_json)
+        say(f"wrote {page}", err=as_json)
     broken = showing.broken(found, require)
     for row in broken:
         note(f"{subject.name}: required law {row.name}: {row.words}")

@@ -13,8 +13,9 @@ from rich.console import Console
 
 from vkbloom.checks import check_number
 from vkbloom.cli import fields
-from vkbloom.cli.image_files import check_part_is_given, note, read, subimage_option
+from vkbloom.cli.image_files import check_part_is_given, read, subimage_option
 from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.terminal import is_quiet, note, say
 from vkbloom.io import image_writing
 from vkbloom.io.images import Picture, StoredImage
 from vkbloom.views.comparison import (
@@ -156,7 +157,7 @@ def command(
     check_part_is_given(first, a)
     check_part_is_given(second, b)
     # FLIP of a large picture of floats takes half a minute.
-    with as_wrong_use(), Console(stderr=True).status("Comparing"):
+    with as_wrong_use(), Console(stderr=True, quiet=is_quiet()).status("Comparing"):
         found = compare(
             a.pixels,
             b.pixels,
@@ -182,7 +183,7 @@ def command(
         for line in _lines((first, second), a, found, failed, cause):
             click.echo(line)
         if scale is not None:
-            click.echo(f"wrote {diff}, differences times {scale:.6g}")
+            say(f"wrote {diff}, differences times {scale:.6g}")
     return 1 if failed else 0
 
 

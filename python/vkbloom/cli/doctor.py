@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 import vkbloom
-from vkbloom.cli.terminal import show
+from vkbloom.cli.terminal import is_quiet, show
 from vkbloom.doctor import Finding, Report, examine
 
 _STYLES: Final = {"ok": "green", "note": "yellow", "problem": "bold red"}
@@ -55,7 +55,7 @@ def command(as_json: bool) -> int:
     optional packages. Renders a small test scene on each adapter and checks the result. The exit
     status is 1 if no adapter renders it correctly.
     """
-    with Console(stderr=True).status("Examining this machine"):
+    with Console(stderr=True, quiet=is_quiet()).status("Examining this machine"):
         report = examine()
     if as_json:
         click.echo(_json(report))

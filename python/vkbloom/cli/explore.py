@@ -1,4 +1,4 @@
-"""``vkbloom explore``: serve the explorer of `vkbloom.explore` without a notebook."""
+"""``vkbloom explore``: explore the bloom of an image or a scene in a browser."""
 
 from __future__ import annotations
 
@@ -16,9 +16,15 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    note_step,
+    refuse_glow_of_scene,
+)
 from vkbloom.cli.live_options import live_options
 from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
+from vkbloom.cli.terminal import tell_device
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
 
@@ -72,6 +78,7 @@ def command(
     if image is not None:
         looked_at = image
         glow = accompanying(mask, emission)(image)
+        note_step(settings, mask, emission)
     else:
         refuse_glow_of_scene(mask, emission)
         looked_at = scene()
@@ -87,7 +94,7 @@ def command(
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.
             new_viewer()
-        click.echo(f"Rendering on {renderer.info.summary}")
+        tell_device(renderer)
         try:
             return asyncio.run(_serve(new_viewer, port, opens))
         except KeyboardInterrupt:

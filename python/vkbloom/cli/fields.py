@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+import itertools
 import json
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -21,6 +23,7 @@ from vkbloom.glare.base import Glare
 from vkbloom.named_glares import glares
 from vkbloom.psf.base import PSF, functions
 from vkbloom.registry import METHODS, STAGES
+from vkbloom.suggestions import did_you_mean, nearest, unknown
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]
@@ -71,10 +74,11 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
 def _read_psf(word: str) -> PSF:
     """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
     name, _, rest = word.partition(":")
-    if name in functions():
-        return PSF.from_dict({"psf": name} | _read_fields(rest))
+    if name.lower() in functions():
+        return PSF.from_dict({"psf": name.lower()} | _read_fields(rest))
     if not os.path.exists(word):
-        raise ValueError(f"is neither a file nor one of {', '.join(functions())}")
+        near = did_you_mean(name, functions())
+        raise ValueError(f"is neither a file nor one of {', '.join(functions())}{near}")
     return psf.samples(read_colours(word))
 
 
@@ -117,14 +121,17 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
     found: list[Glare] = []
     for one in word.split("+"):
         name, sign, rest = one.partition(":")
+        name = name.lower()
         if name in glares:
             if sign:
                 raise ValueError(f"{name} is a published glare, which takes no fields")
             found += glares[name]
             continue
         if name not in STAGES:
-            known = ", ".join([*STAGES, *glares])
-            raise ValueError(f"{name!r} is not one of {known}")
+            known = [*STAGES, *glares]
+            raise ValueError(
+                f"{name!r} is not one of {', '.join(known)}{did_you_mean(name, known)}"
+            )
         found.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
     return tuple(found)
 
@@ -145,7 +152,7 @@ _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
 def option_type(info: FieldInfo) -> _ParamType:
     """Return the option type of a field, or raise TypeError if its kind has none."""
     if info.kind == "choice":
-        kind: _ParamType = click.Choice(info.choices)
+        kind: _ParamType = click.Choice(info.choices, case_sensitive=False)
     elif info.kind in _OPTION_TYPES:
         kind = _OPTION_TYPES[info.kind]
     else:
@@ -275,8 +282,14 @@ class FieldOptions(click.Option):
         return self._made[1]
 
 
+# Where a call keeps the method that its help is about.
+_METHOD: Final = "vkbloom.method"
+# Width of the options' names in the help of a method, which fits on a screen of 50 lines.
+_NARROW: Final = 24
+
+
 class Command(click.Command):
-    """A command with options of fields; its help groups them by the classes that have them."""
+    """A command with options of fields; its help lists those of a method that the call names."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the parameters, with the options of fields in the place of each `FieldOptions`."""
@@ -287,33 +300,71 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Begin with no values of fields."""
+        ctx.meta[_METHOD] = _method_of(args)
         places = (one for one in self.params if isinstance(one, FieldOptions))
         ctx.params.update({place.into: {} for place in places})
         return super().parse_args(ctx, args)
 
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the description; with a method only its first paragraph."""
+        if ctx.meta.get(_METHOD):
+            formatter.write_paragraph()
+            with formatter.indentation():
+                formatter.write_text(inspect.cleandoc(self.help or "").partition("\n\n")[0])
+        else:
+            super().format_help_text(ctx, formatter)
+
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the command's own options, then those of each group."""
-        groups: dict[tuple[str, ...] | None, list[tuple[str, str]]] = {None: []}
-        for parameter in self.get_params(ctx):
-            record = parameter.get_help_record(ctx)
-            if record is not None and isinstance(parameter, click.Option):
-                labels = parameter.labels if isinstance(parameter, FieldOption) else None
-                groups.setdefault(labels, []).append(record)
-        # Fields of many classes come first.
-        order = sorted((labels for labels in groups if labels), key=lambda labels: -len(labels))
-        shared = [labels for labels in order if len(labels) > 1]
+        """Write the command's own options and the settings of every method.
+
+        With --method or --preset the former by their names only, and the method's settings.
+        """
+        general: list[click.Option] = []
+        shared: list[click.Option] = []
+        for one in self.get_params(ctx):
+            if isinstance(one, FieldOption) and one.labels is not None:
+                shared += [] if one.labels else [one]
+            elif isinstance(one, click.Option):
+                general.append(one)
+        method = ctx.meta.get(_METHOD)
+        if method:
+            with formatter.section(f"Options ({ctx.command_path} --help describes them)"):
+                formatter.write_text(" ".join(max(one.opts, key=len) for one in general))
+            with formatter.section(f"Settings of the method {method}"):
+                formatter.write_dl(_records(ctx, _options_of(method)), col_max=_NARROW)
+            return
         with formatter.section("Options"):
-            formatter.write_dl(groups[None])
-        if () in groups:
-            with formatter.section("Settings of every method"):
-                formatter.write_dl(groups[()])
+            formatter.write_dl(_records(ctx, general))
         if shared:
-            with formatter.section("Settings of several methods"):
-                formatter.write_dl([record for labels in shared for record in groups[labels]])
-        for labels in order:
-            if len(labels) == 1:
-                with formatter.section(f"Settings of the method {labels[0]}"):
-                    formatter.write_dl(groups[labels])
+            with formatter.section("Settings of every method"):
+                formatter.write_dl(_records(ctx, shared))
+            with formatter.section(f"{ctx.command_path} --method NAME --help lists those of"):
+                formatter.write_text(", ".join(METHODS))
+
+
+def _method_of(args: Sequence[str]) -> str | None:
+    """Return the method that the words of a call name, by --method or --preset."""
+    for word, after in itertools.zip_longest(args, args[1:], fillvalue=""):
+        option, sign, value = word.partition("=")
+        value = value if sign else after
+        if option == "--method" and (name := nearest(value, METHODS)):
+            return name
+        if option == "--preset" and (name := nearest(value, vkbloom.presets)):
+            return vkbloom.presets[name].method
+    return None
+
+
+def _options_of(method: str) -> list[click.Option]:
+    """Return options of what a method has, with its own defaults; those of all methods last."""
+    fields = fields_of(METHODS[method]).values()
+    # A field with one value is none to choose.
+    infos = [info for info in fields if not info.fixed and len(info.choices) != 1]
+    infos.sort(key=lambda info: info.name in fields_of(vkbloom.Settings))
+    return [FieldOption({"": info}, "", "") for info in infos]
+
+
+def _records(ctx: click.Context, options: Iterable[click.Option]) -> list[tuple[str, str]]:
+    return [record for one in options if (record := one.get_help_record(ctx)) is not None]
 
 
 def options(
@@ -324,26 +375,34 @@ def options(
 
 
 class NameOf(_ParamType):
-    """The type of an option whose value is a name of a registry, read at each call."""
+    """The type of an option whose value is a published name; upper case makes no difference.
 
-    name = "choice"
+    - `kind`: What has the name, such as "preset".
+    - `known`: The names, or what has them as keys. Registries are read at each call.
+    """
 
-    def __init__(self, names: Mapping[str, Any]) -> None:
-        self._names = names
-
-    def _choice(self) -> click.Choice[str]:
-        return click.Choice(list(self._names))
+    def __init__(self, kind: str, *known: Iterable[str]) -> None:
+        self.name = kind
+        self._known = known
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
         """Return the placeholder of the value in the help."""
-        return self._choice().get_metavar(param, ctx)
+        return "NAME"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the name."""
-        return self._choice().convert(value, param, ctx)
+        """Return the name as it was published."""
+        names = {one.lower(): one for names in self._known for one in names}
+        if value.lower() not in names:
+            self.fail(unknown(f"unknown {self.name}", value, names.values()), param, ctx)
+        return names[value.lower()]
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Return the names that begin with some letters."""
-        return self._choice().shell_complete(ctx, param, incomplete)
+        return [
+            CompletionItem(one)
+            for names in self._known
+            for one in names
+            if one.startswith(incomplete.lower())
+        ]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import click
 from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.image_files import read_picture
+from vkbloom.cli.terminal import note
 from vkbloom.io.array_files import premultiplied
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour
@@ -18,6 +18,7 @@ from vkbloom.io.images import Colour
 __all__ = [
     "accompanying",
     "glow_options",
+    "note_step",
     "refuse_glow_of_scene",
     "uploaded",
 ]
@@ -25,28 +26,34 @@ __all__ = [
 Array = NDArray[Any]
 
 
+_MASK: Final = click.option(
+    "--mask",
+    metavar="FILE",
+    type=click.Path(),
+    help="A grey image of the same size, which multiplies what glows: white keeps it, black "
+    "removes it. Its values are not decoded.",
+)
+_EMISSION: Final = click.option(
+    "--emission",
+    metavar="FILE",
+    type=click.Path(),
+    help="An image of the same size that glows instead of the image, such as a renderer's pass of "
+    "emissive materials. It is decoded like the image.",
+)
+
+
 def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--mask`` and ``--emission``, the arguments of `vkbloom.Renderer.apply`."""
+    return _MASK(_EMISSION(command))
 
-    @click.option(
-        "--mask",
-        metavar="FILE",
-        type=click.Path(),
-        help="A grey image of the same size, which multiplies what glows: white keeps it, black "
-        "removes it. Its values are not decoded.",
-    )
-    @click.option(
-        "--emission",
-        metavar="FILE",
-        type=click.Path(),
-        help="An image of the same size that glows instead of the image, such as a renderer's "
-        "pass of emissive materials. It is decoded like the image.",
-    )
-    @functools.wraps(command)
-    def run(**arguments: object) -> object:
-        return command(**arguments)
 
-    return run
+def note_step(settings: vkbloom.Settings | None, mask: str | None, emission: str | None) -> None:
+    """Print a note that a mask's edge is seen in a mix. None: settings that are not known."""
+    if mask and not emission and settings and settings.bloom and settings.composite == "mix":
+        note(
+            "the composite mix takes light from what the mask lets glow, which is seen as a step "
+            "at the mask's edge; --composite add or --preset photo adds the bloom without"
+        )
 
 
 def refuse_glow_of_scene(mask: str | None, emission: str | None) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import io
 import logging
 import math
-import os
 import queue
 import signal
 import threading
@@ -26,18 +24,25 @@ from vkbloom.checks import import_extra
 from vkbloom.cli import axis_options
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE
-from vkbloom.cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
+from vkbloom.cli.glow_options import (
+    accompanying,
+    glow_options,
+    note_step,
+    refuse_glow_of_scene,
+)
 from vkbloom.cli.image_files import (
+    expand_option,
     input_colour_option,
     layer_option,
-    note,
     read_picture,
     subimage_option,
 )
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
-from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
-from vkbloom.cli.settings_options import default_preset, settings_options
+from vkbloom.cli.sequences import check_drawing
+from vkbloom.cli.settings_options import DEFAULT_PRESETS, settings_options
+from vkbloom.cli.terminal import detail_device, is_quiet, note, say
 from vkbloom.grid.image_folder import FileForm, GridFiles
 from vkbloom.grid.layout import Grid, Layout, ask
 from vkbloom.grid.parts import WHOLE, Part, read_part
@@ -77,8 +82,8 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
 )
 @click.option(
     FILE_OPTION,
-    "options_file",
     metavar="FILE",
+    expose_value=False,
     help="A TOML or YAML file with options by their long names. It may have the tables settings, "
     "camera, axes, reduce and chunks, and the list images. Options on the command line override "
     "it.",
@@ -120,13 +125,17 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
     help="Format of image files: png, exr, tif, ...",
 )
 @click.option(
-    "--resume", is_flag=True, help="Continue an interrupted grid, and render damaged points again."
+    "--resume/--no-resume",
+    default=True,
+    show_default=True,
+    help="Continue an interrupted grid, and render damaged points again; without, a grid that is "
+    "there is an error.",
 )
 @click.option(
     "--part",
     metavar="I/N",
     callback=_part,
-    help="Render part I of N, from 1, of the same grid; implies --resume. Other processes may "
+    help="Render part I of N, from 1, of the same grid; with --resume. Other processes may "
     "render other parts at the same time. auto/N takes I, and auto also N, from the environment of "
     "a job array, such as SLURM_ARRAY_TASK_ID.",
 )
@@ -150,6 +159,7 @@ def _part(_: click.Context, __: click.Parameter, value: str | None) -> Part | No
 @click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
 @subimage_option
 @layer_option
+@expand_option
 @glow_options
 @device_options
 @scene_options
@@ -159,7 +169,6 @@ def command(
     images: tuple[str, ...],
     out: str,
     axis_words: tuple[str, ...],
-    options_file: str | None,
     size: tuple[int, int] | None,
     time: float,
     shading: Shading,
@@ -177,6 +186,7 @@ def command(
     raw: bool,
     subimage: int,
     layer: str | None,
+    expand: float | None,
     mask: str | None,
     emission: str | None,
     adapter: str,
@@ -186,9 +196,10 @@ def command(
 ) -> None:
     """Render all combinations of the axes' values.
 
-    The source is a scene, or each IMAGE, read as vkbloom apply reads it. The points of the grid
-    are rendered in the order that runs the fewest passes. A store can be opened while it is
-    written. --resume continues a grid that was killed, and gives the same result.
+    The source is a scene, or each IMAGE, read as vkbloom apply reads it: files of integers (JPEG,
+    PNG) start from the preset photo and are expanded, except with an axis of presets. The points of
+    the grid are rendered in the order that runs the fewest passes. A store can be opened while it
+    is written. The same call again continues a grid that was killed, and gives the same result.
     """
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler exclude each other; give one of them")
@@ -197,7 +208,9 @@ def command(
     chunks = axis_options.chunk_counts(chunk_words)
     begun, axes = _begun_and_axes(axis_words, settings, len(images))
     reduce = axis_options.named_reductions(reduce_words, settings)
-    pictures = [read_picture(one, subimage, input_colour, layer=layer, raw=raw) for one in images]
+    # The presets of an axis differ in whether they expand.
+    expand = expand if "preset" not in axes or given("expand") else None
+    pictures = _pictures(images, subimage, input_colour, layer=layer, raw=raw, expand=expand)
     requested = _source(images, pictures, scene), begun, axes
     shared: dict[str, Any] = {
         "size": size,
@@ -205,7 +218,7 @@ def command(
         "time": time,
         "attachments": _names(attachments),
         "reduce": reduce,
-        **_glows(pictures, mask, emission, input_colour, raw=raw),
+        **_glows(pictures, mask, emission, begun, colour=input_colour, raw=raw),
     }
     with as_wrong_use():
         grid = ask(*requested, **shared)
@@ -246,8 +259,8 @@ class _Output:
             _check_image_files(self.name, self.suffix)
         if self.sheet and not has_frames:
             raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
-        _check_drawing("--sheet", self.sheet, (".png",))
-        _check_drawing("--curves", self.curves, (".png", ".svg", ".pdf"))
+        check_drawing("--sheet", self.sheet, (".png",))
+        check_drawing("--curves", self.curves, (".png", ".svg", ".pdf"))
 
     def check_shape(self, shape: tuple[int, ...]) -> None:
         """Raise click.UsageError if there is no axis along which to plot."""
@@ -262,19 +275,19 @@ class _Output:
             resume=self.resume,
             part=self.part,
             on_mended=note,
-            progress=True,
+            progress=not is_quiet(),
             **options,
         )
         self._tell(points, dataset.attrs["passes_run"], dataset.attrs["passes_saved"])
         if self.sheet:
             safe_writing.write_file(Path(self.sheet), vkbloom.contact_sheet(dataset))
-            click.echo(f"wrote {self.sheet}")
+            say(f"wrote {self.sheet}")
         if self.curves:
             kind = Path(self.curves).suffix[1:].lower()
             drawn = io.BytesIO()
             vkbloom.response_curves(dataset).savefig(drawn, format=kind)
             safe_writing.write_file(Path(self.curves), drawn.getvalue())
-            click.echo(f"wrote {self.curves}")
+            say(f"wrote {self.curves}")
 
     def write_images(self, grid: Grid, pictures: Sequence[Picture], **device: Any) -> None:
         """Render into image files."""
@@ -287,12 +300,12 @@ class _Output:
             files.prepare(resume=self.resume)
             return files
 
-        tally = render_grid(grid, prepared, progress=True, **device)
+        tally = render_grid(grid, prepared, progress=not is_quiet(), **device)
         self._tell(math.prod(grid.shape), tally.ran, tally.saved)
 
     def _tell(self, points: int, ran: int, saved: int) -> None:
         which = f"part {self.part[0]}/{self.part[1]} of " if self.part else ""
-        click.echo(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
+        say(f"wrote {self.name}, {which}{points} points; passes run {ran}, saved {saved}")
 
 
 def _begun_and_axes(
@@ -304,7 +317,7 @@ def _begun_and_axes(
     axes = axis_options.axis_values(words, settings)
     if "preset" not in axes:
         return settings, axes
-    if settings != vkbloom.presets[default_preset(image_count > 0)]:
+    if settings not in map(vkbloom.presets.get, DEFAULT_PRESETS):
         raise click.UsageError(
             "--axis preset sets all settings; leave out options of settings, and vary fields by "
             "further axes"
@@ -317,6 +330,7 @@ def _note_no_bloom(grid: Grid, adapter: str, validation: bool) -> None:
     corners = (tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape))
     points = [point for point in map(grid.point, dict.fromkeys(corners)) if point.settings.bloom]
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
+        detail_device(renderer)
         zero = [
             no_bloom.is_without(frames)
             for _, frames in visit(renderer, grid.source, points, ("bloom",))
@@ -342,17 +356,10 @@ def _check_image_files(out: str, image_format: str) -> None:
     )
 
 
-def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
-    """Check that the drawing can be written, before a long grid is rendered."""
-    if file is None:
-        return
-    path = Path(file)
-    if path.suffix.lower() not in suffixes:
-        raise click.UsageError(f"{option}: {file} does not end in {', '.join(suffixes)}")
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
-    if not path.absolute().parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)
+def _pictures(
+    images: Sequence[str], subimage: int, colour: Colour | None, **options: Any
+) -> list[Picture]:
+    return [read_picture(one, subimage, colour, **options) for one in images]
 
 
 def _source(
@@ -371,12 +378,14 @@ def _glows(
     pictures: Sequence[Picture],
     mask: str | None,
     emission: str | None,
-    colour: Colour | None,
+    settings: vkbloom.Settings | None,
     *,
+    colour: Colour | None,
     raw: bool,
 ) -> dict[str, Any]:
     """Return the arguments `mask` and `emission` of a grid of images."""
     if pictures:
+        note_step(settings, mask, emission)
         return accompanying(mask, emission, colour, raw=raw)(pictures[0].pixels)
     refuse_glow_of_scene(mask, emission)
     return {}

@@ -15,6 +15,7 @@ import click
 import numpy as np
 
 from vkbloom.cli.program import given
+from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
 from vkbloom.io.expansion import PHOTO_EXPANSION
@@ -83,11 +84,6 @@ def check_part_is_given(path: str, stored: StoredImage) -> None:
         raise click.UsageError(f"{path}: has several parts; choose one with --subimage: {parts}")
 
 
-def note(text: str) -> None:
-    """Print a note that is not an error on standard error."""
-    click.echo(f"vkbloom: note: {text}", err=True)
-
-
 def check_input_colour(colour: Colour | None) -> None:
     """Raise click.UsageError for a colour space that is not known."""
     if colour in (None, *COLOURS):
@@ -117,6 +113,8 @@ def read_picture(
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
     if (text := image_reading.specials_note(*counts)) is not None:
         note(f"{source} {text}")
+    height, width = picture.pixels.shape[:2]
+    detail(f"{source}: {width} x {height}, {picture.numbers}")
     for text in picture.notes:
         note(f"{source}: {text}")
     return picture

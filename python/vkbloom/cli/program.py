@@ -5,16 +5,21 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any, Final, NoReturn
 
 import click
 from click.core import ParameterSource
+from click.shell_completion import CompletionItem
 
 import vkbloom
+from vkbloom.cli import terminal
 from vkbloom.free_memory import ADVICE, memory_left
 from vkbloom.registry import METHODS
+from vkbloom.suggestions import did_you_mean
 
 #: Names of the modules of this package that have a click command called `command`.
 COMMANDS: Final = (
@@ -24,8 +29,12 @@ COMMANDS: Final = (
     "explore",
     "grid",
     "fit",
+    "translate",
     "check",
     "compare",
+    "presets",
+    "glares",
+    "psfs",
     "adapters",
     "doctor",
     "warm",
@@ -37,8 +46,10 @@ INTERRUPTED: Final = 130
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
 
-# How Python and OpenImageIO report that there is no memory for a thread's stack.
+# How Python and OpenImageIO report that there is no memory for a thread's stack, and the dynamic
+# linker that there is none for a library.
 _NO_THREAD: Final = ("start new thread", "Resource temporarily unavailable")
+_NO_LIBRARY: Final = ("failed to map segment", "cannot allocate memory")
 
 
 class Program(click.Group):
@@ -56,16 +67,47 @@ class Program(click.Group):
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"vkbloom.cli.{cmd_name}").command
+        if terminal.PRINTING_OPTIONS[0] not in command.params:
+            command.params += terminal.PRINTING_OPTIONS
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that a call names, or say which one was meant."""
+        if args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            ctx.fail(f"No such command {args[0]!r}{did_you_mean(args[0], COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what the commands do, without an import of them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, _summary(name)) for name in COMMANDS])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin with some letters, without an import of them."""
+        found = [
+            CompletionItem(name, help=_summary(name))
+            for name in COMMANDS
+            if name.startswith(incomplete)
+        ]
+        # Not the group's own: it would list the commands again.
+        return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
     ) -> NoReturn:
         """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
         options["standalone_mode"] = False
+        terminal.print_as_usual()
+        begun = time.perf_counter()
         try:
             words = with_methods(sys.argv[1:] if args is None else args)
             status = super().main(words, prog_name, **options)
+        except click.NoSuchOption as error:
+            near = did_you_mean(error.option_name, error.possibilities or ())
+            where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+            _exit(2, f"No such option {error.option_name!r}{near}{where}")
         except click.UsageError as error:
             where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
             _exit(2, error.format_message() + where)
@@ -76,20 +118,32 @@ class Program(click.Group):
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
-            if isinstance(error, RuntimeError) and any(one in str(error) for one in _NO_THREAD):
+            no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
+            if any(one in str(error) for one in no_memory):
                 _exit(1, _described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))
             raise
+        terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
         sys.exit(status)
 
 
+def _summary(name: str) -> str:
+    """Return what a command does: the first line of its module."""
+    spec = find_spec(f"vkbloom.cli.{name}")
+    # A loader of source files has the text; others leave the summary out.
+    read = getattr(spec and spec.loader, "get_source", None)
+    first = ((read and read(f"vkbloom.cli.{name}")) or "").partition("\n")[0]
+    text = first.partition("``: ")[2].rstrip('".')
+    return text[:1].upper() + text[1:]
+
+
 def with_methods(words: Sequence[str]) -> list[str]:
-    """Load the files of own methods after --method; return the words with the methods' names."""
+    """Load the files of own methods after --method or --to; put the names there."""
     changed = list(words)
     for place, word in enumerate(changed):
         option, _, value = word.partition("=")
-        if option != "--method":
+        if option not in ("--method", "--to"):
             continue
         joined = bool(value)
         if not joined and place + 1 < len(changed):
@@ -98,7 +152,7 @@ def with_methods(words: Sequence[str]) -> list[str]:
             continue
         name = vkbloom.load_method(value).method
         if joined:
-            changed[place] = f"--method={name}"
+            changed[place] = f"{option}={name}"
         else:
             changed[place + 1] = name
     return changed
@@ -147,7 +201,10 @@ def given(name: str, context: click.Context | None = None) -> bool:
     # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
+    params=[*terminal.PRINTING_OPTIONS],
 )
-@click.version_option(package_name="vkbloom", message="%(prog)s %(version)s")
+@click.version_option(
+    None, "-V", "--version", package_name="vkbloom", message="%(prog)s %(version)s"
+)
 def program() -> None:
     """Render bloom and inspect each of its framebuffers."""

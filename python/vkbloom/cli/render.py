@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -17,11 +16,10 @@ import vkbloom
 from vkbloom import no_bloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command
-from vkbloom.cli.image_files import note
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.cli.terminal import show
+from vkbloom.cli.terminal import detail, hides_progress, is_quiet, note, say, show, tell_device
 from vkbloom.io.animations import animation
 from vkbloom.settings import SHADINGS, Shading
 
@@ -96,10 +94,10 @@ def command(
     written: list[Path] = []
     seconds: dict[str, list[float]] = {}
     with vkbloom.Renderer(adapter, validation=validation) as renderer, ExitStack() as stack:
-        click.echo(f"Rendering on {renderer.info.summary}")
+        tell_device(renderer)
+        detail(f"{size[0]} x {size[1]}, {shading}, {settings!r}")
         add = stack.enter_context(animation(Path(out), rate)) if is_gif else None
-        # None: tqdm shows the bar if standard error is a terminal.
-        disable = True if count is None or sys.stderr is None else None
+        disable = True if count is None else hides_progress()
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
             with as_wrong_use():
@@ -126,9 +124,10 @@ def command(
                 seconds.setdefault(name, []).append(duration)
     if add is not None:
         written.append(Path(out))
-    show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
+    if not is_quiet():
+        show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
     for line in _listed(written, is_animation=count is not None):
-        click.echo(line)
+        say(line)
 
 
 def _numbered(out: str, index: int, count: int) -> Path:

@@ -21,6 +21,8 @@ PRESET_OF_IMAGES: Final = "bevy_natural"
 #: The preset for image files of integers, where a command can expand their highlights.
 PRESET_OF_PHOTOS: Final = "photo"
 _PRESET_OF_SCENES: Final = "tutorial"
+#: The presets that a call without --preset and --method may start from.
+DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
 # Names of the commands' arguments for image files; explore and grid may be called without one.
 _IMAGES: Final = ("source", "sources", "images")
 
@@ -30,15 +32,16 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option(
         "--preset",
-        type=click.Choice(list(vkbloom.presets)),
-        help="Published settings to start from "
-        f"[default {PRESET_OF_IMAGES} for images, {_PRESET_OF_SCENES} for scenes; apply: "
-        f"{PRESET_OF_PHOTOS} for files of integers]",
+        type=fields.NameOf("preset", vkbloom.presets),
+        help="Published settings to start from; vkbloom presets lists them "
+        f"[default {PRESET_OF_IMAGES} for images, {PRESET_OF_PHOTOS} for files of integers, "
+        f"{_PRESET_OF_SCENES} for scenes]",
     )
     @click.option(
         "--method",
-        type=fields.NameOf(METHODS),
-        help="The method of the blur, with its defaults [default the preset's]",
+        type=fields.NameOf("method", METHODS),
+        help="The method of the blur, with its defaults, or a file of an own method "
+        "[default the preset's]",
     )
     @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
@@ -53,8 +56,9 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         **rest: object,
     ) -> object:
         if preset is None and method is None:
-            preset = default_preset(any(rest.get(name) for name in _IMAGES))
-            if "expand" in rest and not rest.get("raw") and has_integers(_first_of(rest)):
+            image = _first_of(rest)
+            preset = PRESET_OF_IMAGES if image else _PRESET_OF_SCENES
+            if "expand" in rest and not rest.get("raw") and has_integers(image):
                 preset = PRESET_OF_PHOTOS
         if preset == PRESET_OF_PHOTOS and "expand" in rest and rest["expand"] is None:
             rest["expand"] = PHOTO_EXPANSION
@@ -99,11 +103,6 @@ def _first_of(rest: dict[str, Any]) -> str:
     """Return the first of a command's image files; "" if it has none."""
     names = next((value for name in _IMAGES if (value := rest.get(name))), "")
     return names if isinstance(names, str) else str(names[0])
-
-
-def default_preset(is_image: bool) -> str:
-    """Return the preset that is used if there is no --preset and no --method."""
-    return PRESET_OF_IMAGES if is_image else _PRESET_OF_SCENES
 
 
 def _begun(preset: str | None, method: str | None) -> vkbloom.Settings:

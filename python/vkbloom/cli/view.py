@@ -1,4 +1,4 @@
-"""``vkbloom view``: a window that shows the bloom of a scene or an image, controlled by keys."""
+"""``vkbloom view``: show the bloom of a scene or an image in a window."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from vkbloom.checks import import_extra
 from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.live import HELP, Live
 from vkbloom.cli.live_options import live_options
+from vkbloom.cli.terminal import detail_device, say
 from vkbloom.settings import SHADINGS, Shading
 
 _LARGEST: Final = (1600, 900)  # size of a window for an image
@@ -51,6 +52,7 @@ def command(
         vkbloom.Renderer(adapter, validation=validation) as renderer,
         vkbloom.Surface(renderer, window, mailbox=mailbox) as surface,
     ):
+        detail_device(renderer)
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
         live = Live(settings, source, shading)
         _listen(glfw, window, renderer, live)
@@ -76,7 +78,7 @@ def command(
                 else:
                     frames = renderer.apply(live.source, live.settings)
                 for path in frames.save(Path(out, time.strftime("%Y%m%d-%H%M%S"))):
-                    click.echo(f"Wrote {path}")
+                    say(f"wrote {path}")
 
 
 @contextlib.contextmanager

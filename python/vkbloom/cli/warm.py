@@ -8,11 +8,12 @@ from typing import Any, Final
 
 import click
 import numpy as np
-from rich.progress import track
+from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import adapter_option
-from vkbloom.cli.fields import SIZE
+from vkbloom.cli.fields import SIZE, NameOf
+from vkbloom.cli.terminal import detail_device, hides_progress, say
 
 _TYPES: Final = ("uint8", "float16", "float32")
 _USUAL_SIZE: Final = (1920, 1080)
@@ -24,7 +25,7 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
 @click.option(
     "--preset",
     "presets",
-    type=click.Choice(list(vkbloom.presets)),
+    type=NameOf("preset", vkbloom.presets),
     multiple=True,
     help="Only this preset; repeat it for more [default: all, and the built-in scene]",
 )
@@ -61,14 +62,17 @@ def command(
     named = presets or tuple(vkbloom.presets)
     calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), named, _KEPT))
     with vkbloom.Renderer(adapter) as renderer:
+        detail_device(renderer)
         if not presets:
             scene = vkbloom.Scene.ufo()
             for shading in ("forward", "deferred"):
                 for attachments in _KEPT:
                     renderer.render(scene, shading=shading, attachments=attachments)
-        for size, dtype, channels, preset, attachments in track(calls, "Compiling", transient=True):
+        for size, dtype, channels, preset, attachments in tqdm(
+            calls, unit="call", leave=False, disable=hides_progress()
+        ):
             image = np.zeros((size[1], size[0], channels), dtype)
             renderer.apply(image, vkbloom.presets[preset], attachments=attachments)
         name = renderer.info.summary
     seconds, processor = time.perf_counter() - begun, time.process_time() - used
-    click.echo(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")
+    say(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")

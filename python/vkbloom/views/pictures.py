@@ -8,7 +8,7 @@ import math
 import struct
 import warnings
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ __all__ = [
     "png",
     "resized",
     "scaled",
+    "sheet_png",
 ]
 
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
@@ -121,34 +122,50 @@ def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) 
     width = check_index("width", width, 128, 4096)
     if not frames:
         raise ValueError("frames: a contact sheet needs at least one framebuffer")
-    columns = min(columns, len(frames))
     height = round(width / _aspect(frames))
+    tiles = []
+    for name, array in frames.items():
+        fit = min(width / array.shape[1], height / array.shape[0])
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
+        tiles.append((picture, name, _described(array)))
+    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
+    title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
+    return sheet_png(tiles, title, columns, (width, height))
+
+
+def sheet_png(
+    tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
+    title: str,
+    columns: int,
+    cell: tuple[int, int],
+) -> bytes:
+    """Return pictures with two lines of text below each as PNG.
+
+    - `tiles`: Pictures that are not larger than a cell, with their lines.
+    - `cell`: Width and height in pixels.
+    """
+    width, height = cell
+    columns = min(columns, len(tiles))
     text = max(11, width // 20)
     gap, caption = text, 3 * text
-    rows = -(-len(frames) // columns)
+    heading = 2 * text * bool(title)
+    rows = -(-len(tiles) // columns)
     sheet = np.full(
-        (
-            gap + 2 * text + rows * (height + caption + gap),
-            gap + columns * (width + gap),
-            3,
-        ),
+        (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
         24,
         np.uint8,
     )
-    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
-    labels = [(gap, gap + text, f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter)))]
-    for index, (name, array) in enumerate(frames.items()):
+    labels = [(gap, gap + text, title)] if title else []
+    for index, (picture, *lines) in enumerate(tiles):
         row, column = divmod(index, columns)
         left = gap + column * (width + gap)
-        top = gap + 2 * text + row * (height + caption + gap)
-        fit = min(width / array.shape[1], height / array.shape[0])
-        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))[:, :, :3]
+        top = gap + heading + row * (height + caption + gap)
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
         sheet[top : top + height, left : left + width] = 40
-        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
+        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[:, :, :3]
         baseline = top + height + text + text // 4
-        labels += [(left, baseline, name), (left, baseline + text + 2, _described(array))]
+        labels += [(left, baseline + i * (text + 2), line) for i, line in enumerate(lines)]
     return png(labelled(sheet, labels, text))
 
 

@@ -1,0 +1,172 @@
+"""Commands that list what has a published name, and draw a sheet of a picture with each of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
+from tqdm import tqdm
+
+import vkbloom
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.image_files import has_integers, layer_option, read_picture
+from vkbloom.cli.sequences import check_drawing
+from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
+from vkbloom.cli.terminal import hides_progress, say, show, tell_device
+from vkbloom.interruptible import opened_renderer
+from vkbloom.io import safe_writing
+from vkbloom.io.expansion import PHOTO_EXPANSION
+from vkbloom.settings import Settings
+from vkbloom.views import pictures
+
+__all__ = ["Entry", "base_settings", "listing_command"]
+
+# Longer side of the picture in pixels: larger ones are reduced before the bloom.
+_LARGEST_SIDE: Final = 1280
+_COLUMNS: Final = 4
+_WIDTH: Final = 480
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """What has a published name.
+
+    - `what`: What it looks like.
+    - `whose`: Its source.
+    - `composite`: How its light comes into the picture: "add", "mix", ...
+    - `needs_hdr`: Whether only values above 1 glow.
+    - `values`: Further keys of the JSON.
+    """
+
+    name: str
+    what: str
+    whose: str
+    composite: str
+    needs_hdr: bool
+    values: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+
+#: Settings that show an entry on a picture, in the place of those that the picture starts from;
+#: None for an entry that a picture cannot show.
+Shown = Callable[[Entry, Settings], Settings | None]
+
+
+def listing_command(text: str, entries: Callable[[], Iterable[Entry]], shown: Shown) -> Any:
+    """Return the command that lists entries, with the help `text`."""
+
+    @click.command(help=text)
+    @click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
+    @click.option(
+        "--sheet",
+        "image",
+        metavar="IMAGE",
+        type=click.Path(),
+        help="Render this picture with each of them, and write all to the file of --out. A "
+        f"picture of more than {_LARGEST_SIDE} pixels is reduced before.",
+    )
+    @click.option("-o", "--out", metavar="FILE", type=click.Path(), help="The sheet: a PNG.")
+    @layer_option
+    @device_options
+    def command(
+        *,
+        as_json: bool,
+        image: str | None,
+        out: str | None,
+        layer: str | None,
+        adapter: str,
+        validation: bool,
+    ) -> None:
+        if (image is None) != (out is None):
+            raise click.UsageError("--sheet IMAGE and --out FILE need each other")
+        listed = list(entries())
+        if image is not None and out is not None:
+            check_drawing("--out", out, (".png",))
+            sheet = _sheet(image, layer, listed, shown, (adapter, validation))
+            safe_writing.write_file(Path(out), sheet)
+            say(f"wrote {out}")
+        elif as_json:
+            objects = [
+                {key: value for key, value in dataclasses.asdict(one).items() if key != "values"}
+                | one.values
+                for one in listed
+            ]
+            click.echo(json.dumps(objects, indent=2))
+        else:
+            show(_table(listed))
+
+    return command
+
+
+def _table(entries: Iterable[Entry]) -> Table:
+    """Return a table of one line for each entry, which a narrow terminal cuts."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for title in ("name", "composite", "needs HDR", "what", "whose"):
+        table.add_column(title, no_wrap=True, overflow="ellipsis")
+    for one in entries:
+        needed = "yes" if one.needs_hdr else "no"
+        table.add_row(one.name, one.composite, needed, one.what, one.whose)
+    return table
+
+
+def base_settings(is_photo: bool) -> Settings:
+    """Return the settings that a picture starts from."""
+    return vkbloom.presets[PRESET_OF_PHOTOS if is_photo else PRESET_OF_IMAGES]
+
+
+def _sheet(
+    file: str,
+    layer: str | None,
+    entries: list[Entry],
+    shown: Shown,
+    device: tuple[str, bool],
+) -> bytes:
+    """Return a PNG of a picture, then the picture with each entry."""
+    is_photo = has_integers(file)
+    base = base_settings(is_photo)
+    plain = _reduced(read_picture(file, 0, None, layer=layer).pixels)
+    # As by vkbloom apply with the preset photo, and for what would show nothing otherwise.
+    expanded = plain
+    if is_photo:
+        with_lights = read_picture(file, 0, None, layer=layer, expand=PHOTO_EXPANSION)
+        expanded = _reduced(with_lights.pixels)
+    height, width = plain.shape[:2]
+    cell = pictures.scaled(width, height, _WIDTH / max(height, width))
+    tiles = [(_tile(plain, cell), "without bloom", Path(file).name)]
+    with opened_renderer(*device) as renderer:
+        tell_device(renderer)
+        for one in tqdm(entries, unit="picture", leave=False, disable=hides_progress()):
+            settings = shown(one, base)
+            if settings is None:
+                continue
+            for_photos = settings.replace(glare=()) == base_settings(is_photo=True)
+            image = expanded if one.needs_hdr or for_photos else plain
+            final = renderer.apply(image, settings, attachments=["final"])["final"]
+            words = f"{one.composite}{', needs HDR' * one.needs_hdr}"
+            if is_photo and one.needs_hdr:
+                words += f": --expand {PHOTO_EXPANSION:g}"
+            tiles.append((_tile(final, cell), one.name, words))
+    return pictures.sheet_png(tiles, "", _COLUMNS, cell)
+
+
+def _reduced(image: NDArray[Any]) -> NDArray[Any]:
+    """Return the colours of an image, its longer side at most that of the sheet's renders."""
+    colours = image[:, :, :3]
+    height, width = colours.shape[:2]
+    factor = _LARGEST_SIDE / max(height, width)
+    if factor >= 1:
+        return np.ascontiguousarray(colours)
+    size = pictures.scaled(width, height, factor)
+    return pictures.resized(colours.astype(np.float32), *size).astype(image.dtype)
+
+
+def _tile(final: NDArray[Any], cell: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return a picture in the size of a cell."""
+    return pictures.picture(final, "final", size=cell)

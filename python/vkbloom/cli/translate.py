@@ -1,0 +1,62 @@
+"""``vkbloom translate``: find another method's parameters whose bloom comes closest to settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import click
+
+import vkbloom
+from vkbloom.cli.device_options import device_options
+from vkbloom.cli.fields import SIZE, Command, NameOf
+from vkbloom.cli.program import as_wrong_use, given
+from vkbloom.cli.search_options import search_options
+from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.terminal import detail_device
+from vkbloom.interruptible import opened_renderer
+from vkbloom.registry import METHODS
+
+
+@click.command(cls=Command)
+@click.option(
+    "--to",
+    "target",
+    required=True,
+    type=NameOf("preset or method", vkbloom.presets, METHODS),
+    help="A preset or a method: where the search starts, and the settings that do not vary.",
+)
+@click.option(
+    "--size",
+    type=SIZE,
+    default="1920x1080",
+    show_default=True,
+    help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
+    "of the frame at every size but this.",
+)
+@search_options(vary=None, loss="log", max_calls=300)
+@device_options
+@settings_options
+def command(
+    *,
+    target: str,
+    size: tuple[int, int],
+    search: dict[str, Any],
+    told: Callable[[Sequence[vkbloom.FitResult]], int],
+    adapter: str,
+    validation: bool,
+    settings: vkbloom.Settings,
+) -> int:
+    """Find another method's parameters whose bloom comes closest.
+
+    --preset or --method, with further options, are the settings to translate; --to names the other
+    method. Both get a black picture with four small lights. The result is printed as Python code,
+    with its loss and a verdict.
+    """
+    if not (given("preset") or given("method")):
+        raise click.UsageError("give what to translate: --preset NAME or --method NAME")
+    start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
+    with opened_renderer(adapter, validation) as renderer, as_wrong_use():
+        detail_device(renderer)
+        found = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
+    return told([found])

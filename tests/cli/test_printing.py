@@ -1,0 +1,127 @@
+"""What commands print with --quiet and --verbose, and completion in real shells."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import vkbloom
+from vkbloom.cli.program import program
+
+pytest.importorskip("OpenImageIO")
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(program, [str(word) for word in words])
+
+
+@pytest.fixture
+def dark(tmp_path: Path) -> Path:
+    """A picture about which there is a note: nothing in it glows."""
+    return vkbloom.write(tmp_path / "dark.exr", np.full((12, 16, 3), 0.1, np.float32))
+
+
+@pytest.mark.parametrize("place", [0, 1], ids=["program", "command"])
+@pytest.mark.parametrize("option", ["-q", "--quiet"])
+def test_quiet(tmp_path: Path, dark: Path, place: int, option: str) -> None:
+    words: list[object] = ["apply", dark, tmp_path / "o.png", "--preset", "kino"]
+    usual = run(*words)
+    assert "the bloom is zero everywhere" in usual.stderr
+    assert usual.stdout.splitlines()[-1] == f"wrote {tmp_path / 'o.png'}"
+    (tmp_path / "o.png").unlink()
+    result = run(*words[:place], option, *words[place:])
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "o.png").exists()
+    # It ends with the call.
+    assert run(*words).output == usual.output
+    # Errors and results stay.
+    assert run("apply", "none.png", tmp_path / "o.png", option).stderr.endswith("directory\n")
+    assert vkbloom.adapters()[0].name in run("adapters", option).stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("render", "-o", "{tmp}/o.png", "--size", "16x12"),
+        ("grid", "{dark}", "-o", "{tmp}/grid", "--axis", "exposure=0,1", "--preset", "kino"),
+        ("compare", "{dark}", "{dark}", "--diff", "{tmp}/d.png"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_other_commands_are_quiet(tmp_path: Path, dark: Path, words: tuple[str, ...]) -> None:
+    result = run(*(word.format(tmp=tmp_path, dark=dark) for word in words), "--quiet")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "wrote" not in result.stdout
+    assert len(list(tmp_path.iterdir())) > 1
+
+
+@pytest.mark.parametrize("option", ["-v", "--verbose"])
+def test_verbose_tells_adapter_sizes_and_times(tmp_path: Path, dark: Path, option: str) -> None:
+    result = run("apply", dark, tmp_path / "o.png", option)
+    assert result.exit_code == 0
+    with vkbloom.Renderer() as renderer:
+        info = renderer.info
+    assert f"vkbloom: adapter: {info.name} ({info.type}), " in result.stderr
+    assert f"vkbloom: {dark}: 16 x 12, float\n" in result.stderr
+    assert re.search(rf"^vkbloom: {dark}: \d+\.\d\d ms on the device$", result.stderr, re.M)
+    assert re.search(r"^vkbloom: \d+\.\d\d s in all\n\Z", result.stderr, re.M)
+
+
+# Completion
+
+# The scripts that the documented lines load, called as the shell calls them at the Tab key.
+_BASH = """
+eval "$(_VKBLOOM_COMPLETE=bash_source vkbloom)"
+COMP_WORDS=({words}) COMP_CWORD={last}
+_vkbloom_completion vkbloom
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+# zsh's own functions print here what they would offer.
+_ZSH = """
+compdef() {{ :; }}
+eval "$(_VKBLOOM_COMPLETE=zsh_source vkbloom)"
+compadd() {{ print -l -- "${{(@P)@[-1]}}" }}
+_describe() {{ print -l -- "${{(@P)3%%:*}}" }}
+words=({words}) CURRENT={last}
+_vkbloom_completion
+"""
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_completion(tmp_path: Path, shell: str) -> None:
+    found = shutil.which(shell)
+    if found is None:
+        pytest.skip(f"{shell} is not installed")
+    program_file = tmp_path / "vkbloom"
+    program_file.write_text(f"#!{sys.executable}\nfrom vkbloom.cli import main\n\nmain()\n")
+    program_file.chmod(program_file.stat().st_mode | stat.S_IXUSR)
+    environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    for words, expected in (
+        (["vkbloom", "gl"], {"glares"}),
+        (["vkbloom", "apply", "--thresh"], {"--threshold", "--threshold-scale"}),
+        (["vkbloom", "apply", "--preset", "unity"], {"unity_urp", "unity_hdrp"}),
+    ):
+        quoted = " ".join(f"'{word}'" for word in words)
+        # bash counts words from 0, zsh from 1.
+        script = (
+            _BASH.format(words=quoted, last=len(words) - 1)
+            if shell == "bash"
+            else _ZSH.format(words=quoted, last=len(words))
+        )
+        done = subprocess.run(
+            [found, "-f" if shell == "zsh" else "--norc", "-c", script],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert set(done.stdout.split()) == expected, done.stderr
