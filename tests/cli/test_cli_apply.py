@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.processes import python
+from vkbloom import renderer
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -22,6 +23,8 @@ from vkbloom.methods.mip_chain import Pyramid
 from vkbloom.methods.separable import Separable
 
 oiio = pytest.importorskip("OpenImageIO")
+
+pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 NATURAL = vkbloom.presets["bevy_natural"]
 
@@ -456,7 +459,7 @@ class TestErrors:
 
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
         before = path.read_bytes()
-        monkeypatch.setattr(vkbloom.Renderer, "apply_each", fail)
+        monkeypatch.setattr(renderer.Renderer, "apply_each", fail)
         result = run(path, path, "--overwrite")
         assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
         assert path.read_bytes() == before
