@@ -8,6 +8,7 @@ methods and variants some in a run that is not exhaustive.
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import shutil
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.core.descriptors import open_descriptors
+from tests.device.device_work import Consumer, OnDevice
 from tests.exhaustive import some
 from tests.images import picture
 from tests.screens import CAMERA, panel
@@ -32,9 +34,9 @@ from vkbloom.scene.textures import Texture
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4
 #: The calls that report a lost device.
-#: The number of presets with a set of variants that the usual run walks.
-METHODS = 12
 CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
+#: The number of methods, each with a set of variants, that the usual run walks.
+METHODS = 12
 SIZE = (24, 16)
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -180,6 +182,31 @@ def grid_to_zarr(_: Renderer) -> Arrays:
     return arrays
 
 
+@functools.cache
+def own_settings() -> tuple[vkbloom.Settings, ...]:
+    """Return the settings of two own methods, of draws and of dispatches; compiled once."""
+    folder = Path("examples/own_methods")
+    return tuple(vkbloom.load_method(folder / f"{name}.hook")() for name in ("karis", "compute"))
+
+
+def own_passes(renderer: Renderer) -> Arrays:
+    frames = renderer.apply_many(picture(*SIZE), own_settings())
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def on_device(renderer: Any) -> Arrays:
+    """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before."""
+    images = np.stack([picture(*SIZE, dtype="float16", seed=seed) for seed in range(3)])
+    settings = vkbloom.Separable(threshold=0.3)
+    one = renderer.apply(OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]))
+    arrays = {name: array.numpy() for name, array in one.items()}
+    copied = np.from_dlpack(Consumer(one["bloom"]))
+    del one
+    for index, frames in enumerate(renderer.apply_each(OnDevice(images), settings)):
+        arrays[f"{index} final"] = frames["final"].numpy()
+    return {**arrays, "copied": copied}
+
+
 UFO = Scene.ufo()
 # One convolution stands for all: they have the same passes.
 PRESETS = {
@@ -199,6 +226,8 @@ WORK: dict[str, Work] = {
     "readback": readback,
     "handles": handles,
     "present": presented,
+    "own passes": own_passes,
+    **({"arrays on the device": on_device} if "STAND_IN_UUID" in os.environ else {}),
     **{
         f"apply {preset} {variant}": method(settings)
         for preset, settings in PRESETS.items()
@@ -225,12 +254,17 @@ def check_error(error: BaseException, failed: str, result: int) -> None:
     if failed == "vkb_alloc":
         assert isinstance(error, MemoryError), error
         return
-    assert isinstance(error, vkbloom.Error), error
+    assert isinstance(error, vkbloom.Error | TypeError), error
     if failed == "vkEnumerateInstanceLayerProperties":
         assert "validation was asked for" in str(error), error
         return
     if failed == "volkInitialize":
         assert isinstance(error, vkbloom.AdapterNotFoundError), error
+        return
+    if failed.startswith("cu"):
+        # What CUDA says when arrays are taken is the reason why they are not.
+        assert isinstance(error, vkbloom.OutOfMemoryError | TypeError), error
+        assert f"CUDA: {failed} failed with CUDA_ERROR_OUT_OF_MEMORY" in str(error)
         return
     expected = vkbloom.OutOfMemoryError if result != DEVICE_LOST else vkbloom.DeviceLostError
     assert type(error) is expected, error
@@ -389,6 +423,7 @@ def workloads() -> list[str]:
 
 def main(stride: int, names: list[str]) -> None:
     # Objects that a process creates once must exist before the count.
+    own_settings()
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:

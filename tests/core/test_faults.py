@@ -18,8 +18,10 @@ import pytest
 import vkbloom
 from tests.core.builds import ROOT, core_with_faults
 from tests.core.fault_walk import METHODS
+from tests.device import stand_in
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.processes import output
+from vkbloom import AdapterInfo
 
 pytestmark = pytest.mark.skipif(
     "VKBLOOM_SANITIZED" in os.environ, reason="the walk has a core of its own, without sanitizers"
@@ -27,11 +29,17 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment variables of a process with the core that fails on demand."""
+def faulty(tmp_path_factory: pytest.TempPathFactory, software: AdapterInfo) -> dict[str, str]:
+    """The environment variables of a process with the core that fails on demand, and a stand-in for
+    CUDA."""
     package = core_with_faults(tmp_path_factory.getbasetemp()) / "python"
+    cuda = stand_in.build(tmp_path_factory.mktemp("cuda"))
     # Without the cache on disk, which has its own test.
-    return {"PYTHONPATH": str(package), "VKBLOOM_CACHE_DIR": ""}
+    return {
+        "PYTHONPATH": str(package),
+        "VKBLOOM_CACHE_DIR": "",
+        **stand_in.variables(cuda, software),
+    }
 
 
 def run(faulty: dict[str, str], walk: str, *arguments: str) -> str:
@@ -60,6 +68,7 @@ def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) ->
 OTHERS = (
     *("create", "close", "render forward", "render deferred", "mask and emission", "glare"),
     *("batch", "grid", "grid in memory", "grid to Zarr", "readback", "handles"),
+    *("own passes", "arrays on the device"),
 )
 
 

@@ -6,7 +6,8 @@ import itertools
 from collections.abc import Iterable
 from typing import Any
 
-from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights
+from tests.exhaustive import EXHAUSTIVE
+from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights, presets
 
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
 
@@ -47,13 +48,29 @@ METHODS: dict[str, Settings] = {
 DTYPES = ("uint8", "float16", "float32")
 
 
+def presets_of_low_levels(height: int) -> dict[str, Settings]:
+    """Return the presets; levels whose height does not follow from the image's have this one.
+
+    Of small images, levels of the engines' heights take seconds and show nothing more.
+    """
+    fields = {"bevy_natural": "max_mip_dimension", "photo": "max_mip_dimension"}
+    fields |= {"filament": "resolution"}
+    return {
+        name: each.replace(**{fields[name]: height}) if name in fields else each
+        for name, each in presets.items()
+    }
+
+
 def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
     """Return the product of the columns; each row ends with one of `turns`.
 
     Every two values of two columns, or of a column and of `turns`, meet in some row. The product
-    with all turns finds little more, and takes as many times as long as there are turns.
+    with all turns finds little more, and takes as many times as long as there are turns: an
+    exhaustive run has it.
     """
     last = list(turns)
+    if EXHAUSTIVE:
+        return list(itertools.product(*columns, last))
     rows = itertools.product(*(enumerate(column) for column in columns))
     return [
         (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])

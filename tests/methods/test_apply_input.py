@@ -3,6 +3,7 @@ errors."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -12,8 +13,10 @@ from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.exhaustive import some
 from tests.framebuffers import assert_same
 from tests.images import picture
+from tests.methods.cases import DTYPES, by_turns
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import (
     DualKawase,
@@ -35,7 +38,7 @@ METHODS: dict[str, Settings] = {
     "firefly": Pyramid(firefly_filter=True),
     "dual-kawase": DualKawase(),
 }
-DTYPES = ("uint8", "float16", "float32")
+COMPOSITES = ("add", "mix", "screen")
 OFF = Separable(bloom=False)
 
 
@@ -183,15 +186,18 @@ def test_nan_and_infinity_are_not_spread(
     assert (clean.info["nan"], clean.info["inf"]) == (0, 0)
 
 
-@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb"])
 @pytest.mark.parametrize(
-    "tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+    ("tonemap", "encoding", "other"),
+    by_turns(
+        ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"],
+        ["none", "gamma22", "srgb"],
+        turns=itertools.product(["float16", "float32"], COMPOSITES),
+    ),
 )
-@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
-@pytest.mark.parametrize("dtype", ["float16", "float32"])
 def test_nan_and_infinity_stay_in_final(
-    renderer: Renderer, dtype: str, composite: Any, tonemap: Any, encoding: Any
+    renderer: Renderer, tonemap: Any, encoding: Any, other: tuple[str, Any]
 ) -> None:
+    dtype, composite = other
     image = with_specials(dtype, 3)
     settings = Separable(
         composite=composite, tonemap=tonemap, encoding=encoding, exposure=1.0, intensity=0.5
@@ -273,13 +279,14 @@ def test_no_bloom_is_the_identity_of_floats(renderer: Renderer) -> None:
     assert np.isnan(final[~number]).all()
 
 
-@pytest.mark.parametrize("tonemap", ["none", "agx"])
-@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "dtype", "other"),
+    by_turns(METHODS, DTYPES, turns=itertools.product(["none", "agx"], COMPOSITES)),
+)
 def test_alpha_is_untouched(
-    renderer: Renderer, method: str, dtype: str, composite: Any, tonemap: Any
+    renderer: Renderer, method: str, dtype: str, other: tuple[Any, Any]
 ) -> None:
+    tonemap, composite = other
     image = picture(15, 14, 4, dtype, seed=7)
     if dtype != "uint8":
         # Beyond 0..1, too.
@@ -591,7 +598,7 @@ def test_largest_side(renderer: Renderer, method: str) -> None:
         assert_matches_reference(frames, view, METHODS[method])
 
 
-@pytest.mark.parametrize("side", [1919, 4095, None])
+@pytest.mark.parametrize("side", some([1919, None, 4095], 2))
 @pytest.mark.parametrize("method", METHODS)
 def test_long_odd_side(renderer: Renderer, method: str, side: int | None) -> None:
     """The sizes of two levels have no whole ratio: positions need more bits than a float has."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.exhaustive import some
 from vkbloom import Convolution, Renderer, Settings, psf, reference
 from vkbloom.reference.convolution import convolve, prefiltered
 
@@ -71,14 +72,13 @@ def test_the_reference_is_a_sum(
     )
 
 
-@pytest.mark.parametrize("boundary", BOUNDARIES)
 @pytest.mark.parametrize(
-    ("size", "kernel", "channels"),
+    ("size", "kernel", "channels", "boundary"),
     [
-        ((33, 21), (7, 4), 3),
-        ((33, 21), (90, 55), 1),
-        ((1, 1), (5, 5), 3),
-        ((16, 9), (16, 9), 3),
+        *(((33, 21), (7, 4), 3, boundary) for boundary in BOUNDARIES),
+        *(((33, 21), (90, 55), 1, boundary) for boundary in some(BOUNDARIES, 2)),
+        *(((1, 1), (5, 5), 3, boundary) for boundary in some(BOUNDARIES, 2)),
+        *(((16, 9), (16, 9), 3, boundary) for boundary in some(BOUNDARIES, 2)),
     ],
     ids=str,
 )

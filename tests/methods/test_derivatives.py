@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import vkbloom
-from tests.methods.cases import METHODS
+from tests.methods.cases import METHODS, presets_of_low_levels
 from tests.methods.reference_cases import random_image
 from vkbloom import reference
 from vkbloom.reference.derivatives import DISCRETE, differentiable
@@ -44,17 +43,12 @@ CURVES = {
     )
     for tonemap, encoding, composite in CHOICES
 }
-# The levels of engines have a height of their own, which is more than this test needs.
-SMALLER: dict[str, dict[str, int]] = {
-    "bevy_natural": {"max_mip_dimension": 32},
-    "filament": {"resolution": 32},
-}
 CURVED: dict[str, Any] = {
-    **{name: each.replace(**SMALLER.get(name, {})) for name, each in vkbloom.presets.items()},
+    **presets_of_low_levels(32),
     **CURVES,
     "knee": vkbloom.Separable(threshold=0.5, knee=0.5),
     "glare": vkbloom.Pyramid(levels=2, threshold=0.5, knee=0.3, glare=GLARE),
-    "engine-glare": vkbloom.presets["unity_urp"].replace(format=None, glare=GLARE),
+    "engine-glare": vkbloom.presets["unity_urp"].replace(format=None, glare=GLARE[2:]),
     "firefly": vkbloom.Pyramid(firefly_filter=True, level_weights=(1, 2, 3, 4, 5, 6)),
     "soft-light": vkbloom.presets["godot_4_5"].replace(format=None, composite="soft_light"),
     "alpha": vkbloom.Pyramid(levels=2, threshold=0.5, knee=0.5, alpha="blur"),
@@ -83,14 +77,10 @@ def test_image_derivative_is_the_exact_transpose_of_a_linear_bloom(
     assert abs(forward - back) <= 1e-12 * np.abs(frames["final"] * y).sum()
 
 
-def slope(function: Any, at: Any, direction: Any) -> float:
-    """Return the derivative along a direction, by the step of which the halves agree best."""
-    found = []
-    for step in (1e-5, 1e-6, 1e-7):
-        ends = [function(np.asarray(at) + sign * step * direction) for sign in (-1, 1)]
-        found.append((ends[1] - ends[0]) / (2 * step))
-    pairs = sorted(itertools.pairwise(found), key=lambda pair: abs(pair[1] - pair[0]))
-    return float(pairs[0][1])
+def slope(function: Any, at: Any, direction: Any, step: float) -> float:
+    """Return the derivative along a direction, by a difference."""
+    ends = [function(np.asarray(at) + sign * step * direction) for sign in (-1, 1)]
+    return float(ends[1] - ends[0]) / (2 * step)
 
 
 def as_field(value: Any) -> Any:
@@ -112,6 +102,9 @@ def test_derivatives_are_those_of_central_differences(name: str) -> None:
         if key in frames
     }
     derivatives = pullback(cotangents)
+    assert not DISCRETE & derivatives.keys()
+    # The differences of sums of this size are rounded.
+    least = 1e-3 * sum(np.abs(one).sum() for one in cotangents.values())
 
     def total(image: Any = image, settings: Any = settings, **arrays: Any) -> float:
         found = reference.apply(image, settings, **(given | arrays))
@@ -119,24 +112,30 @@ def test_derivatives_are_those_of_central_differences(name: str) -> None:
 
     def check(name: str, function: Any, at: Any) -> None:
         direction = random.standard_normal(np.shape(at))
-        expected, actual = slope(function, at, direction), product(derivatives[name], direction)
-        # The differences of sums of this size are rounded.
-        scale = max(abs(expected), 1e-3 * sum(np.abs(one).sum() for one in cotangents.values()))
-        assert abs(actual - expected) <= 1e-6 * scale, (name, actual, expected)
+        actual = product(derivatives[name], direction)
+        # A step may meet a corner of a curve, another may drown in rounding.
+        for step in (1e-6, 1e-5, 1e-7):
+            expected = slope(function, at, direction, step)
+            if abs(actual - expected) <= 1e-6 * max(abs(expected), least):
+                return
+        pytest.fail(f"{name}: {actual}, not {expected}")
 
     check("image", lambda moved: total(image=moved), image)
     for key, array in given.items():
         check(key, lambda moved, key=key: total(**{key: moved}), array)
-    for field, value in differentiable(settings).items():
-        inside = np.asarray(value) * 0.99 + 0.001  # not at the end of a range
-
-        def moved(at: Any, field: str = field) -> float:
-            return total(settings=settings.replace(**{field: as_field(at)}))
-
-        derivatives = reference.vjp(image, settings.replace(**{field: as_field(inside)}), **given)[
-            1
-        ](cotangents)
-        check(field, moved, inside)
+    # Not at the ends of the ranges.
+    inside = {
+        field: as_field(np.asarray(value) * 0.99 + 0.001)
+        for field, value in differentiable(settings).items()
+    }
+    settings = settings.replace(**inside)
+    derivatives = reference.vjp(image, settings, **given)[1](cotangents)
+    for field, value in inside.items():
+        check(
+            field,
+            lambda at, field=field: total(settings=settings.replace(**{field: as_field(at)})),
+            value,
+        )
 
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)
@@ -189,15 +188,6 @@ def test_nan_and_infinity_of_the_image_have_the_derivative_0() -> None:
     assert np.isfinite(derivative).all()
     assert (derivative[2, 2] == [0, 0, derivative[2, 2, 2]]).all()
     assert derivative[2, 2, 2] > 0
-
-
-def test_every_real_field_has_a_derivative_by_its_name() -> None:
-    for settings in vkbloom.presets.values():
-        image = random_image(6, 5, seed=1)
-        frames, pullback = reference.vjp(image, settings)
-        found = pullback({"final": frames["final"]})
-        assert found.keys() >= {"image", *differentiable(settings)}
-        assert not DISCRETE & found.keys()
 
 
 @pytest.mark.parametrize(

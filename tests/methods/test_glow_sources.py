@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from tests.images import hdr_picture, picture
+from tests.methods.cases import by_turns
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     BevyBloom,
@@ -102,7 +104,7 @@ def given_of(case: Case) -> dict[str, Any]:
     return {name: made[name] for name in case.given}
 
 
-@pytest.fixture(scope="module", params=("fragment", "cpu", "gpu"))
+@pytest.fixture(scope="module")
 def varied(request: pytest.FixtureRequest) -> Iterator[Renderer]:
     """A renderer that uses one column of the table of variants."""
     with pytest.MonkeyPatch.context() as patch:
@@ -112,7 +114,20 @@ def varied(request: pytest.FixtureRequest) -> Iterator[Renderer]:
         yield opened
 
 
-@pytest.mark.parametrize("name", CASES)
+VARIANTS = ("fragment", "cpu", "gpu")
+# Cases of which a pass replaces several run in all variants.
+FUSED = ("separable", "separable-fused", "pyramid", "pyramid-max")
+
+
+@pytest.mark.parametrize(
+    ("name", "varied"),
+    [
+        *itertools.product(FUSED, VARIANTS),
+        *by_turns([name for name in CASES if name not in FUSED], turns=VARIANTS),
+    ],
+    indirect=["varied"],
+    scope="module",
+)
 def test_against_the_reference(varied: Renderer, name: str) -> None:
     case = CASES[name]
     image, given = image_of(case.size, case.dtype), given_of(case)
@@ -124,7 +139,10 @@ def test_against_the_reference(varied: Renderer, name: str) -> None:
     assert_array_equal(alone["final"], frames["final"])
 
 
-@pytest.mark.parametrize("name", CASES)
+# One of each method.
+@pytest.mark.parametrize(
+    "name", {case.settings.method: name for name, case in CASES.items()}.values()
+)
 def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
     renderer: Renderer, name: str
 ) -> None:

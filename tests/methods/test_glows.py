@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, by_turns
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     BlenderGlare,
@@ -19,7 +18,6 @@ from vkbloom import (
     Renderer,
     Scene,
     Separable,
-    Settings,
     UnrealBloom,
     presets,
     reference,
@@ -263,29 +261,3 @@ def test_the_node_is_its_reference(renderer: Renderer, size: tuple[int, int]) ->
     assert frames["bright"].shape[1::-1] == half
     for name, values in expected.items():
         assert_allclose(frames[name], values, atol=1e-4 * max(1.0, float(values.max())))
-
-
-# --- all of them ---
-
-NEW: list[Settings] = [
-    presets["godot_4_5"],
-    presets["godot_4_6"].replace(bloom_size=(50, 31)),
-    presets["blender_bloom"].replace(maximum=4.0),
-    presets["pygfx"].replace(karis_average=True, bloom_scale=0.7),
-    UnrealBloom(node=True, intensity=1.0),
-]
-
-
-@pytest.mark.parametrize(("settings", "dtype"), by_turns(NEW, turns=DTYPES))
-def test_all_variants_give_the_same(
-    settings: Settings, dtype: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    image = lights((75, 46), dtype)
-    results = []
-    for variant in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_VARIANT", variant)
-        with Renderer(validation=True) as renderer:
-            results.append(renderer.apply(image, settings))
-    for name, values in results[0].items():
-        for other in results[1:]:
-            np.testing.assert_array_equal(other[name], values, err_msg=name)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+from tests.exhaustive import examples
 from tests.tolerance import tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference, testing
 from vkbloom.testing import Probe
@@ -50,7 +51,7 @@ FLOATS = ("float16", "float32")
 ERRORS = {"float16": 2e-3, "float32": 1e-5, "float64": 1e-12}
 BOTH = pytest.mark.parametrize("dtype", ["float32", "float64"], ids=["device", "reference"])
 
-few = hypothesis.settings(max_examples=12, deadline=None)
+few = hypothesis.settings(max_examples=examples(4), deadline=None)
 
 
 def bloom_of(renderer: Renderer, image: Image, settings: Settings) -> Array:

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
+from tests.methods.cases import DTYPES, by_turns, presets_of_low_levels
 from vkbloom import (
     DualKawase,
     GodotBloom,
@@ -17,7 +18,6 @@ from vkbloom import (
     Scene,
     Separable,
     Settings,
-    presets,
     reference,
 )
 from vkbloom.reference.image import storage
@@ -85,8 +85,9 @@ def lights(size: tuple[int, int], dtype: str = "float32") -> Array:
     return (image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
 
 
+LOW = presets_of_low_levels(64)
 METHODS: list[Settings] = [
-    *(settings.replace(format="rg11b10ufloat") for settings in presets.values()),
+    *(settings.replace(format="rg11b10ufloat") for settings in LOW.values()),
     Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rg11b10ufloat"),
     Separable(direct=True, loops=2, blur_scale=0.5, format="rg11b10ufloat"),
     Pyramid(threshold=0.5, knee=0.3, bloom_scale=0.5, format="rg11b10ufloat"),
@@ -96,8 +97,7 @@ METHODS: list[Settings] = [
 ]
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-@pytest.mark.parametrize("settings", METHODS)
+@pytest.mark.parametrize(("settings", "dtype"), by_turns(METHODS, turns=DTYPES))
 def test_every_method_has_the_format(renderer: Renderer, settings: Settings, dtype: str) -> None:
     """A value may fall on the other side of a step than the reference's: 1/64, of blue 1/32.
 
@@ -124,7 +124,7 @@ def test_every_method_has_the_format(renderer: Renderer, settings: Settings, dty
 @pytest.mark.parametrize("name", ["bevy_natural", "filament", "unity_urp", "unity_hdrp"])
 def test_engines_round_their_levels_alone(renderer: Renderer, name: str) -> None:
     image = lights((40, 30))
-    frames = renderer.apply(image, presets[name].replace(format="rg11b10ufloat"))
+    frames = renderer.apply(image, LOW[name].replace(format="rg11b10ufloat"))
     assert_array_equal(frames["glow"][..., :3], image)
     rounded = storage("rg11b10ufloat")
     for level in (one for one in frames if one.startswith(("down", "up"))):
@@ -137,11 +137,11 @@ def test_engines_round_their_levels_alone(renderer: Renderer, name: str) -> None
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 @pytest.mark.parametrize("name", ["tutorial", "jimenez2014", "bevy_natural", "godot_4_6"])
 def test_of_a_scene(renderer: Renderer, name: str, shading: Any) -> None:
-    settings = presets[name].replace(format="rg11b10ufloat")
-    frames = renderer.render(Scene.ufo(), settings, (160, 90), shading=shading)
+    settings = LOW[name].replace(format="rg11b10ufloat")
+    frames = renderer.render(Scene.ufo(), settings, (80, 45), shading=shading)
     assert frames["bloom"].dtype == np.float32
     assert frames["bloom"].max() > 0
     if shading == "forward":
-        expected = reference.passes(frames["glow"], settings, (160, 90))["bloom"]
+        expected = reference.passes(frames["glow"], settings, (80, 45))["bloom"]
         difference = np.abs(frames["bloom"] - expected)[..., :3]
         assert difference.mean() <= 2e-3 * expected[..., :3].mean()

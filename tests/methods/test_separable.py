@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.methods.cases import by_turns
 from tests.screens import noise, screen
 from tests.tolerance import colours
 from vkbloom import Frames, Renderer, Scene, Separable, gaussian_weights, reference
@@ -97,8 +98,7 @@ SETTINGS = [
 ]
 
 
-@pytest.mark.parametrize("format", FORMATS)
-@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize(("settings", "format"), by_turns(SETTINGS, turns=FORMATS))
 def test_device_equals_the_reference(
     renderer: Renderer, settings: Separable, format: Format
 ) -> None:
@@ -107,17 +107,17 @@ def test_device_equals_the_reference(
     assert_is_the_references(render(renderer, image, settings), settings, format)
 
 
-@pytest.mark.parametrize("format", FORMATS)
-@pytest.mark.parametrize("blur_scale", [1.0, 1.37])
-@pytest.mark.parametrize("size", [(1, 1), (7, 1), (1, 9), (333, 517)], ids=str)
+@pytest.mark.parametrize(
+    ("size", "blur_scale", "format"),
+    by_turns([(1, 1), (7, 1), (1, 9), (333, 517)], [1.0, 1.37], turns=FORMATS),
+)
 def test_sizes(renderer: Renderer, size: Size, blur_scale: float, format: Format) -> None:
     settings = Separable(blur_scale=blur_scale, format=format)
     image = noise(size, brightest(format))
     assert_is_the_references(render(renderer, image, settings), settings, format)
 
 
-@pytest.mark.parametrize("format", FORMATS)
-@pytest.mark.parametrize("blur_scale", [1.0, 0.77])
+@pytest.mark.parametrize(("blur_scale", "format"), by_turns([1.0, 0.77], turns=FORMATS))
 def test_bloom_buffers_of_1280_x_720(renderer: Renderer, blur_scale: float, format: Format) -> None:
     size = (1280, 720)
     settings = Separable(blur_scale=blur_scale, format=format, bloom_size=size)

@@ -121,8 +121,8 @@ def rows_of(name: str, table: list[Any], found: list[tuple[str, float, float]]) 
         )
 
 
-def page(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
-    """Return the text of docs/engines.md, whose words around the table stay."""
+def table_of(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
+    """Return the table of the page."""
     lines = [
         "| engine | cases of | cases | outputs | reference | device |",
         "|---|---|---|---|---|---|",
@@ -132,13 +132,18 @@ def page(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
         f"| {shown(row, row.of_reference)} | {shown(row, row.of_device)} |"
         for row in rows
     ]
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition("<!-- table -->\n")
-    after = rest.partition("<!-- end -->\n")[2]
-    table = "\n".join(lines)
     said = "; ".join(versions.values())
-    words = f"Versions: {said}. The device is {adapter}."
-    return f"{before}<!-- table -->\n\n{table}\n\n{words}\n\n<!-- end -->\n{after}"
+    return "\n".join([*lines, "", f"Versions: {said}. The device is {adapter}."])
+
+
+def replace_in_page(mark: str, table: str) -> None:
+    """Write a table into docs/engines.md, in the place of the one with this mark."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, _, rest = text.partition(f"<!-- {mark} -->\n")
+    after = rest.partition("<!-- end -->\n")[2]
+    PAGE.write_text(
+        f"{before}<!-- {mark} -->\n\n{table}\n\n<!-- end -->\n{after}", encoding="utf-8"
+    )
 
 
 def shown(row: Row, number: float) -> str:
@@ -186,7 +191,7 @@ def main() -> None:
         adapter = f"{renderer.info.name}, {renderer.info.driver_info}"
     for row in rows:
         print(f"{row.engine:<8} {row.what:<24} {row.of_reference:.1e} {row.of_device:.1e}")
-    PAGE.write_text(page(rows, versions, adapter), encoding="utf-8")
+    replace_in_page("table", table_of(rows, versions, adapter))
     if arguments.keep:
         np.savez_compressed(KEPT, **kept)
     if any(max(row.of_reference, row.of_device) > LIMIT for row in rows):

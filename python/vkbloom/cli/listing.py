@@ -12,14 +12,15 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 from rich import box
-from rich.progress import track
 from rich.table import Table
+from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import has_integers, layer_option, read_picture
+from vkbloom.cli.sequences import check_drawing
 from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
-from vkbloom.cli.terminal import is_quiet, say, show, tell_device
+from vkbloom.cli.terminal import hides_progress, say, show, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
 from vkbloom.io.expansion import PHOTO_EXPANSION
@@ -87,8 +88,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]], shown: Sh
             raise click.UsageError("--sheet IMAGE and --out FILE need each other")
         listed = list(entries())
         if image is not None and out is not None:
-            if Path(out).suffix.lower() != ".png":
-                raise click.UsageError(f"--out: {out} does not end in .png")
+            check_drawing("--out", out, (".png",))
             sheet = _sheet(image, layer, listed, shown, (adapter, validation))
             safe_writing.write_file(Path(out), sheet)
             say(f"wrote {out}")
@@ -142,7 +142,7 @@ def _sheet(
     tiles = [(_tile(plain, cell), "without bloom", Path(file).name)]
     with opened_renderer(*device) as renderer:
         tell_device(renderer)
-        for one in track(entries, "Rendering", transient=True, disable=is_quiet()):
+        for one in tqdm(entries, unit="picture", leave=False, disable=hides_progress()):
             settings = shown(one, base)
             if settings is None:
                 continue
