@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
+from rich.console import Console
 
 import vkbloom
 from vkbloom.cli import glares as glares_command
@@ -46,6 +48,17 @@ def test_one_line_each(command: str) -> None:
     # Below the heading and its rule.
     assert [words[0] for words in lines[2:]] == NAMES[command]
     assert all(len(words) >= 5 for words in lines[2:])
+
+
+def test_a_narrow_terminal_cuts_the_last_columns() -> None:
+    printed = io.StringIO()
+    console = Console(width=80, file=printed, force_terminal=True, color_system=None)
+    entries = list(presets_command.entries())
+    console.print(listing._table(entries))
+    lines = [line.split() for line in printed.getvalue().splitlines() if line.strip()]
+    assert [words[0] for words in lines[2:]] == NAMES["presets"]
+    for words, entry in zip(lines[2:], entries, strict=True):
+        assert words[1:3] == [entry.composite, "yes" if entry.needs_hdr else "no"]
 
 
 def test_what_is_said_of_presets_and_glares() -> None:
