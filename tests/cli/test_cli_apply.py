@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.exhaustive import some
 from tests.processes import python
 from vkbloom import renderer
 from vkbloom.cli.program import program
@@ -430,7 +431,7 @@ class TestErrors:
         assert result.exit_code == 1
         assert f"vkbloom.write('image.exr', numpy.load('{file}'))" in result.stderr
 
-    @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "tif"])
+    @pytest.mark.parametrize("suffix", some(["png", "exr", "tif", "jpg"], 2))
     def test_libraries_are_silenced(self, tmp_path: Path, suffix: str) -> None:
         path = tmp_path / f"a.{suffix}"
         values = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
