@@ -7,6 +7,8 @@
 # make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
 # make engine-laws: takes both through all laws, in a quarter of an hour.
+# make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
+#   which comes as packages of Debian 13 that are unpacked, not installed.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -26,7 +28,8 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test exhaustive check docs bench engines engine-laws wheels lint format sanitize clean
+.PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo wheels lint format \
+	sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -77,17 +80,25 @@ build/engines/%/done:
 	$(@D)/bin/pip install --quiet $(PACKAGES)
 	touch $@
 
+# Compares own methods with libplacebo (docs/libplacebo.md).
+libplacebo: build/stamp/core build/libplacebo/apply_hook
+	test -n "$(HOOKS)" || { echo "give a folder of user shaders: make libplacebo HOOKS=..."; exit 2; }
+	$(PYTHON) tools/libplacebo/compare.py build/libplacebo/apply_hook "$(HOOKS)" $(LIBPLACEBO)
+
+build/libplacebo/apply_hook: tools/libplacebo/build.sh tools/libplacebo/apply_hook.c
+	tools/libplacebo/build.sh build/libplacebo
+
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
+	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 
 format: build/stamp/lint
 	$(VENV)/bin/ruff check --fix-only .
 	$(VENV)/bin/ruff format .
-	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/threads/*.c
+	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 sanitize: build/stamp/core build/stamp/test

@@ -160,7 +160,7 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     y, x = height // 2, width // 2
     # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
-    figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8, 4.6), layout="constrained")
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
         exact = settings.replace(format="rgba32float", bloom=True)
         bloom = renderer.apply(image, exact, attachments=["bloom"])["bloom"]
@@ -170,14 +170,15 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
             np.arange(len(profile))[seen] + 0.5,
             profile[seen] / 9000,
             label=name,
-            color=mpl.colormaps["tab20"](index / 20 + 0.01),
+            color=mpl.colormaps["tab20"](index % 20 / 20 + 0.01),
+            linestyle="-" if index < 20 else "--",
             linewidth=1.4,
         )
     axes.set_xlabel("distance, pixels (+ 0.5)")
     axes.set_ylabel("share of the light of the point, per pixel")
     axes.set_ylim(1e-7, 1)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7, ncols=2)
+    figure.legend(fontsize=7, loc="outside right upper")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

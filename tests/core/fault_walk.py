@@ -2,12 +2,13 @@
 
 Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
 is the n-th Vulkan call or allocation; the walk ends when the workload finishes without reaching it.
-One of STRIDE points is walked (1: all points). Without names, all workloads are walked; if STRIDE
-is above 1, one method of three, with one of the sets of variants in turn.
+One of STRIDE points is walked (1: all points). Without names, all workloads are walked, but of the
+methods and variants some in a run that is not exhaustive.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import shutil
@@ -23,6 +24,8 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.core.descriptors import open_descriptors
+from tests.device.device_work import Consumer, OnDevice
+from tests.exhaustive import some
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
@@ -32,6 +35,8 @@ OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4
 #: The calls that report a lost device.
 CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
+#: The number of methods, each with a set of variants, that the usual run walks.
+METHODS = 12
 SIZE = (24, 16)
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -177,6 +182,31 @@ def grid_to_zarr(_: Renderer) -> Arrays:
     return arrays
 
 
+@functools.cache
+def own_settings() -> tuple[vkbloom.Settings, ...]:
+    """Return the settings of two own methods, of draws and of dispatches; compiled once."""
+    folder = Path("examples/own_methods")
+    return tuple(vkbloom.load_method(folder / f"{name}.hook")() for name in ("karis", "compute"))
+
+
+def own_passes(renderer: Renderer) -> Arrays:
+    frames = renderer.apply_many(picture(*SIZE), own_settings())
+    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+
+
+def on_device(renderer: Any) -> Arrays:
+    """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before."""
+    images = np.stack([picture(*SIZE, dtype="float16", seed=seed) for seed in range(3)])
+    settings = vkbloom.Separable(threshold=0.3)
+    one = renderer.apply(OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]))
+    arrays = {name: array.numpy() for name, array in one.items()}
+    copied = np.from_dlpack(Consumer(one["bloom"]))
+    del one
+    for index, frames in enumerate(renderer.apply_each(OnDevice(images), settings)):
+        arrays[f"{index} final"] = frames["final"].numpy()
+    return {**arrays, "copied": copied}
+
+
 UFO = Scene.ufo()
 # One convolution stands for all: they have the same passes.
 PRESETS = {
@@ -196,6 +226,8 @@ WORK: dict[str, Work] = {
     "readback": readback,
     "handles": handles,
     "present": presented,
+    "own passes": own_passes,
+    **({"arrays on the device": on_device} if "STAND_IN_UUID" in os.environ else {}),
     **{
         f"apply {preset} {variant}": method(settings)
         for preset, settings in PRESETS.items()
@@ -222,12 +254,17 @@ def check_error(error: BaseException, failed: str, result: int) -> None:
     if failed == "vkb_alloc":
         assert isinstance(error, MemoryError), error
         return
-    assert isinstance(error, vkbloom.Error), error
+    assert isinstance(error, vkbloom.Error | TypeError), error
     if failed == "vkEnumerateInstanceLayerProperties":
         assert "validation was asked for" in str(error), error
         return
     if failed == "volkInitialize":
         assert isinstance(error, vkbloom.AdapterNotFoundError), error
+        return
+    if failed.startswith("cu"):
+        # What CUDA says when arrays are taken is the reason why they are not.
+        assert isinstance(error, vkbloom.OutOfMemoryError | TypeError), error
+        assert f"CUDA: {failed} failed with CUDA_ERROR_OUT_OF_MEMORY" in str(error)
         return
     expected = vkbloom.OutOfMemoryError if result != DEVICE_LOST else vkbloom.DeviceLostError
     assert type(error) is expected, error
@@ -353,6 +390,9 @@ def walk_one(name: str, stride: int) -> None:
     start = 1 + zlib.crc32(name.encode()) % stride
     before = state()
     if name == "create":
+        # It has few points, which are quickly walked.
+        stride = max(1, stride // 10)
+        start = 1 + start % stride
         walk(lambda n: one.renderer_at(n, OUT_OF_DEVICE_MEMORY), start, stride, before)
     elif name == "close":
         walk(lambda n: one.close_at(n, OUT_OF_DEVICE_MEMORY, ""), 1, 1, before)
@@ -372,23 +412,22 @@ def walk_one(name: str, stride: int) -> None:
     print(json.dumps({"workload": name, **figures}), flush=True)
 
 
-def workloads(stride: int) -> list[str]:
+def workloads() -> list[str]:
     """Return the names of the workloads that are walked by default."""
     methods = [name for name in WORK if name.startswith("apply ")]
     others = [name for name in WORK if name not in methods]
     if not presents():
         others.remove("present")
-    # Three for each preset: of the first preset the first, of the fourth one the second.
-    some = [name for i, name in enumerate(methods) if i % 9 == i // 9 % 3]
-    return ["create", "close", *others, *(methods if stride == 1 else some)]
+    return ["create", "close", *others, *some(methods, METHODS)]
 
 
 def main(stride: int, names: list[str]) -> None:
     # Objects that a process creates once must exist before the count.
+    own_settings()
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:
-        for name in names or workloads(stride):
+        for name in names or workloads():
             walk_one(name, stride)
     finally:
         shutil.rmtree(FOLDER, ignore_errors=True)

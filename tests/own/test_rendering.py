@@ -255,6 +255,19 @@ def test_values_of_parameters() -> None:
         kind(gain=-1)
 
 
+def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:
+    text = "//!PARAM reference_white\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 1000\n100\n"
+    settings = own(text + COPY.replace("return", "return 0.01 * reference_white *"))
+    image = picture()
+    assert settings.reference_white == 100
+    assert difference(renderer.apply(image, settings)["final"], image) < 1e-6
+    doubled = renderer.apply(image, settings.replace(reference_white=200))
+    assert difference(doubled["final"], 2 * image) < 1e-6
+    for value in (0.5, 1001):
+        with pytest.raises(ValueError, match="reference_white"):
+            settings.replace(reference_white=value)
+
+
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 def test_a_scene(renderer: Renderer, shading: Any) -> None:
     settings = own(COPY.replace("return", "return 0.5 *"), format="rgba16float")

@@ -39,7 +39,7 @@ from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.program import given as was_given
 from vkbloom.cli.sequences import PIPE, check_targets, pairs
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.cli.terminal import detail, is_quiet, note, say, tell_device
+from vkbloom.cli.terminal import detail, hides_progress, note, say, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import premultiplied
@@ -113,9 +113,11 @@ def command(
     their highlights are expanded; files of floats start from bevy_natural. Further options change
     the settings.
 
-    Bloom is computed in linear colours, and OUT has the number type of IN, or the closest one of
-    its format. docs/command-line.md says how colours, alpha and metadata are treated. OUT is
-    replaced when the new file is complete.
+    Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
+    with Rec. 709 colours. Files of floats are linear. OUT has the number type of IN, or the closest
+    one of its format. Integers are encoded to sRGB and clipped to 0..1. Floats (as in OpenEXR and
+    Radiance HDR) are written linear. Alpha does not change, unless --alpha is given. OUT is
+    replaced when the new file is complete. See docs/command-line.md.
     """
     options = _Options(**given)
     inputs, target = _arguments(sources, out)
@@ -204,8 +206,7 @@ class _Run:
         self._folder = folder
         self._renderer = renderer
         self._several = several
-        # None: shown where standard error is a terminal.
-        self._hidden = True if sys.stderr is None or is_quiet() else None
+        self._hidden = hides_progress()
 
     def is_by_rows(self, name: str) -> bool:
         """Whether a file is read and written in bands of rows."""

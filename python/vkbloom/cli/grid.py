@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import io
 import logging
 import math
-import os
 import queue
 import signal
 import threading
@@ -42,6 +40,7 @@ from vkbloom.cli.image_files import (
 from vkbloom.cli.option_files import FILE_OPTION, CommandWithFile
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
+from vkbloom.cli.sequences import check_drawing
 from vkbloom.cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom.cli.terminal import detail_device, is_quiet, note, say
 from vkbloom.grid.image_folder import FileForm, GridFiles
@@ -260,8 +259,8 @@ class _Output:
             _check_image_files(self.name, self.suffix)
         if self.sheet and not has_frames:
             raise click.UsageError("--sheet needs framebuffers; leave out --attachments none")
-        _check_drawing("--sheet", self.sheet, (".png",))
-        _check_drawing("--curves", self.curves, (".png", ".svg", ".pdf"))
+        check_drawing("--sheet", self.sheet, (".png",))
+        check_drawing("--curves", self.curves, (".png", ".svg", ".pdf"))
 
     def check_shape(self, shape: tuple[int, ...]) -> None:
         """Raise click.UsageError if there is no axis along which to plot."""
@@ -355,19 +354,6 @@ def _check_image_files(out: str, image_format: str) -> None:
         f"--out: {out} is an image's name, not a folder's; a grid writes an image for each point: "
         f"name a folder, and give --image-format {suffix[1:]}"
     )
-
-
-def _check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
-    """Check that the drawing can be written, before a long grid is rendered."""
-    if file is None:
-        return
-    path = Path(file)
-    if path.suffix.lower() not in suffixes:
-        raise click.UsageError(f"{option}: {file} does not end in {', '.join(suffixes)}")
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
-    if not path.absolute().parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)
 
 
 def _pictures(

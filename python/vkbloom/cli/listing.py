@@ -12,14 +12,16 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 from rich import box
-from rich.progress import track
 from rich.table import Table
+from rich.text import Text
+from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import has_integers, layer_option, read_picture
+from vkbloom.cli.sequences import check_drawing
 from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
-from vkbloom.cli.terminal import is_quiet, say, show, tell_device
+from vkbloom.cli.terminal import hides_progress, say, show, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
 from vkbloom.io.expansion import PHOTO_EXPANSION
@@ -87,8 +89,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]], shown: Sh
             raise click.UsageError("--sheet IMAGE and --out FILE need each other")
         listed = list(entries())
         if image is not None and out is not None:
-            if Path(out).suffix.lower() != ".png":
-                raise click.UsageError(f"--out: {out} does not end in .png")
+            check_drawing("--out", out, (".png",))
             sheet = _sheet(image, layer, listed, shown, (adapter, validation))
             safe_writing.write_file(Path(out), sheet)
             say(f"wrote {out}")
@@ -106,13 +107,16 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]], shown: Sh
 
 
 def _table(entries: Iterable[Entry]) -> Table:
-    """Return a table of one line for each entry, which a narrow terminal cuts."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for title in ("name", "composite", "needs HDR", "what", "whose"):
-        table.add_column(title, no_wrap=True, overflow="ellipsis")
+    """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("name", "composite", "needs HDR"):
+        table.add_column(title, no_wrap=True)
+    # Columns that rich makes narrower, with texts that it does not wrap.
+    table.add_column("what")
+    table.add_column("whose")
     for one in entries:
-        needed = "yes" if one.needs_hdr else "no"
-        table.add_row(one.name, one.composite, needed, one.what, one.whose)
+        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (one.what, one.whose))
+        table.add_row(one.name, one.composite, "yes" if one.needs_hdr else "no", *texts)
     return table
 
 
@@ -142,7 +146,7 @@ def _sheet(
     tiles = [(_tile(plain, cell), "without bloom", Path(file).name)]
     with opened_renderer(*device) as renderer:
         tell_device(renderer)
-        for one in track(entries, "Rendering", transient=True, disable=is_quiet()):
+        for one in tqdm(entries, unit="picture", leave=False, disable=hides_progress()):
             settings = shown(one, base)
             if settings is None:
                 continue

@@ -46,8 +46,10 @@ INTERRUPTED: Final = 130
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
 
-# How Python and OpenImageIO report that there is no memory for a thread's stack.
+# How Python and OpenImageIO report that there is no memory for a thread's stack, and the dynamic
+# linker that there is none for a library.
 _NO_THREAD: Final = ("start new thread", "Resource temporarily unavailable")
+_NO_LIBRARY: Final = ("failed to map segment", "cannot allocate memory")
 
 
 class Program(click.Group):
@@ -116,7 +118,8 @@ class Program(click.Group):
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
-            if isinstance(error, RuntimeError) and any(one in str(error) for one in _NO_THREAD):
+            no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
+            if any(one in str(error) for one in no_memory):
                 _exit(1, _described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, _described(error))

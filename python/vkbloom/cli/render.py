@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,7 +19,7 @@ from vkbloom.cli.fields import SIZE, Command
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
-from vkbloom.cli.terminal import detail, is_quiet, note, say, show, tell_device
+from vkbloom.cli.terminal import detail, hides_progress, is_quiet, note, say, show, tell_device
 from vkbloom.io.animations import animation
 from vkbloom.settings import SHADINGS, Shading
 
@@ -98,8 +97,7 @@ def command(
         tell_device(renderer)
         detail(f"{size[0]} x {size[1]}, {shading}, {settings!r}")
         add = stack.enter_context(animation(Path(out), rate)) if is_gif else None
-        # None: tqdm shows the bar if standard error is a terminal.
-        disable = True if count is None or sys.stderr is None or is_quiet() else None
+        disable = True if count is None else hides_progress()
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
             with as_wrong_use():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
@@ -59,6 +60,11 @@ def print_as_usual() -> None:
 def is_quiet() -> bool:
     """Return whether progress and notes are left out."""
     return _Printing.level == _QUIET
+
+
+def hides_progress() -> bool | None:
+    """Return the argument `disable` of a tqdm; None: shown where standard error is a terminal."""
+    return True if is_quiet() or sys.stderr is None else None
 
 
 def say(text: str, *, err: bool = False) -> None:

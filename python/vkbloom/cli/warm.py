@@ -8,12 +8,12 @@ from typing import Any, Final
 
 import click
 import numpy as np
-from rich.progress import track
+from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import adapter_option
 from vkbloom.cli.fields import SIZE, NameOf
-from vkbloom.cli.terminal import detail_device, is_quiet, say
+from vkbloom.cli.terminal import detail_device, hides_progress, say
 
 _TYPES: Final = ("uint8", "float16", "float32")
 _USUAL_SIZE: Final = (1920, 1080)
@@ -68,8 +68,8 @@ def command(
             for shading in ("forward", "deferred"):
                 for attachments in _KEPT:
                     renderer.render(scene, shading=shading, attachments=attachments)
-        for size, dtype, channels, preset, attachments in track(
-            calls, "Compiling", transient=True, disable=is_quiet()
+        for size, dtype, channels, preset, attachments in tqdm(
+            calls, unit="call", leave=False, disable=hides_progress()
         ):
             image = np.zeros((size[1], size[0], channels), dtype)
             renderer.apply(image, vkbloom.presets[preset], attachments=attachments)

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final, Literal, Self
 
 from numpy.typing import NDArray
 
+from vkbloom import _core
 from vkbloom.argument_types import checked
 from vkbloom.fields import number_field, value_field
 from vkbloom.own.file import OwnFile, read_file
@@ -263,7 +264,12 @@ def class_name(name: str) -> str:
 
 def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
     """Return type and declaration of a parameter's field."""
-    if hasattr(OwnMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
+    low, high = max(param.low, -LARGEST_FLOAT), min(param.high, LARGEST_FLOAT)
+    shared = param.name == SHARED and param.number == "float"
+    if shared:
+        _, least, most = _core.VALUES[SHARED]
+        low, high = max(low, least), min(high, most)
+    elif hasattr(OwnMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
         raise file.source.fault(
             param.line, f"PARAM: {param.name!r} is a name that all settings have; rename it"
         )
@@ -277,8 +283,8 @@ def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
     return (int if whole else float), number_field(
         default=default,
         # Finite, since a range that ends at infinity does not contain its beginning.
-        range=(max(param.low, -LARGEST_FLOAT), min(param.high, LARGEST_FLOAT)),
-        slider=slider_of(param),
+        range=(low, high),
+        slider=() if shared else slider_of(param),
         text=param.description,
     )
 
@@ -293,6 +299,9 @@ def slider_of(param: Param) -> tuple[float, float] | tuple[()]:
     return (start if start < end else end - 1), end
 
 
+#: The setting that a PARAM can be: the file gives its default and narrows its range, the body and
+#: the encoding get its value. Published files of tone curves have it with the same meaning.
+SHARED: Final = "reference_white"
 #: Names that classes of settings have beside their attributes.
 TAKEN: Final = {"method", "sha256", "threshold", "self"}
 
