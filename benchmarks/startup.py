@@ -106,7 +106,9 @@ def _imports(plan: Plan, section: Section, rounds: int) -> None:
         return once
 
     times = alternate_seconds(
-        {name: process(statement) for name, statement in statements.items()}, rounds, warm_up=1
+        {name: process(statement) for name, statement in statements.items()},
+        rounds,
+        warm_up=0 if plan.quick else 1,
     )
     section.times["processes"] = times
     bare = times["Python alone"]

@@ -68,6 +68,8 @@ def random_settings(seed: int, index: int) -> vkbloom.Settings:
         stages.append(vkbloom.Halo(intensity=float(rng.uniform(0.005, 0.03))))
     return vkbloom.Convolution(
         lens(seed, int(rng.integers(LENSES))),
+        # The light of these lenses ends before. Without it, kernels are of twice the image's size.
+        kernel_size=(1023, 1023),
         threshold=float(rng.uniform(0.8, 2.0)),
         intensity=float(rng.uniform(0.05, 0.5)),
         # Glare is smooth. A smaller scale would miss single bright pixels.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Iterable
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 #: Whether this run takes everything.
 EXHAUSTIVE: Final = os.environ.get("VKBLOOM_EXHAUSTIVE", "0") not in ("", "0")
@@ -25,3 +26,20 @@ def some(cases: Iterable[T], count: int) -> list[T]:
 def examples(usual: int) -> int:
     """Return the number of examples of a hypothesis test; eight times as many when exhaustive."""
     return 8 * usual if EXHAUSTIVE else usual
+
+
+def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Return the product of the columns; each row ends with one of `turns`.
+
+    Every two values of two columns, or of a column and of `turns`, meet in some row. The product
+    with all turns finds little more, and takes as many times as long as there are turns: an
+    exhaustive run has it.
+    """
+    last = list(turns)
+    if EXHAUSTIVE:
+        return list(itertools.product(*columns, last))
+    rows = itertools.product(*(enumerate(column) for column in columns))
+    return [
+        (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])
+        for row in rows
+    ]

@@ -79,7 +79,7 @@ def photograph_jupyterlab(browser: Browser, folder: Path) -> None:
         variables = {"VKBLOOM_ADAPTER": "software"}
         with jupyterlab(Path(temporary), CELLS, variables) as url:
             for theme in THEMES:
-                page = browser.new_page(viewport={"width": 1240, "height": 760}, color_scheme=theme)
+                page = browser.new_page(viewport={"width": 1240, "height": 900}, color_scheme=theme)
                 page.goto(url)
                 page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=60_000)
                 page.locator(".jp-CodeCell .cm-content").first.click()
@@ -92,6 +92,7 @@ def photograph_jupyterlab(browser: Browser, folder: Path) -> None:
                 page.locator(".jp-CodeCell .cm-content").nth(1).click()
                 page.keyboard.press("Shift+Enter")
                 page.locator(".jp-OutputArea", has_text="fields at their defaults").wait_for()
+                page.locator(".jp-CodeCell").first.scroll_into_view_if_needed()
                 page.wait_for_timeout(500)
                 save(page, folder / f"explorer_jupyterlab_{theme}.jpg")
                 page.close()

@@ -114,8 +114,11 @@ def core_with_faults(temporary: Path) -> Path:
             ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
             for folder in ("csrc", "shaders", "python"):
                 shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
+            # With its shaders' modules, of which those older than their sources are compiled again.
+            if (ROOT / "build" / "spirv").is_dir():
+                shutil.copytree(ROOT / "build" / "spirv", tree / "build" / "spirv")
             for name in ("setup.py", "pyproject.toml", "README.md"):
-                shutil.copy(ROOT / name, tree / name)
+                shutil.copy2(ROOT / name, tree / name)
             succeed(tree, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
             whole.touch()
     return tree

@@ -2,8 +2,8 @@
 
 Runs over a core built with VKBLOOM_FAULTS: ``python fault_walk.py STRIDE [WORKLOAD ...]``. Point n
 is the n-th Vulkan call or allocation; the walk ends when the workload finishes without reaching it.
-One of STRIDE points is walked (1: all points). Without names, all workloads are walked; if STRIDE
-is above 1, one method of three, with one of the sets of variants in turn.
+One of STRIDE points is walked (1: all points). Without names, all workloads are walked, but of the
+methods and variants some in a run that is not exhaustive.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.core.descriptors import open_descriptors
 from tests.device.device_work import Consumer, OnDevice
+from tests.exhaustive import some
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
@@ -34,6 +35,8 @@ OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4
 #: The calls that report a lost device.
 CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
+#: The number of methods, each with a set of variants, that the usual run walks.
+METHODS = 12
 SIZE = (24, 16)
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -387,6 +390,9 @@ def walk_one(name: str, stride: int) -> None:
     start = 1 + zlib.crc32(name.encode()) % stride
     before = state()
     if name == "create":
+        # It has few points, which are quickly walked.
+        stride = max(1, stride // 10)
+        start = 1 + start % stride
         walk(lambda n: one.renderer_at(n, OUT_OF_DEVICE_MEMORY), start, stride, before)
     elif name == "close":
         walk(lambda n: one.close_at(n, OUT_OF_DEVICE_MEMORY, ""), 1, 1, before)
@@ -406,15 +412,13 @@ def walk_one(name: str, stride: int) -> None:
     print(json.dumps({"workload": name, **figures}), flush=True)
 
 
-def workloads(stride: int) -> list[str]:
+def workloads() -> list[str]:
     """Return the names of the workloads that are walked by default."""
     methods = [name for name in WORK if name.startswith("apply ")]
     others = [name for name in WORK if name not in methods]
     if not presents():
         others.remove("present")
-    # Three for each preset: of the first preset the first, of the fourth one the second.
-    some = [name for i, name in enumerate(methods) if i % 9 == i // 9 % 3]
-    return ["create", "close", *others, *(methods if stride == 1 else some)]
+    return ["create", "close", *others, *some(methods, METHODS)]
 
 
 def main(stride: int, names: list[str]) -> None:
@@ -423,7 +427,7 @@ def main(stride: int, names: list[str]) -> None:
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:
-        for name in names or workloads(stride):
+        for name in names or workloads():
             walk_one(name, stride)
     finally:
         shutil.rmtree(FOLDER, ignore_errors=True)

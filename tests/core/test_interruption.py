@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -29,10 +29,6 @@ LEAVES_BEHIND = pytest.mark.skipif(
 )
 UNIX = pytest.mark.skipif(os.name == "nt", reason="signals and forks of Unix")
 
-# 65 x 65 taps a pixel, filtered by hand.
-LONG = Separable(
-    weights=gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
-)
 SHORT = Separable(blur_strength=0.5)
 RIGHT_SIZE = (24, 16)
 
@@ -54,40 +50,63 @@ def alarm() -> Iterator[Callable[[float], None]]:
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.fixture(scope="module")
-def large() -> NDArray[np.float32]:
-    """A square image for which LONG takes more than 0.3 s, so that there is a wait to interrupt
-    after 0.1 s.
+def slow(radius: int) -> Separable:
+    """Return settings of (2 radius + 1)^2 taps a pixel, filtered by hand."""
+    weights = gaussian_weights(10.0, radius)
+    return Separable(weights=weights, blur_scale=0.5, direct=True, format="rgba32float")
 
-    It has at least 1 MiB, so that the device writes directly into the array.
+
+class Long(NamedTuple):
+    """Work that takes more than 0.3 s, so that there is a wait to interrupt after 0.1 s.
+
+    The image has at least 1 MiB, so that the device writes directly into the array.
     """
+
+    image: NDArray[np.float32]
+    radius: int
+
+    @property
+    def settings(self) -> Separable:
+        return slow(self.radius)
+
+    @property
+    def half(self) -> NDArray[np.float32]:
+        return self.image[: len(self.image) // 2, : len(self.image) // 2]
+
+    def run(self, renderer: Renderer) -> None:
+        renderer.apply(self.image, self.settings, attachments="final")
+
+
+@pytest.fixture(scope="module")
+def long() -> Long:
+    """No longer than necessary, since all of these tests wait for it several times."""
     with Renderer() as renderer:
-        side = 256
-        # Another image of this size first, so that the next call does not compile shaders.
-        renderer.apply(picture(side, side)[::-1], LONG, attachments="final")
+        side, radius = 256, 4
         while side <= 4096:
-            image = picture(side, side)
+            work = Long(picture(side, side), radius)
+            # Another image of this size first, so that the next call does not compile shaders.
+            work._replace(image=work.image[::-1]).run(renderer)
             begin = time.perf_counter()
-            renderer.apply(image, LONG, attachments="final")
+            work.run(renderer)
             seconds = time.perf_counter() - begin
             if seconds > 0.3:
-                return image
-            # No larger than necessary, since all of these tests wait for it several times.
-            side = int(side * min(2.0, max(1.1, math.sqrt(0.36 / seconds))))
+                return work
+            growth = math.sqrt(min(4.0, max(1.2, 0.36 / seconds)))
+            if radius < 32:
+                radius = min(32, math.ceil(growth * radius))
+            else:
+                side = int(side * growth)
     pytest.skip("this device is done before a wait can be interrupted")
 
 
-def long_work(renderer: Renderer, image: NDArray[np.float32]) -> None:
-    renderer.apply(image, LONG, attachments="final")
-
-
 class Case(NamedTuple):
-    """A new renderer, an image with which its work is long, and an alarm."""
+    """A new renderer, work that is long, and an alarm."""
 
     renderer: Renderer
-    image: NDArray[np.float32]
+    long: Long
     alarm: Callable[[float], None]
     scene: Scene
+    right: list[NDArray[Any]]
 
     @contextmanager
     def interrupted(self, seconds: float = 0.1) -> Iterator[None]:
@@ -98,30 +117,34 @@ class Case(NamedTuple):
 
     def check(self) -> None:
         """The renderer gives the exact pictures of a new one."""
-        with Renderer() as new:
-            for settings in (SHORT, Separable(bloom_size=(7, 5))):
-                expected = new.render(self.scene, settings, RIGHT_SIZE)
-                frames = self.renderer.render(self.scene, settings, RIGHT_SIZE)
-                for name, array in expected.items():
-                    np.testing.assert_array_equal(frames[name], array)
-            after, expected_after = (
-                each.apply(picture(9, 9), SHORT)["final"] for each in (self.renderer, new)
-            )
-            np.testing.assert_array_equal(after, expected_after)
+        for array, expected in zip(exact(self.renderer, self.scene), self.right, strict=True):
+            np.testing.assert_array_equal(array, expected)
+
+
+def exact(renderer: Renderer, scene: Scene) -> list[NDArray[Any]]:
+    rendered = (
+        renderer.render(scene, settings, RIGHT_SIZE)
+        for settings in (SHORT, Separable(bloom_size=(7, 5)))
+    )
+    arrays = [array for frames in rendered for array in frames.values()]
+    return [*arrays, renderer.apply(picture(9, 9), SHORT)["final"]]
+
+
+@pytest.fixture(scope="module")
+def right(scene: Scene) -> list[NDArray[Any]]:
+    with Renderer() as new:
+        return exact(new, scene)
 
 
 @pytest.fixture
 def case(
     new_renderer: Callable[[], Renderer],
-    large: NDArray[np.float32],
+    long: Long,
     alarm: Callable[[float], None],
     scene: Scene,
+    right: list[NDArray[Any]],
 ) -> Case:
-    return Case(new_renderer(), large, alarm, scene)
-
-
-def quarter(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    return image[: len(image) // 4, : len(image) // 4]
+    return Case(new_renderer(), long, alarm, scene, right)
 
 
 # Signals
@@ -129,24 +152,24 @@ def quarter(image: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @UNIX
 def test_a_long_frame_is_interrupted(case: Case) -> None:
-    case.renderer.apply(picture(8, 8), LONG)
+    case.renderer.apply(picture(8, 8), case.long.settings)
     for _ in range(2):
         with case.interrupted():
-            long_work(case.renderer, case.image)
+            case.long.run(case.renderer)
     case.check()
 
 
 @UNIX
 def test_an_interrupted_frame_keeps_its_arrays(case: Case) -> None:
     # The device writes into the array when no one else refers to it.
-    renderer, image = case.renderer, case.image
-    expected = renderer.apply(image, LONG, attachments="final")["final"]
-    renderer.apply(image[:8, :8], LONG)
+    renderer, image, settings = case.renderer, case.long.image, case.long.settings
+    expected = renderer.apply(image, settings, attachments="final")["final"]
+    renderer.apply(image[:8, :8], settings)
     with case.interrupted():
-        renderer.apply(image, LONG, attachments="final", out={"final": np.zeros_like(image)})
+        renderer.apply(image, settings, attachments="final", out={"final": np.zeros_like(image)})
     gc.collect()
     others = [np.zeros_like(image) for _ in range(4)]
-    again = renderer.apply(image, LONG, attachments="final")["final"]
+    again = renderer.apply(image, settings, attachments="final")["final"]
     np.testing.assert_array_equal(again, expected)
     assert not any(other.any() for other in others)
 
@@ -154,8 +177,8 @@ def test_an_interrupted_frame_keeps_its_arrays(case: Case) -> None:
 @UNIX
 def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
     """Regression: the array of an interrupted call was released with the renderer's lock held."""
-    renderer = case.renderer
-    renderer.apply(picture(8, 8), LONG)
+    renderer, image, settings = case.renderer, case.long.image, case.long.settings
+    renderer.apply(picture(8, 8), settings)
     finished: list[bool] = []
 
     def use_elsewhere() -> None:
@@ -164,10 +187,10 @@ def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
         thread.join(20.0)
         finished.append(not thread.is_alive())
 
-    array = np.zeros_like(case.image)
+    array = np.zeros_like(image)
     weakref.finalize(array, use_elsewhere)
     with case.interrupted():
-        renderer.apply(case.image, LONG, attachments="final", out={"final": array})
+        renderer.apply(image, settings, attachments="final", out={"final": array})
     del array
     gc.collect()
     assert not finished
@@ -178,14 +201,18 @@ def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
 
 @UNIX
 def test_a_sequence_is_interrupted(case: Case) -> None:
-    settings = [LONG.replace(exposure=step / 8, blur_strength=1 + step / 8) for step in range(3)]
+    settings = [
+        case.long.settings.replace(exposure=step / 8, blur_strength=1 + step / 8)
+        for step in range(3)
+    ]
     with case.interrupted(0.3):
-        for _ in case.renderer.apply_many(case.image, settings):
+        for _ in case.renderer.apply_many(case.long.image, settings):
             pass
     case.check()
 
 
-STRENGTHS = {"blur_strength": np.linspace(1, 2, 24).tolist()}
+POINTS = 12
+STRENGTHS = {"blur_strength": np.linspace(1, 2, POINTS).tolist()}
 
 
 class Stopper:
@@ -207,9 +234,13 @@ def test_a_grid_is_interrupted(case: Case) -> None:
     stopper = Stopper(case.alarm)
     with pytest.raises(Alarm):
         case.renderer.grid(
-            quarter(case.image), LONG, STRENGTHS, reduce={"mean": stopper}, progress=False
+            case.long.half,
+            case.long.settings,
+            STRENGTHS,
+            reduce={"mean": stopper},
+            progress=False,
         )
-    assert stopper.points < 24
+    assert stopper.points < POINTS
     case.check()
 
 
@@ -228,8 +259,8 @@ def test_an_interrupted_store_is_completed(
 
     def to_store(stopper: Stopper) -> xarray.Dataset:
         return vkbloom.grid_to_zarr(
-            quarter(case.image),
-            LONG,
+            case.long.half,
+            case.long.settings,
             STRENGTHS,
             tmp_path / "grid",
             chunks={"blur_strength": 2},
@@ -244,13 +275,17 @@ def test_an_interrupted_store_is_completed(
     # The caller does not wait for pending submissions after an interruption.
     assert threading.main_thread() not in closers
     done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
-    assert 2 <= done <= first.points < 24
+    assert 2 <= done <= first.points < POINTS
     got = to_store(second)
     assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape. A block may be complete without a mark.
-    assert second.points <= 24 - done + 1
+    assert second.points <= POINTS - done + 1
     right = case.renderer.grid(
-        quarter(case.image), LONG, STRENGTHS, reduce={"mean": Stopper(None)}, progress=False
+        case.long.half,
+        case.long.settings,
+        STRENGTHS,
+        reduce={"mean": Stopper(None)},
+        progress=False,
     )
     assert bool(got["done"].all())
     for name in ("final", "mean"):
@@ -260,7 +295,7 @@ def test_an_interrupted_store_is_completed(
 @UNIX
 def test_an_interrupted_close_leaves_the_renderer_open(case: Case) -> None:
     with case.interrupted():
-        long_work(case.renderer, case.image)
+        case.long.run(case.renderer)
     with case.interrupted():
         case.renderer.close()
     assert not case.renderer.closed
@@ -271,7 +306,7 @@ def test_an_interrupted_close_leaves_the_renderer_open(case: Case) -> None:
 
 @UNIX
 def test_waiting_for_another_thread_is_interrupted(case: Case) -> None:
-    thread = threading.Thread(target=long_work, args=(case.renderer, case.image))
+    thread = threading.Thread(target=case.long.run, args=(case.renderer,))
     thread.start()
     time.sleep(0.05)
     with case.interrupted():
@@ -298,7 +333,7 @@ def test_a_handler_that_uses_the_renderer_gets_an_error(case: Case) -> None:
     before = signal.signal(signal.SIGALRM, handler)
     signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
     while not caught:
-        long_work(case.renderer, case.image)
+        case.long.run(case.renderer)
     signal.signal(signal.SIGALRM, before)
     (message,) = set(caught)
     assert "at work in this thread" in message
@@ -317,17 +352,17 @@ def test_wrong_wait_limit_is_refused(monkeypatch: pytest.MonkeyPatch, text: str)
 
 @LEAVES_BEHIND
 def test_a_device_that_takes_too_long(
-    monkeypatch: pytest.MonkeyPatch, scene: Scene, large: NDArray[np.float32]
+    monkeypatch: pytest.MonkeyPatch, scene: Scene, long: Long
 ) -> None:
-    # On GPUs, transfers take a part of the 0.3 s of LONG. This has four times as many taps.
-    longer = LONG.replace(weights=gaussian_weights(10.0, 64))
+    # On GPUs, transfers take a part of the 0.3 s. This has four times as many taps.
+    longer = slow(2 * long.radius)
     monkeypatch.setenv("VKBLOOM_TIMEOUT", "0.1")
     renderer = Renderer(validation=True)
     # The limit is 0.1 s for each frame; a large image counts as several.
     with pytest.raises(
         DeviceLostError, match=r"not finished within 0\.\d s.*VKBLOOM_TIMEOUT"
     ) as hung:
-        renderer.apply(large, longer, attachments="final")
+        renderer.apply(long.image, longer, attachments="final")
     assert hung.value.vk_call == "vkWaitForFences"
     assert hung.value.vk_result == 2  # VK_TIMEOUT
     with pytest.raises(DeviceLostError):
@@ -346,10 +381,13 @@ import gc, signal, sys, threading, time
 import numpy as np
 import vkbloom
 
-side, pressing = int(sys.argv[1]), sys.argv[2] == "pressed"
+side, radius, pressing = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "pressed"
 image = np.random.default_rng(side).random((side, side, 4), dtype=np.float32)
 long = vkbloom.Separable(
-    weights=vkbloom.gaussian_weights(10.0, 32), blur_scale=0.5, direct=True, format="rgba32float"
+    weights=vkbloom.gaussian_weights(10.0, radius),
+    blur_scale=0.5,
+    direct=True,
+    format="rgba32float",
 )
 renderer = vkbloom.Renderer()
 source = vkbloom._core.image_source(image)
@@ -381,13 +419,11 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize(
     ("how", "limit", "words"), [("left", "0.1", "collected"), ("pressed", "300", "interrupted")]
 )
-def test_collecting_a_renderer_at_work(
-    large: NDArray[np.float32], how: str, limit: str, words: str
-) -> None:
+def test_collecting_a_renderer_at_work(long: Long, how: str, limit: str, words: str) -> None:
     """Regression: this wait had no limit, and Ctrl-C did not end it."""
-    # Twice the side: four times as long as half a second.
-    side = str(2 * len(large))
-    printed = output("-c", COLLECT, side, how, VKBLOOM_TIMEOUT=limit)
+    # Twice the side: four times as long.
+    sizes = (str(2 * len(long.image)), str(long.radius))
+    printed = output("-c", COLLECT, *sizes, how, VKBLOOM_TIMEOUT=limit)
     ending, seconds = printed.split()
     assert ending == words
     assert float(seconds) < 1.0

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from tests.core.builds import ROOT, compiler, require_header
+from tests.exhaustive import EXHAUSTIVE
 from tests.processes import python
 from vkbloom import AdapterInfo
 
@@ -97,27 +98,30 @@ def run(
     return python(*program, cwd=ROOT, **variables)
 
 
-@pytest.mark.parametrize(
-    ("lesser", "errors"),
-    [
-        # No more than every device has, of what limits say.
-        ("limits", too_large(4096)),
-        ("cpu,limits", too_large(4096)),
-        # An image may be no larger than the least of several limits; nothing is timed; no memory
-        # comes from the host.
-        ("wide,timestamps,import", too_large(5000)),
-        # The same; compute shaders cannot write images.
-        ("high,storage", too_large(5000)),
-        # Memory of the device's own, and the host's, which is coherent or cached; a buffer does not
-        # reach all rows of a large image.
-        ("memory,bands", {}),
-        ("cpu,memory", {}),
-        # Images of single floats are neither blended nor filtered; a buffer does not reach all rows
-        # of a large array, to which the last pass stores.
-        ("blend,filter,bands", {**LAYERS, **SKY}),
-        ("cpu,blend,filter", {**LAYERS, **SKY}),
-    ],
-)
+#: What is taken away, and the expected errors: of each once from a CPU or from a GPU.
+LESSER: list[tuple[str, dict[str, str]]] = [
+    # No more than every device has, of what limits say.
+    ("cpu,limits", too_large(4096)),
+    # An image may be no larger than the least of several limits; nothing is timed; no memory
+    # comes from the host.
+    ("wide,timestamps,import", too_large(5000)),
+    # The same; compute shaders cannot write images.
+    ("high,storage", too_large(5000)),
+    # Memory of the device's own, and the host's, which is coherent or cached; a buffer does not
+    # reach all rows of a large image.
+    ("cpu,memory,bands", {}),
+    # Images of single floats are neither blended nor filtered; a buffer does not reach all rows
+    # of a large array, to which the last pass stores.
+    ("blend,filter,bands", {**LAYERS, **SKY}),
+]
+OTHER: list[tuple[str, dict[str, str]]] = [
+    ("limits", too_large(4096)),
+    ("memory", {}),
+    ("cpu,blend,filter", {**LAYERS, **SKY}),
+]
+
+
+@pytest.mark.parametrize(("lesser", "errors"), LESSER + OTHER * EXHAUSTIVE)
 def test_lesser_devices(layer: Path, name: str, lesser: str, errors: dict[str, str]) -> None:
     done = run(layer, name, lesser)
     assert done.returncode == 0, done.stderr
@@ -131,7 +135,7 @@ def test_lesser_devices(layer: Path, name: str, lesser: str, errors: dict[str, s
 
 
 def test_no_depth(layer: Path, name: str) -> None:
-    done = run(layer, name, "depth")
+    done = run(layer, name, "depth", (*WORK, "whole", "sky"))
     assert done.returncode == 0, done.stderr
     wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
     assert wrong.keys() >= {"whole forward", "whole deferred", "sky uint8"}
@@ -143,7 +147,7 @@ def test_no_depth(layer: Path, name: str) -> None:
 
 
 def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
-    done = run(layer, name, "indices")
+    done = run(layer, name, "indices", (*WORK, "whole"))
     assert done.returncode == 0, done.stderr
     wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
     words = r"^ValueError: scene: index \d+ is beyond this adapter's limit of 9$"
@@ -158,6 +162,7 @@ TOO_LARGE = """
 import os
 import numpy as np
 import vkbloom
+from tests.exhaustive import EXHAUSTIVE
 from tests.processes import python
 
 size = (2000, 2000)
@@ -185,7 +190,7 @@ def test_a_convolution_of_too_much_memory(layer: Path, name: str) -> None:
 
 
 def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
-    done = run(layer, name, "storage", VKBLOOM_VARIANT="tiles")
+    done = run(layer, name, "storage", (*WORK, "whole"), VKBLOOM_VARIANT="tiles")
     assert "ValueError: VKBLOOM_VARIANT: tiles is not one of auto" in done.stderr
 
 
@@ -193,7 +198,7 @@ def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, n
 def test_a_variant_that_the_device_cannot_run_is_refused(
     layer: Path, name: str, variant: str
 ) -> None:
-    done = run(layer, name, "storage", VKBLOOM_VARIANT=variant)
+    done = run(layer, name, "storage", (*WORK, "whole"), VKBLOOM_VARIANT=variant)
     words = (
         f"ValueError: VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
     )
@@ -336,7 +341,7 @@ def test_waits_for_presentations_have_a_limit(
 
 
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
-    done = run(layer, name, "bindings")
+    done = run(layer, name, "bindings", (*WORK, "whole"))
     assert "ValidationError" in done.stderr
     assert "maxPerStageDescriptorStorageImages limit (0)" in done.stderr
 

@@ -173,7 +173,7 @@ def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
 
 def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
     # Under validation, which at the close of the renderer reports any object that is left.
-    for step in range(60):
+    for step in range(30):
         size = (1 + 7 * step % 50, 1 + 11 * step % 40)
         settings = Separable(
             bloom_size=(1 + step % 17, 1 + step % 23),
@@ -181,7 +181,7 @@ def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
             format="rgba16float" if step % 2 else "rgba8unorm",
             direct=step % 5 == 0,
         )
-        frames = renderer.render(scene, settings, size, time=step / 60)
+        frames = renderer.render(scene, settings, size, time=step / 30)
         assert frames["final"].shape == (size[1], size[0], 4)
 
 
@@ -279,10 +279,10 @@ def ticks_during(work: Callable[[], object]) -> int:
 
 
 def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
-    # 65 x 65 taps a pixel, filtered by hand: a second or so of one core. With the lock held the
+    # 25 x 25 taps a pixel, filtered by hand: half a second of one core. With the lock held the
     # other thread would come round once before the work takes it, and once after.
     settings = Separable(
-        weights=gaussian_weights(10.0, 32),
+        weights=gaussian_weights(10.0, 12),
         blur_scale=0.5,
         direct=True,
         format="rgba32float",

@@ -1,6 +1,6 @@
 """Eight threads and one renderer: rendering, reading, closing, in random order, exact pictures.
 
-Three rounds; with VKBLOOM_THREAD_SECONDS as many as begin in so many seconds.
+Two rounds; with VKBLOOM_THREAD_SECONDS as many as begin in so many seconds.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from tests.images import picture
 from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings
 
 THREADS = 8
-ROUNDS = 3
+ROUNDS = 2
 SECONDS = float(os.environ.get("VKBLOOM_THREAD_SECONDS", "0"))
-CALLS = 12  # of each thread in each round
+CALLS = 8  # of each thread in each round
 # The arrays of the last one are in the renderer's pages.
 SIZES = ((24, 16), (17, 31), (300, 290))
 Key = tuple[str, int, tuple[int, int]]

@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable
 
@@ -105,7 +106,7 @@ def same(frames: Any, expected: Any) -> None:
 def layouts(renderer: Any) -> None:
     rng = np.random.default_rng(1)
     methods = (Separable(threshold=0.3), Pyramid(levels=2), Separable(bloom_scale=0.5))
-    for step in range(60):
+    for step in range(60 if EXHAUSTIVE else 24):
         dtype = ("uint8", "float16", "float32")[step % 3]
         image = strided(rng, dtype)
         if dtype != "uint8" and step % 4 == 0:
@@ -141,7 +142,7 @@ def sequences(renderer: Any) -> None:
         renderer.apply_each([OnDevice(one) for one in images]), expected, strict=True
     ):
         same(frames, right)
-    settings = [Pyramid(levels=2, intensity=step / 4) for step in range(40)]
+    settings = [Pyramid(levels=2, intensity=step / 4) for step in range(12)]
     many = renderer.apply_many(OnDevice(images[0]), settings)
     for frames, one in zip(many, settings, strict=True):
         same(frames, renderer.apply(images[0], one))

@@ -11,6 +11,7 @@ import pytest
 from tests.core.builds import ROOT
 from tests.core.test_lesser_devices import layer, run  # noqa: F401  a fixture
 from tests.device import stand_in
+from tests.exhaustive import EXHAUSTIVE
 from tests.processes import python
 from vkbloom import AdapterInfo
 
@@ -20,7 +21,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return stand_in.build(tmp_path_factory.mktemp("cuda"))
 
 
-@pytest.mark.parametrize("validation", ["validated", "plain"])
+@pytest.mark.parametrize("validation", ["validated", *["plain"] * EXHAUSTIVE])
 def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None:
     """Layouts, batches, places, capsules, lifetimes and errors (device_work.py)."""
     done = python(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
+from rich.text import Text
 from tqdm import tqdm
 
 import vkbloom
@@ -106,13 +107,16 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]], shown: Sh
 
 
 def _table(entries: Iterable[Entry]) -> Table:
-    """Return a table of one line for each entry, which a narrow terminal cuts."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for title in ("name", "composite", "needs HDR", "what", "whose"):
-        table.add_column(title, no_wrap=True, overflow="ellipsis")
+    """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("name", "composite", "needs HDR"):
+        table.add_column(title, no_wrap=True)
+    # Columns that rich makes narrower, with texts that it does not wrap.
+    table.add_column("what")
+    table.add_column("whose")
     for one in entries:
-        needed = "yes" if one.needs_hdr else "no"
-        table.add_row(one.name, one.composite, needed, one.what, one.whose)
+        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (one.what, one.whose))
+        table.add_row(one.name, one.composite, "yes" if one.needs_hdr else "no", *texts)
     return table
 
 
