@@ -39,7 +39,7 @@ MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
 MISSING: Final = (
     "own methods need the compiler glslang (glslangValidator); on Debian or Ubuntu: apt install "
-    "glslang-tools"
+    "glslang-tools; or the wheel vkbloom-glslang (extra shaders)"
 )
 
 
