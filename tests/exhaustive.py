@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Iterable
-from typing import Final, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, TypeVar
 
 #: Whether this run takes everything.
 EXHAUSTIVE: Final = os.environ.get("VKBLOOM_EXHAUSTIVE", "0") not in ("", "0")
@@ -20,6 +21,22 @@ def some(cases: Iterable[T], count: int) -> list[T]:
     if count == 1:
         return every[:1]
     return [every[round(i * (len(every) - 1) / (count - 1))] for i in range(count)]
+
+
+def pairs(*lists: Sequence[Any]) -> list[tuple[Any, ...]]:
+    """Return cases with every value of the first two lists together, the others in turn; the whole
+    product in an exhaustive run."""
+    if EXHAUSTIVE:
+        return list(itertools.product(*lists))
+    first, second, *others = lists
+    cases = []
+    for (i, one), (j, two) in itertools.product(enumerate(first), enumerate(second)):
+        case, turn = [one, two], i + j
+        for other in others:
+            case.append(other[turn % len(other)])
+            turn //= len(other)
+        cases.append(tuple(case))
+    return cases
 
 
 def examples(usual: int) -> int:
