@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, Final, TypeVar
 
 #: Whether this run takes everything.
@@ -23,22 +23,23 @@ def some(cases: Iterable[T], count: int) -> list[T]:
     return [every[round(i * (len(every) - 1) / (count - 1))] for i in range(count)]
 
 
-def pairs(*lists: Sequence[Any]) -> list[tuple[Any, ...]]:
-    """Return cases with every value of the first two lists together, the others in turn; the whole
-    product in an exhaustive run."""
-    if EXHAUSTIVE:
-        return list(itertools.product(*lists))
-    first, second, *others = lists
-    cases = []
-    for (i, one), (j, two) in itertools.product(enumerate(first), enumerate(second)):
-        case, turn = [one, two], i + j
-        for other in others:
-            case.append(other[turn % len(other)])
-            turn //= len(other)
-        cases.append(tuple(case))
-    return cases
-
-
 def examples(usual: int) -> int:
     """Return the number of examples of a hypothesis test; eight times as many when exhaustive."""
     return 8 * usual if EXHAUSTIVE else usual
+
+
+def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Return the product of the columns; each row ends with one of `turns`.
+
+    Every two values of two columns, or of a column and of `turns`, meet in some row. The product
+    with all turns finds little more, and takes as many times as long as there are turns: an
+    exhaustive run has it.
+    """
+    last = list(turns)
+    if EXHAUSTIVE:
+        return list(itertools.product(*columns, last))
+    rows = itertools.product(*(enumerate(column) for column in columns))
+    return [
+        (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])
+        for row in rows
+    ]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.exhaustive import pairs
+from tests.exhaustive import by_turns
 from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable, Settings
 
@@ -46,12 +46,12 @@ def cpu(new_renderer: Callable[[], Renderer]) -> Renderer:
 
 
 @pytest.mark.parametrize(
-    ("dtype", "size", "channels", "settings"),
-    pairs(
-        ["uint8", "float16", "float32"],
-        [(640, 560), (1021, 352), (4, 16384)],
-        [3, 4],
+    ("settings", "channels", "size", "dtype"),
+    by_turns(
         SETTINGS,
+        [3, 4],
+        [(640, 560), (1021, 352), (4, 16384)],
+        turns=["uint8", "float16", "float32"],
     ),
 )
 def test_in_place_or_copied_is_the_same(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.exhaustive import pairs
+from tests.exhaustive import by_turns
 from tests.images import picture
 from vkbloom import Pyramid, Renderer, Scene, Separable, Settings, _core
 
@@ -32,7 +32,7 @@ def placed(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize(
     ("dtype", "size", "channels"),
-    pairs(DTYPES, [(513, 512), (1001, 333), (1, 16000), (16000, 21)], [3, 4]),
+    by_turns(DTYPES, [(513, 512), (1001, 333), (1, 16000), (16000, 21)], turns=[3, 4]),
 )
 def test_large_images_come_back_to_the_byte(
     renderer: Renderer, size: tuple[int, int], dtype: str, channels: int
@@ -49,7 +49,7 @@ def test_large_images_come_back_to_the_byte(
 # Multiples of the largest pixel, as new arrays have them; of smaller pixels; of nothing.
 @pytest.mark.parametrize(
     ("dtype", "start", "channels"),
-    pairs(DTYPES, [0, 16, 64, 4080, 8, 4, 12, 2, 1, 4095], [3, 4]),
+    by_turns(DTYPES, [0, 16, 64, 4080, 8, 4, 12, 2, 1, 4095], turns=[3, 4]),
 )
 def test_nothing_around_an_array_is_touched(
     renderer: Renderer, dtype: str, channels: int, start: int
@@ -77,7 +77,7 @@ def test_every_framebuffer_both_ways(renderer: Renderer, scene: Scene, shading: 
         np.testing.assert_array_equal(apart[name], array, err_msg=name)
 
 
-@pytest.mark.parametrize(("dtype", "width", "channels"), pairs(DTYPES, [960, 701], [3, 4]))
+@pytest.mark.parametrize(("dtype", "width", "channels"), by_turns(DTYPES, [960, 701], turns=[3, 4]))
 def test_a_final_that_comes_again_is_kept(
     new_renderer: Callable[[], Renderer], width: int, dtype: str, channels: int
 ) -> None:
@@ -102,10 +102,10 @@ def test_a_final_that_comes_again_is_kept(
 # size the rows are complete words but no complete blocks; in the third they are no complete words.
 @pytest.mark.parametrize(
     ("settings", "size", "dtype"),
-    pairs(
+    by_turns(
         [Separable(threshold=0.4), Pyramid(levels=3), Separable(threshold=0.4, blur_scale=2.0)],
         [(960, 600), (944, 403), (701, 603)],
-        DTYPES,
+        turns=DTYPES,
     ),
 )
 def test_three_channels_are_stored_without_alpha(
