@@ -362,7 +362,7 @@ def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
     general = vkb(name, "--help").output
     assert {"--adapter", "--threshold", "--quiet"} <= options_in(general)
     assert not {"--blur-scale", "--levels"} & options_in(general)
-    assert f"{name} --method NAME --help lists those of:" in general
+    assert f"{name} --method NAME --help lists the settings of:" in general
     forms = (("--method", "kino"), ("--method=Kino",), ("--preset", "kino"))
     for words in forms if name == "apply" else forms[:1]:
         text = vkb(name, *words, "--help").output

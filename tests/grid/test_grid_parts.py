@@ -79,10 +79,10 @@ def test_parts_are_disjoint_and_complete() -> None:
 
 def test_chunks_suffice_for_all_parts(tmp_path: Path) -> None:
     store = tmp_path / "a.zarr"
-    for number in range(15):
-        make(store, part=(number, 16))
-    # 0 is the same as 16.
-    assert check_grid(store).missing_parts == ("15/16",)
+    for number in range(7):
+        make(store, part=(number, 8))
+    # 0 is the same as 8.
+    assert check_grid(store).missing_parts == ("7/8",)
     found = make(store)
     assert check_grid(store).complete
     make(tmp_path / "whole.zarr")

@@ -19,9 +19,11 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.exhaustive import by_turns
 from tests.framebuffers import noise
+from tests.grid import grid_to_kill
 from tests.grid.stores import contents
-from tests.processes import output, python
+from tests.processes import python
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, psf, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
@@ -290,10 +292,10 @@ class TestResumed:
         assert contents(store) == contents(undisturbed)
 
     def test_killed_process_is_resumed_with_the_same_bytes(self, tmp_path: Path) -> None:
-        script = Path(__file__).with_name("grid_to_kill.py")
+        script = grid_to_kill.__file__
         whole, store = tmp_path / "whole.zarr", tmp_path / "killed.zarr"
         for seconds in (0.0, 0.2):
-            process = subprocess.Popen([sys.executable, str(script), str(store)])
+            process = subprocess.Popen([sys.executable, script, str(store)])
             try:
                 # From the first chunk on, at different places.
                 while not any((store / "final").glob("c.*")) and process.poll() is None:
@@ -304,8 +306,8 @@ class TestResumed:
                 process.wait()
             if (store / "zarr.json").exists():
                 assert int(xr.open_zarr(store)["done"].sum()) < 1000
-        output(script, store)
-        output(script, whole)
+        for each in (store, whole):
+            grid_to_kill.fill(each)
         assert contents(store) == contents(whole)
 
     def test_resume_false_refuses_an_existing_store(self, copy: Path) -> None:
@@ -497,7 +499,7 @@ def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps(metadata))
 
 
-CHUNK_OF_FINAL = "final/c.0.1.1.0.0.0"
+CHUNKS_OF_KINDS = ["final/c.0.1.1.0.0.0", "done/c.0.0.0", "channel/c.0", "exposure/c.0"]
 #: A Zstandard frame of 19 bytes that declares 64 GiB, and one of 8 KB that contains 256 MiB.
 DECLARES_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
 ONES = ((1 << 17 << 3) | 2).to_bytes(3, "little") + b"\1"
@@ -508,9 +510,8 @@ class TestHostile:
     """Stores that fuzzing found, or would."""
 
     @pytest.mark.parametrize(
-        "frame", [DECLARES_TOO_MUCH, CONTAINS_TOO_MUCH], ids=["declares", "contains"]
+        ("key", "frame"), by_turns(CHUNKS_OF_KINDS, turns=[DECLARES_TOO_MUCH, CONTAINS_TOO_MUCH])
     )
-    @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
     def test_chunk_with_wrong_checksum_is_not_decompressed(
         self, copy: Path, undisturbed: Path, key: str, frame: bytes
     ) -> None:
@@ -526,8 +527,7 @@ class TestHostile:
         assert most < 64 << 20
         assert contents(copy) == contents(undisturbed)
 
-    @pytest.mark.parametrize("size", [0, 100, 100_000])
-    @pytest.mark.parametrize("key", [CHUNK_OF_FINAL, "done/c.0.0.0", "channel/c.0", "exposure/c.0"])
+    @pytest.mark.parametrize(("key", "size"), by_turns(CHUNKS_OF_KINDS, turns=[0, 100, 100_000]))
     def test_chunk_of_another_size_is_damaged(
         self, copy: Path, undisturbed: Path, key: str, size: int
     ) -> None:
@@ -629,20 +629,22 @@ class TestHostile:
         told = ["a: nested lists in the store, 1 requested"]
         assert differences({"a": deep}, {"a": 1}) == told
 
-    @pytest.mark.parametrize("name", ["final", "done", "channel"])
     @pytest.mark.parametrize(
-        "change",
-        [
-            {"shape": [10**9]},
-            {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**9]}}},
-            {"codecs": [{"name": "bytes"}]},
-            {"data_type": "int8"},
-            {"zarr_format": 3.0},
-            {"attributes": 3},
-            {"attributes": {"grid": {}}},
-            {"attributes": {"grid": [[]]}},
-            {"dimension_names": [3]},
-        ],
+        ("change", "name"),
+        by_turns(
+            [
+                {"shape": [10**9]},
+                {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**9]}}},
+                {"codecs": [{"name": "bytes"}]},
+                {"data_type": "int8"},
+                {"zarr_format": 3.0},
+                {"attributes": 3},
+                {"attributes": {"grid": {}}},
+                {"attributes": {"grid": [[]]}},
+                {"dimension_names": [3]},
+            ],
+            turns=["final", "done", "channel"],
+        ),
         ids=str,
     )
     def test_changed_array_metadata_are_reported_and_mended(

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable
-from typing import Any
-
-from tests.exhaustive import EXHAUSTIVE
 from vkbloom import DualKawase, Pyramid, Separable, Settings, gaussian_weights, presets
 
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
@@ -59,20 +54,3 @@ def presets_of_low_levels(height: int) -> dict[str, Settings]:
         name: each.replace(**{fields[name]: height}) if name in fields else each
         for name, each in presets.items()
     }
-
-
-def by_turns(*columns: Iterable[Any], turns: Iterable[Any]) -> list[tuple[Any, ...]]:
-    """Return the product of the columns; each row ends with one of `turns`.
-
-    Every two values of two columns, or of a column and of `turns`, meet in some row. The product
-    with all turns finds little more, and takes as many times as long as there are turns: an
-    exhaustive run has it.
-    """
-    last = list(turns)
-    if EXHAUSTIVE:
-        return list(itertools.product(*columns, last))
-    rows = itertools.product(*(enumerate(column) for column in columns))
-    return [
-        (*(value for _, value in row), last[sum(index for index, _ in row) % len(last)])
-        for row in rows
-    ]

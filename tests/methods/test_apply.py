@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.exhaustive import EXHAUSTIVE
+from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS, by_turns, presets_of_low_levels
+from tests.methods.cases import DTYPES, METHODS, presets_of_low_levels
 from tests.tolerance import (
     FORMATS,
     assert_close,

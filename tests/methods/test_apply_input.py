@@ -13,10 +13,10 @@ from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import some
+from tests.exhaustive import by_turns, some
 from tests.framebuffers import assert_same
 from tests.images import picture
-from tests.methods.cases import DTYPES, by_turns
+from tests.methods.cases import DTYPES
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import (
     DualKawase,

@@ -11,8 +11,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+from tests.exhaustive import by_turns
 from tests.images import hdr_picture, picture
-from tests.methods.cases import by_turns
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     BevyBloom,

@@ -10,7 +10,7 @@ import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
-from tests.methods.cases import by_turns
+from tests.exhaustive import by_turns
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
 

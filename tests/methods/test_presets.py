@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from tests.methods.cases import by_turns, presets_of_low_levels
+from tests.exhaustive import by_turns
+from tests.methods.cases import presets_of_low_levels
 from tests.tolerance import real
 from vkbloom import (
     BevyBloom,

@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-from tests.methods.cases import DTYPES, by_turns, presets_of_low_levels
+from tests.exhaustive import by_turns
+from tests.methods.cases import DTYPES, presets_of_low_levels
 from vkbloom import (
     DualKawase,
     GodotBloom,

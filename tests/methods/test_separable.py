@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.methods.cases import by_turns
+from tests.exhaustive import by_turns
 from tests.screens import noise, screen
 from tests.tolerance import colours
 from vkbloom import Frames, Renderer, Scene, Separable, gaussian_weights, reference

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.exhaustive import by_turns
 from tests.framebuffers import assert_same
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS, by_turns
+from tests.methods.cases import DTYPES, METHODS
 from tests.tolerance import assert_matches_reference, real, tolerance
 from vkbloom import (
     BevyBloom,

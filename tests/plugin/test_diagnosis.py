@@ -260,7 +260,7 @@ def pairs() -> list[tuple[str, Image, Image]]:
     found = []
     for seed in range(20):
         generator = np.random.default_rng(seed)
-        shape = (int(generator.integers(24, 64)), int(generator.integers(24, 64)), 3)
+        shape = (int(generator.integers(24, 40)), int(generator.integers(24, 40)), 3)
         noise = generator.random(shape) ** 4
         other = generator.random(shape) ** 4
         smooth = reference.blur(noise, Separable(blur_strength=1.0))

@@ -1,12 +1,12 @@
-"""Fuzz a reader: ``python tools/fuzz/run.py TARGET [--seconds N] [--corpus FOLDER]``.
+"""Fuzz readers: ``python tools/fuzz/run.py TARGET... [--seconds N] [--corpus FOLDER]``.
 
 The run starts from the target's valid files and from ``corpus/TARGET.zip``, the inputs that earlier
 runs saved. New inputs of this run are saved in FOLDER, if it is given.
 
-With atheris the inputs are guided by the coverage of the package's Python code. Without it, or with
---plain, they are mutations of valid files. The run ends with a finding: an exception that the
-reader does not document, or more than MIB of additional memory. The input is then written to the
-folder as ``finding-TARGET``.
+With atheris the inputs are guided by the coverage of the package's Python code, of one target.
+Without it, or with --plain, they are mutations of valid files. The run ends with a finding: an
+exception that the reader does not document, or more than MIB of additional memory. The input is
+then written to the folder as ``finding-TARGET``.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def kept(target: str) -> list[bytes]:
 def main() -> int:
     """Run one target; return 1 if there is a finding."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("target")
+    parser.add_argument("targets", nargs="+", metavar="TARGET")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--memory", type=int, default=1024)
     parser.add_argument("--seed", type=int, default=1)
@@ -57,38 +57,41 @@ def main() -> int:
         import targets
     import mutate
 
-    target = targets.TARGETS[options.target]
-    seeds = target.seeds() + kept(options.target)
-    count = 0
+    if not options.plain and len(options.targets) > 1:
+        parser.error("TARGET: atheris takes one; use --plain for several")
 
-    def one(data: bytes) -> None:
-        nonlocal count
-        count += 1
+    def run(name: str, data: bytes) -> None:
         try:
-            targets.run(target, data)
+            targets.run(targets.TARGETS[name], data)
         except BaseException:
-            Path(f"finding-{options.target}").write_bytes(data)
+            Path(f"finding-{name}").write_bytes(data)
             raise
 
     # Readers load libraries when they read the first file.
-    for seed in seeds:
-        one(seed)
+    inputs = {name: targets.TARGETS[name].seeds() + kept(name) for name in options.targets}
+    for name, seeds in inputs.items():
+        for seed in seeds:
+            run(name, seed)
     limit_memory(options.memory << 20)
-    end = time.monotonic() + options.seconds
-    if options.plain:
+    for name, seeds in inputs.items() if options.plain else ():
+        end = time.monotonic() + options.seconds
+        count = len(seeds)
         for data in mutate.inputs(seeds, options.seed):
-            one(data)
+            run(name, data)
+            count += 1
             if time.monotonic() > end:
                 break
-        print(f"{options.target}: {count} executions in {options.seconds:.0f} s, nothing found")
+        print(f"{name}: {count} executions in {options.seconds:g} s, nothing found")
+    if options.plain:
         return 0
+    ((name, seeds),) = inputs.items()
     corpus = options.corpus or targets.FOLDER / "corpus"
     corpus.mkdir(exist_ok=True)
     for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
     arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
     arguments += ["-rss_limit_mb=0", "-max_len=65536", "-len_control=0", "-keep_seed=1"]
-    atheris.Setup([sys.argv[0], *arguments, str(corpus)], one)
+    atheris.Setup([sys.argv[0], *arguments, str(corpus)], lambda data: run(name, data))
     atheris.Fuzz()
     return 0
 

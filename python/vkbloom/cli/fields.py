@@ -338,7 +338,9 @@ class Command(click.Command):
         if shared:
             with formatter.section("Settings of every method"):
                 formatter.write_dl(_records(ctx, shared))
-            with formatter.section(f"{ctx.command_path} --method NAME --help lists those of"):
+        if any(one.type.name == "method" for one in general):
+            call = f"{ctx.command_path} --method NAME --help"
+            with formatter.section(f"{call} lists the settings of"):
                 formatter.write_text(", ".join(METHODS))
 
 

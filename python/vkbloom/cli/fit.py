@@ -9,7 +9,7 @@ import click
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.fields import NameOf
+from vkbloom.cli.fields import Command, NameOf
 from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.search_options import search_options
@@ -19,7 +19,7 @@ from vkbloom.interruptible import opened_renderer
 from vkbloom.registry import METHODS
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("image", metavar="IMAGE", type=click.Path())
 @click.argument("target", metavar="TARGET", type=click.Path())
 @click.option(
