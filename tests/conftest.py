@@ -16,8 +16,9 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import vkbloom
 from tests.time_budget import TimeBudget
-from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
+from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters, interruptible
 from vkbloom.registry import METHODS
 
 #: The adapter of the tests. For a GPU, set VKBLOOM_TEST_ADAPTER=hardware.
@@ -122,6 +123,37 @@ def new_renderer() -> Iterator[Callable[[], Renderer]]:
     yield open_one
     for one in opened:
         one.close()
+
+
+class Kept(Renderer):
+    """Stays open for the next command, which does not compile the same shaders again."""
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def kept(environment: None) -> Iterator[dict[object, Kept]]:
+    """Open renderers, by what decides how they are opened."""
+    opened: dict[object, Kept] = {}
+    yield opened
+    for one in opened.values():
+        Renderer.close(one)
+
+
+@pytest.fixture
+def kept_renderers(kept: dict[object, Kept], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands of a module's tests share their renderers."""
+
+    def opened(adapter: str = "auto", *, validation: bool = False) -> Renderer:
+        variables = sorted(item for item in os.environ.items() if item[0].startswith("V"))
+        key = (adapter, validation, *variables)
+        if key not in kept or kept[key].closed:
+            kept[key] = Kept(adapter, validation=validation)
+        return kept[key]
+
+    monkeypatch.setattr(vkbloom, "Renderer", opened)
+    monkeypatch.setattr(interruptible, "Renderer", opened)
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,9 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.exhaustive import some
 from tests.processes import python
+from vkbloom import renderer
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -22,6 +24,8 @@ from vkbloom.methods.mip_chain import Pyramid
 from vkbloom.methods.separable import Separable
 
 oiio = pytest.importorskip("OpenImageIO")
+
+pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 NATURAL = vkbloom.presets["bevy_natural"]
 
@@ -427,7 +431,7 @@ class TestErrors:
         assert result.exit_code == 1
         assert f"vkbloom.write('image.exr', numpy.load('{file}'))" in result.stderr
 
-    @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "tif"])
+    @pytest.mark.parametrize("suffix", some(["png", "exr", "tif", "jpg"], 2))
     def test_libraries_are_silenced(self, tmp_path: Path, suffix: str) -> None:
         path = tmp_path / f"a.{suffix}"
         values = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
@@ -456,7 +460,7 @@ class TestErrors:
 
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
         before = path.read_bytes()
-        monkeypatch.setattr(vkbloom.Renderer, "apply_each", fail)
+        monkeypatch.setattr(renderer.Renderer, "apply_each", fail)
         result = run(path, path, "--overwrite")
         assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
         assert path.read_bytes() == before

@@ -15,6 +15,8 @@ import vkbloom
 from tests.images import picture
 from vkbloom.cli.program import program
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 xr = pytest.importorskip("xarray")
 

@@ -27,6 +27,8 @@ from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
 from vkbloom.io.images import Picture
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 xr = pytest.importorskip("xarray")
 

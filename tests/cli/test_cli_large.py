@@ -17,6 +17,8 @@ from vkbloom.io import rows
 
 oiio = pytest.importorskip("OpenImageIO")
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 
 def run(*words: object) -> Result:
     return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])

@@ -19,6 +19,8 @@ from vkbloom.io.expansion import KNEE, expanded
 from vkbloom.io.image_reading import load
 from vkbloom.io.srgb import decode_srgb
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 data = pytest.importorskip("skimage.data")
 

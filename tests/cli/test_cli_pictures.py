@@ -16,6 +16,8 @@ from tests.io.test_array_files import halves, store_exr
 from tests.processes import python
 from vkbloom.cli.program import program
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 
 IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)

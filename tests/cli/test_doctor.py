@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import vkbloom
 from tests.processes import python
 from vkbloom import doctor
+from vkbloom.cli.program import program
 from vkbloom.doctor import caches, child, drivers, installation, trial
 from vkbloom.doctor.finding import Finding
 from vkbloom.io import pipeline_cache
@@ -39,10 +41,10 @@ def renders_of(findings: Iterable[Finding]) -> list[Finding]:
 
 def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
     """Run ``vkbloom doctor --json``; return its status, its answer and its findings."""
-    ended = python("-m", "vkbloom.cli", "doctor", "--json", **changes)
+    ended = CliRunner().invoke(program, ["doctor", "--json"], env=changes)
     assert ended.stderr == ""
     answer = json.loads(ended.stdout)
-    return ended.returncode, answer, [Finding(**entry) for entry in answer["findings"]]
+    return ended.exit_code, answer, [Finding(**entry) for entry in answer["findings"]]
 
 
 def manifests() -> list[Finding]:
@@ -98,8 +100,8 @@ def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
 
 
 def test_the_table_has_a_line_for_each_finding() -> None:
-    ended = python("-m", "vkbloom.cli", "doctor", VKBLOOM_ADAPTER="nonsense")
-    assert (ended.returncode, ended.stderr) == (0, "")
+    ended = CliRunner().invoke(program, ["doctor"], env={"VKBLOOM_ADAPTER": "nonsense"})
+    assert (ended.exit_code, ended.stderr) == (0, "")
     lines = ended.stdout.splitlines()
     chosen = next(index for index, line in enumerate(lines) if "chosen adapter" in line)
     assert lines[chosen].startswith("problem  ")

@@ -51,7 +51,7 @@ SEQUENCE: list[Settings] = [
 # The same frames
 
 
-@pytest.mark.parametrize("attachments", ["all", ("bloom", "final"), "final", ()], ids=str)
+@pytest.mark.parametrize("attachments", ["all", "final"], ids=str)
 def test_images_one_by_one_and_many(
     new_renderer: Callable[[], Renderer], attachments: str | Sequence[str]
 ) -> None:

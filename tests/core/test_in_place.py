@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.exhaustive import by_turns
 from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable, Settings
 
@@ -44,10 +45,15 @@ def cpu(new_renderer: Callable[[], Renderer]) -> Renderer:
     return renderer
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=["separable", "pyramid"])
-@pytest.mark.parametrize("channels", [3, 4])
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-@pytest.mark.parametrize("size", [(640, 560), (1021, 352), (4, 16384)], ids=str)
+@pytest.mark.parametrize(
+    ("settings", "channels", "size", "dtype"),
+    by_turns(
+        SETTINGS,
+        [3, 4],
+        [(640, 560), (1021, 352), (4, 16384)],
+        turns=["uint8", "float16", "float32"],
+    ),
+)
 def test_in_place_or_copied_is_the_same(
     renderer: Renderer, size: tuple[int, int], dtype: str, channels: int, settings: Settings
 ) -> None:

@@ -162,7 +162,6 @@ TOO_LARGE = """
 import os
 import numpy as np
 import vkbloom
-from tests.exhaustive import EXHAUSTIVE
 from tests.processes import python
 
 size = (2000, 2000)

@@ -132,7 +132,7 @@ def build(mutation: Mutation, whole: Path, tree: Path) -> Path:
     return tree / "python"
 
 
-@pytest.mark.parametrize("name", some(MUTATIONS, 2))
+@pytest.mark.parametrize("name", some(MUTATIONS, 1))
 def test_is_found_and_named(
     name: str,
     whole: Path,

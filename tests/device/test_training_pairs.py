@@ -18,6 +18,8 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.processes import python
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 PATH = ROOT / "examples" / "training_pairs.py"
 
 

@@ -84,7 +84,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 # And so is its warning if its usual port is in use.
 @pytest.mark.filterwarnings("ignore:Port:UserWarning")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_code_of_a_page(page: Path, folder: Path) -> None:
+def test_code_of_a_page(page: Path, folder: Path, kept_renderers: None) -> None:
     """Run a page's code from top to bottom, as one program."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text()
@@ -95,7 +95,7 @@ def test_code_of_a_page(page: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("words", list(commands()))
-def test_commands_of_pages(words: list[str], folder: Path) -> None:
+def test_commands_of_pages(words: list[str], folder: Path, kept_renderers: None) -> None:
     if words[0] in ENDLESS or "--scheduler" in words or "--from" in words:
         command = program.get_command(None, words[0])  # type: ignore[arg-type]
         assert command is not None
