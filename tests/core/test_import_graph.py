@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,10 +28,16 @@ def module_files(package: Path) -> dict[str, Path]:
     return found
 
 
+@functools.cache
+def nodes(text: str) -> list[ast.AST]:
+    """Return all nodes of a module's tree, which several tests read."""
+    return list(ast.walk(ast.parse(text)))
+
+
 def from_imports(name: str, file: Path) -> Iterator[tuple[str, ast.alias]]:
     """Yield the module and the alias of each ``from`` import, also in functions and for types."""
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes(file.read_text(encoding="utf-8")):
         if isinstance(node, ast.ImportFrom):
             above = package.split(".")[: len(package.split(".")) + 1 - node.level]
             base = ".".join([*(above if node.level else []), *filter(None, [node.module])])
@@ -44,7 +51,7 @@ def imported(name: str, file: Path, modules: dict[str, Path]) -> set[str]:
         f"{base}.{alias.name}" if f"{base}.{alias.name}" in modules else base
         for base, alias in from_imports(name, file)
     }
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes(file.read_text(encoding="utf-8")):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
     return (found & modules.keys()) - {name}
@@ -61,7 +68,7 @@ def private_uses(name: str, file: Path) -> Iterator[str]:
         is_private = alias.name.startswith("_") and not alias.name.endswith("__")
         if is_private and alias.name not in PUBLIC:
             yield f"{name}: from {base} import {alias.name}"
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in nodes(file.read_text(encoding="utf-8")):
         if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
             owner = ast.unparse(node.value)
             is_public = node.attr.endswith("__") or node.attr in PUBLIC
@@ -94,7 +101,7 @@ def test_core_of_a_renderer_is_read_in_the_seam_only() -> None:
     reading = {
         name
         for name, file in module_files(PACKAGE).items()
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        for node in nodes(file.read_text(encoding="utf-8"))
         if isinstance(node, ast.Attribute)
         and node.attr == "_core"
         and ast.unparse(node.value) not in ("self", "vkbloom")
@@ -153,7 +160,7 @@ def test_functions_have_at_most_60_lines_of_code() -> None:
     long = []
     for name, file in module_files(PACKAGE).items():
         text = file.read_text(encoding="utf-8")
-        for node in ast.walk(ast.parse(text)):
+        for node in nodes(text):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 count = code_lines(node, text.splitlines())
                 long += [f"{name}.{node.name}: {count} lines"] if count > 60 else []

@@ -68,6 +68,8 @@ def test_examples_of_a_module(name: str, request: pytest.FixtureRequest) -> None
     tests = examples_in(module)
     if any('"software"' in one.source for test in tests for one in test.examples):
         request.getfixturevalue("software")  # skips where there is none
+    if name not in ("vkbloom.renderer", "vkbloom.surface"):  # they show what closing does
+        request.getfixturevalue("kept_renderers")
     for test in tests:
         runner.run(test, out=report.append)
     assert runner.failures == 0, "".join(report)

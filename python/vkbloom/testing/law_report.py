@@ -111,7 +111,9 @@ class LawReport:
     Examples
     --------
     >>> from vkbloom import reference, testing
-    >>> found = testing.report(lambda image: reference.blur(image, vkbloom.Separable()))
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.Separable())
+    >>> found = testing.report(bloom, size=(64, 64))
     >>> [row.name for row in found.rows if not row.held]
     ['bounded_fireflies', 'additive']
     >>> found.assert_held("superposition", "gain", "symmetric")
