@@ -184,8 +184,8 @@ def test_laws_and_figures(renderer: Renderer, kind: Any) -> None:
 def test_the_plugin_compares_all_framebuffers(
     renderer: Renderer, kind: Any, tmp_path: Path
 ) -> None:
-    def regression(**modes: bool) -> testing.FrameRegression:
-        mode = Mode(**modes)
+    def regression(*, update: bool = False) -> testing.FrameRegression:
+        mode = Mode(update=update)
         return testing.FrameRegression(
             folder=tmp_path, test="test_own", name="own", mode=mode, records=[]
         )
