@@ -4,7 +4,7 @@
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
-# make wheels: builds the wheels of vkbloom and of its driver into dist/ (docs/releasing.md); as root.
+# make wheels: builds the wheels of vkbloom, its driver and its compiler into dist/ (docs/releasing.md); as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,

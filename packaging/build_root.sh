@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the root that the wheels are built in: Debian 11 with glibc 2.31, GCC 10 and a static
-# LLVM 16; Python 3.11 from Debian 12's source; Mesa's source as Debian 13 has it; volk and the
-# Vulkan headers of Debian 12. As root, with mmdebstrap.
+# LLVM 16; Python 3.11 from Debian 12's source; glslang's source as Debian 12 has it, Mesa's as
+# Debian 13 has it; volk and the Vulkan headers of Debian 12. As root, with mmdebstrap.
 # DEBIAN_MIRROR, DEBIAN_SECURITY_MIRROR: by default what this system's apt uses.
 # Argument: the folder to make.
 set -eu

@@ -12,8 +12,11 @@ source_version() {
 }
 apt-get source -qq --download-only "mesa=$(source_version mesa "$MESA")"
 apt-get source -qq --download-only "python3.11=$(source_version python3.11 "$PYTHON")"
+apt-get source -qq --download-only "glslang=$(source_version glslang "$GLSLANG")"
 apt-get download -qq libvulkan-volk-dev/bookworm libvulkan-dev/bookworm
 echo "$MESA_SHA256  mesa_$MESA.orig.tar.xz" | sha256sum --check --quiet
+echo "$GLSLANG_SHA256  glslang_$GLSLANG.orig.tar.gz" | sha256sum --check --quiet
+tar -xf "glslang_$GLSLANG.orig.tar.gz" -C /build
 tar -xf "mesa_$MESA.orig.tar.xz" -C /build
 tar -xf "python3.11_$PYTHON".orig.tar.?z -C /build
 for package in *.deb; do

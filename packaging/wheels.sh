@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds the wheels of vkbloom and vkbloom-lavapipe into dist/, as root on a system with mmdebstrap.
+# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang into dist/, as root on a system with mmdebstrap.
 # The root that they are built in is made once, in build/wheels; so is Mesa.
 set -eu
 cd "$(dirname "$0")/.."
@@ -24,9 +24,9 @@ chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
 rm -rf "$root/build/vkbloom" "$root/build/wheels"
 mkdir -p "$root/build/vkbloom" "$root/build/wheels" dist
 git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$root/build/vkbloom"
-for step in core.sh lavapipe/build.sh; do
+for step in core.sh lavapipe/build.sh glslang/build.sh; do
     folder=/build/vkbloom
-    test "$step" = core.sh || folder=$folder/packaging/lavapipe
+    test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
     chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" \
         sh "/build/vkbloom/packaging/$step" "$folder" /build/wheels
 done
@@ -39,5 +39,6 @@ check_glibc() {
 }
 check_glibc "$CORE_GLIBC" '/build/vkbloom/build/lib*/vkbloom/_core.abi3.so'
 check_glibc "$DRIVER_GLIBC" /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so
+check_glibc "$DRIVER_GLIBC" /build/vkbloom-glslang/vkbloom_glslang/glslangValidator
 cp "$root"/build/wheels/*.whl dist/
 ls -l dist

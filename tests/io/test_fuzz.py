@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from tests.processes import output
 from vkbloom.scene import skybox
 
 RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
+GLSLANG = any(map(shutil.which, ("glslangValidator", "glslang")))
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space of Linux")
 
 
@@ -22,6 +24,8 @@ def test_a_short_run(tmp_path: Path) -> None:
     # In one process, since most of a short run would be imports.
     names = ["gltf", "ktx", "faces", "equirectangular", "pipelines"]
     names += ["zarr", "images", "toml", "yaml"]
+    # Of own methods tests/own tests mutations without the compiler, which takes most of the time.
+    names += ["own"] if EXHAUSTIVE and GLSLANG else []
     seconds = "2" if EXHAUSTIVE else "0.5"
     printed = output(RUN, *names, "--plain", "--seconds", seconds, cwd=tmp_path)
     assert printed.count("nothing found") == len(names)

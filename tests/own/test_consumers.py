@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import Renderer, Settings, load_method, psf, reference, testing
+from vkbloom.cli.live import Live
 from vkbloom.cli.program import program
 from vkbloom.explorer.controls import as_code
 from vkbloom.own.compiler import find_compiler
 from vkbloom.registry import METHODS
+from vkbloom.testing.regression import Mode
 
 xarray = pytest.importorskip("xarray")
 
@@ -179,6 +181,30 @@ def test_laws_and_figures(renderer: Renderer, kind: Any) -> None:
     assert testing.diagnose(bloom(photo()), bloom(2 * photo())).cause == "gain"
 
 
+def test_the_plugin_compares_all_framebuffers(
+    renderer: Renderer, kind: Any, tmp_path: Path
+) -> None:
+    def regression(*, update: bool = False) -> testing.FrameRegression:
+        mode = Mode(update=update)
+        return testing.FrameRegression(
+            folder=tmp_path, test="test_own", name="own", mode=mode, records=[]
+        )
+
+    regression(update=True).check(renderer.apply(photo(), kind()))
+    regression().check(renderer.apply(photo(), kind()))
+    with pytest.raises(AssertionError, match="rows"):
+        regression().check(renderer.apply(photo(), kind(spread=2.5)))
+
+
+def test_the_keys_of_the_window(renderer: Renderer, kind: Any) -> None:
+    live = Live(kind(), photo())
+    names = list(renderer.plan(photo(), live.settings).outputs)
+    for key in ("right", "2"):
+        live.press(key, names)
+    assert (live.settings, live.framebuffer) == (kind(intensity=1.1), "rows")
+    assert live.title(0.02).startswith("rows: of_consumers | ")
+
+
 def test_stored_frames(renderer: Renderer, kind: Any, tmp_path: Path) -> None:
     frames = renderer.apply(photo(), kind(spread=3))
     frames.save(path := tmp_path / "frames.exr")
@@ -219,6 +245,7 @@ def test_the_reference_needs_a_twin(kind: Any) -> None:
     [
         (["render", "--size", "32x24", "-o", "{out}.exr"], "{out}.exr"),
         (["apply", "{image}", "{out}.exr"], "{out}.exr"),
+        (["warm", "--type", "float16", "--size", "40x32"], "{image}"),
         (["grid", "{image}", "--axis", "spread=1:3:2", "--out", "{out}.zarr"], "{out}.zarr"),
     ],
 )
@@ -228,7 +255,8 @@ def test_commands(tmp_path: Path, words: list[str], result: str) -> None:
     vkbloom.write(places["image"], photo())
     words = [word.format(**places) for word in words]
     method = ["--method", str(tmp_path / "soft.hook"), "--spread", "2.5", "--shape", "box"]
-    done = CliRunner().invoke(program, [*words, *(method[:2] if words[0] == "grid" else method)])
+    given = method[:2] if words[0] in ("grid", "warm") else method
+    done = CliRunner().invoke(program, [*words, *given])
     assert done.exit_code == 0, done.output
     assert Path(result.format(**places)).exists()
     METHODS.unregister("soft")

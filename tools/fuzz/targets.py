@@ -1,7 +1,7 @@
 """The readers of the package, as functions of bytes; each may raise only documented exceptions.
 
 A target writes the bytes to the file of its reader and calls it. Files that do not load may raise
-OSError and ValueError; any other exception is a finding.
+OSError and ValueError, own methods also ShaderError; any other exception is a finding.
 """
 
 from __future__ import annotations
@@ -10,23 +10,25 @@ import base64
 import contextlib
 import functools
 import json
+import os
 import struct
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import OpenImageIO
 import options
 import stores
 
+import vkbloom
 from vkbloom.io import pipeline_cache
 from vkbloom.scene import ktx, skybox
 from vkbloom.scene.gltf import load_mesh
 
 FOLDER = Path(tempfile.mkdtemp(prefix="vkbloom-fuzz-"))
-PROMISED = (OSError, ValueError)
+PROMISED = (OSError, ValueError, vkbloom.ShaderError)
 DRIVER = bytes(range(16))
 
 
@@ -173,6 +175,69 @@ def _pipeline_seeds() -> list[bytes]:
     return [pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, kept) + kept]
 
 
+#: Blocks that the examples do not have.
+_BLOCKS = b"""\
+//!TEXTURE line
+//!SIZE 4
+//!FORMAT r8
+//!FILTER LINEAR
+//!BORDER REPEAT
+ff 00 00 00
+//!TEXTURE kept
+//!SIZE 2 2
+//!FORMAT rgba16f
+//!STORAGE
+
+//!BUFFER numbers
+//!VAR vec3 colour
+//!VAR float weights[2]
+0000803f000000000000803f00000000 0000803f000000000000000000000000 00000000000000000000000000000000
+//!PARAM kind
+//!DESC a choice
+//!TYPE ENUM DEFINE
+plain
+squared
+//!PARAM count
+//!TYPE CONSTANT int
+//!MINIMUM 1
+//!MAXIMUM 4
+2
+//!HOOK RGB
+//!HOOK OUTPUT
+//!BIND HOOKED
+//!BIND line
+//!BIND numbers
+//!BIND kept
+//!SAVE LOW
+//!WIDTH HOOKED.w 2 / 1 +
+//!HEIGHT HOOKED.h count % 2 +
+//!WHEN kind squared = ! OUTPUT.w 4 > *
+//!OFFSET 0.5 -1
+//!COMPUTE 8 8 4 4
+void hook() {
+    imageStore(kept, ivec2(0), vec4(random, float(frame), target_size));
+    imageStore(out_image, ivec2(gl_GlobalInvocationID.xy), line_tex(weights[0]) + colour.xyzz);
+}
+//!HOOK RGB
+//!BIND LOW
+//!BIND HOOKED
+//!COMPONENTS 3
+vec4 hook() { return LOW_gather(LOW_pos, 0) + HOOKED_texOff(ivec2(1, 0)); }
+"""
+
+
+def _own(data: bytes) -> None:
+    kind: Any = vkbloom.load_method(_file("own.hook", data), name="fuzzed")
+    kind().core_passes((16, 12), (8, 6))
+
+
+def _own_seeds() -> list[bytes]:
+    # Not the user's cache. Passes that a mutation leaves alone are not compiled again.
+    os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "own")
+    examples = Path(__file__).parents[2] / "examples" / "own_methods"
+    return [_BLOCKS, *(file.read_bytes() for file in sorted(examples.glob("*.hook")))]
+
+
 @functools.cache
 def _stores() -> stores.Stores:
     return stores.Stores(FOLDER)
@@ -194,6 +259,7 @@ TARGETS = {
     "faces": Target(_faces, lambda: _image_seeds((4, 4, 3))),
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
     "pipelines": Target(_pipelines, _pipeline_seeds),
+    "own": Target(_own, _own_seeds),
     "zarr": Target(lambda data: _stores().run(data), lambda: _stores().seeds()),
     "images": Target(lambda data: _folders().run(data), lambda: _folders().seeds()),
     "toml": Target(lambda data: _options(".toml").run(data), lambda: _options(".toml").seeds()),

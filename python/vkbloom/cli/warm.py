@@ -14,6 +14,7 @@ import vkbloom
 from vkbloom.cli.device_options import adapter_option
 from vkbloom.cli.fields import SIZE, NameOf
 from vkbloom.cli.terminal import detail_device, hides_progress, say
+from vkbloom.registry import METHODS
 
 _TYPES: Final = ("uint8", "float16", "float32")
 _USUAL_SIZE: Final = (1920, 1080)
@@ -28,6 +29,13 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
     type=NameOf("preset", vkbloom.presets),
     multiple=True,
     help="Only this preset; repeat it for more [default: all, and the built-in scene]",
+)
+@click.option(
+    "--method",
+    "methods",
+    type=NameOf("method", METHODS),
+    multiple=True,
+    help="Only this method with its defaults, or a file of an own method; repeat it for more",
 )
 @click.option(
     "--type",
@@ -46,11 +54,12 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
 @adapter_option
 def command(
     presets: tuple[str, ...],
+    methods: tuple[str, ...],
     types: tuple[str, ...],
     sizes: tuple[tuple[int, int], ...],
     adapter: str,
 ) -> None:
-    """Compile the pipelines of presets, so that later processes find them in the caches.
+    """Compile the pipelines of presets and methods, so that later processes find them.
 
     Some pipelines are made for the size of the image: those of convolutions, and of small levels.
 
@@ -59,20 +68,22 @@ def command(
     compiles for the CPU that it runs on: another type of CPU does not find these pipelines.
     """
     begun, used = time.perf_counter(), time.process_time()
-    named = presets or tuple(vkbloom.presets)
-    calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), named, _KEPT))
+    everything = not presets and not methods
+    warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
+    warmed += [METHODS[name]() for name in methods]
+    calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), warmed, _KEPT))
     with vkbloom.Renderer(adapter) as renderer:
         detail_device(renderer)
-        if not presets:
+        if everything:
             scene = vkbloom.Scene.ufo()
             for shading in ("forward", "deferred"):
                 for attachments in _KEPT:
                     renderer.render(scene, shading=shading, attachments=attachments)
-        for size, dtype, channels, preset, attachments in tqdm(
+        for size, dtype, channels, settings, attachments in tqdm(
             calls, unit="call", leave=False, disable=hides_progress()
         ):
             image = np.zeros((size[1], size[0], channels), dtype)
-            renderer.apply(image, vkbloom.presets[preset], attachments=attachments)
+            renderer.apply(image, settings, attachments=attachments)
         name = renderer.info.summary
     seconds, processor = time.perf_counter() - begun, time.process_time() - used
     say(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")

@@ -39,7 +39,7 @@ MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
 MISSING: Final = (
     "own methods need the compiler glslang (glslangValidator); on Debian or Ubuntu: apt install "
-    "glslang-tools"
+    "glslang-tools; or the wheel vkbloom-glslang (extra shaders)"
 )
 
 
@@ -66,15 +66,27 @@ def identity() -> bytes:
 
 def compile_shader(file: OwnFile, one: OwnPass, shader: Shader) -> bytes:
     """Return the SPIR-V of a pass, from the cache where it is there."""
-    key = hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).hexdigest()
+    code = cached_code(shader)
+    if code is None:
+        code = compiled(file, one, shader)
+        if kept := cache_file(shader):
+            write_cached(kept, code)
+    return code
+
+
+def cached_code(shader: Shader) -> bytes | None:
+    """Return the SPIR-V of a shader that was compiled before; None if the cache has it not."""
+    kept = cache_file(shader)
+    return None if kept is None else read_cached(kept)
+
+
+def cache_file(shader: Shader) -> Path | None:
+    """Return the file of a shader's code in the cache; None without a cache."""
     folder = pipeline_cache.folder()
-    kept = None if folder is None else folder / "own" / f"{key}.spv"
-    known = None if kept is None else read_cached(kept)
-    if known is None:
-        known = compiled(file, one, shader)
-        if kept is not None:
-            write_cached(kept, known)
-    return known
+    if folder is None:
+        return None
+    key = hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode())
+    return folder / "own" / f"{key.hexdigest()}.spv"
 
 
 def read_cached(file: Path) -> bytes | None:

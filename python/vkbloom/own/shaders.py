@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 from vkbloom import _core
-from vkbloom.own.compiler import compile_shader
+from vkbloom.own.compiler import cached_code, compile_shader
 from vkbloom.own.file import OwnFile, read_file
 from vkbloom.own.glsl import Shader, write_shader
 from vkbloom.own.passes import OwnPass
@@ -48,24 +48,41 @@ class Shaders:
         self, one: OwnPass, stage: str, values: Mapping[str, float]
     ) -> tuple[Shader, _core.Shader]:
         """Return the shader of a pass at a stage, for the values that the compiler must know."""
-        fixed = tuple(values[param.name] for param in self._file.params if param.use != "uniform")
-        key = (one.line, stage, fixed)
+        key = self._key(one, stage, values)
         found = self._compiled.get(key)
         if found is None:
             shader = write_shader(self._file, one, stage, values)
-            code = compile_shader(self._file, one, shader)
-            found = shader, _core.shader(f"{self._name}_{one.line}", code)
-            self._compiled[key] = found
+            found = self._keep(key, one, shader, compile_shader(self._file, one, shader))
         return found
 
     def compile_all(self, values: Mapping[str, float]) -> None:
         """Compile all passes, several at a time."""
+        missing = []
+        for stage, one in self._file.runs():
+            # The cache has most, and a thread takes longer than to read them.
+            shader = write_shader(self._file, one, stage, values)
+            code = cached_code(shader)
+            if code is None:
+                missing.append((one, stage))
+            else:
+                self._keep(self._key(one, stage, values), one, shader, code)
+        if not missing:
+            return
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            futures = [
-                threads.submit(self.of, one, stage, values) for stage, one in self._file.runs()
-            ]
+            futures = [threads.submit(self.of, one, stage, values) for one, stage in missing]
         for future in futures:
             future.result()
+
+    def _key(self, one: OwnPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
+        fixed = tuple(values[param.name] for param in self._file.params if param.use != "uniform")
+        return one.line, stage, fixed
+
+    def _keep(
+        self, key: tuple[Any, ...], one: OwnPass, shader: Shader, code: bytes
+    ) -> tuple[Shader, _core.Shader]:
+        found = shader, _core.shader(f"{self._name}_{one.line}", code)
+        self._compiled[key] = found
+        return found
 
 
 @functools.cache

@@ -19,7 +19,8 @@ from vkbloom.views.pictures import picture, png
 _STYLE: Final = (
     "body{font:15px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;"
     "color-scheme:light dark}td,th{padding:2px 12px 2px 0;vertical-align:top;text-align:left}"
-    "td.n{text-align:right;font-variant-numeric:tabular-nums}tr.no th{color:#c33}"
+    "td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
+    "tr.no th{color:#c33}"
     "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
 )
 

@@ -1,0 +1,41 @@
+#!/bin/sh
+# Runs in the build root: builds glslang's program, and its wheel. It has few files and no choices
+# to make, so that it needs no CMake. Arguments: this folder, and where to put the wheel.
+set -eu
+package=$1
+wheels=$2
+. /srv/versions.sh
+source=/build/glslang-$GLSLANG
+objects=/build/glslang
+python=/opt/python/bin/python3.11
+
+mkdir -p "$objects/include/glslang"
+cd "$source"
+"$python" build_info.py . -i build_info.h.tmpl -o "$objects/include/glslang/build_info.h"
+"$python" gen_extension_headers.py -i glslang/ExtensionHeaders \
+    -o "$objects/include/glslang/glsl_intrinsic_header.h"
+ls glslang/MachineIndependent/*.cpp glslang/MachineIndependent/preprocessor/*.cpp \
+    glslang/GenericCodeGen/*.cpp glslang/OSDependent/Unix/ossource.cpp \
+    OGLCompilersDLL/InitializeDll.cpp SPIRV/*.cpp StandAlone/StandAlone.cpp \
+    StandAlone/ResourceLimits.cpp | grep -v CInterface >"$objects/sources"
+# shellcheck disable=SC2016  # the inner shell's own argument
+xargs -P "${JOBS:-2}" -n 1 sh -c 'g++ -std=c++11 -O2 -w -DNDEBUG -DENABLE_OPT=0 \
+    -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -ffile-prefix-map="$PWD"=. \
+    -I. -I"$0/include" -c "$1" -o "$0/$(echo "$1" | tr / _).o"' "$objects" <"$objects/sources"
+
+work=/build/vkbloom-glslang
+rm -rf "$work"
+cp -r "$package" "$work"
+cd "$work"
+g++ -static-libgcc -static-libstdc++ -Wl,--gc-sections -s "$objects"/*.o \
+    -o vkbloom_glslang/glslangValidator -lpthread
+cat >vkbloom_glslang/_build.py <<END
+GLSLANG = "$GLSLANG"
+SHA256 = "$(sha256sum vkbloom_glslang/glslangValidator | cut -d ' ' -f 1)"
+END
+cp "$source/LICENSE.txt" LICENSE.glslang
+cp /usr/share/doc/gcc-10-base/copyright LICENSE.gcc
+"$python" -m pip --quiet wheel --no-deps --no-build-isolation --no-index --wheel-dir dist .
+"$python" -m wheel tags --remove --python-tag py3 --abi-tag none \
+    --platform-tag "manylinux_${DRIVER_GLIBC}_x86_64" dist/*.whl
+mv dist/*.whl "$wheels"
