@@ -22,6 +22,7 @@ _EXTRAS: Final = {
     "grid": "to_xarray and grids of settings",
     "cli": "the command line",
     "software": "a bundled driver that renders on any CPU",
+    "shaders": "own methods where the system has no glslang",
     "quality": "quality figures such as SSIM",
     "fit": "settings that give a picture: fit, translate, fit_pyramid",
     "cvvdp": "the reduction ColorVideoVDP",
