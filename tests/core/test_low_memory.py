@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.exhaustive import some
 from tests.processes import output, python
 from vkbloom import Convolution, Renderer, psf
 
@@ -37,7 +38,7 @@ except MemoryError as error:
 THREADS = {"LP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"}
 
 
-@pytest.mark.parametrize("room", [60, 200, 330, 480, 620, 735])
+@pytest.mark.parametrize("room", some([60, 200, 330, 480, 620, 735], 3))
 def test_without_room_for_a_driver(room: int) -> None:
     """Drivers that find no memory crash, or are not found."""
     said = output("-c", PROGRAM, str(room), **THREADS)
@@ -47,7 +48,7 @@ def test_without_room_for_a_driver(room: int) -> None:
     assert "ulimit -v" in said
 
 
-@pytest.mark.parametrize("room", [745, 800, 850, 900, 950, 1000])
+@pytest.mark.parametrize("room", some([745, 800, 850, 900, 950, 1000], 3))
 def test_without_room_for_the_frame(room: int) -> None:
     said = output("-c", PROGRAM, str(room), **THREADS)
     # Also NumPy's words, and "done" where the driver takes less.
