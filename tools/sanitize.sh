@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 # Each preset is in test_variants.py.
 if [ $# = 0 ]; then
     for name in adapters array_memory batches bundled_driver core_arguments errors eviction graph \
-        interruption lifetime out_of_date pipeline_cache plans readback settings threads; do
+        interruption lifetime pipeline_cache plans readback settings threads; do
         set -- "$@" "tests/core/test_$name.py"
     done
     for name in apply_input dither level_weights rg11b10 variants; do
@@ -19,7 +19,7 @@ if [ $# = 0 ]; then
     for name in deferred deferred_passes render textures; do
         set -- "$@" "tests/scene/test_$name.py"
     done
-    set -- "$@" tests/grid/test_grid.py
+    set -- "$@" tests/own/test_rendering.py
     for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
         rg11b10.py::test_every_method variants.py::test_every_variant variants.py::test_final_alone \
         variants.py::test_large variants.py::test_the_forward_frame; do
