@@ -19,7 +19,6 @@ if [ $# = 0 ]; then
     for name in deferred deferred_passes render textures; do
         set -- "$@" "tests/scene/test_$name.py"
     done
-    set -- "$@" tests/own/test_rendering.py
     for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
         rg11b10.py::test_every_method variants.py::test_every_variant variants.py::test_final_alone \
         variants.py::test_large variants.py::test_the_forward_frame; do
