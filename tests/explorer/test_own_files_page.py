@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -69,7 +71,10 @@ def test_an_edited_file(
         assert field(page, "strength").get_attribute("max") == "8"
         assert field(page, "gain").count() == 0
         page.wait_for_function(LEVEL_IS, arg=level(0.3))
-        # The address does not keep the method's text, so the page can be loaded again.
+        # The address does not keep the method's text, so the page can be loaded again, also where
+        # it has a field that is gone.
+        fragment = quote(json.dumps({"a": {"method": kind.method, "gain": 1, "strength": 2}}))
+        page.goto(f"{page.url.partition('#')[0]}#{fragment}")
         page.reload()
         page.wait_for_function(LEVEL_IS, arg=level(0.3))
 

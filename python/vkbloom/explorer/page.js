@@ -752,7 +752,9 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       const method = setup.methods[kept[side]?.method];
       const begun =
         setup.sides[side].method === kept[side]?.method ? setup.sides[side] : method?.defaults;
-      settings[side] = { ...(method ? { ...begun, ...kept[side] } : setup.sides[side]) };
+      // A file of an own method may have lost fields since.
+      const known = Object.entries(kept[side] ?? {}).filter(([name]) => method && name in begun);
+      settings[side] = method ? { ...begun, ...Object.fromEntries(known) } : { ...setup.sides[side] };
     }
     comparing = Number.isFinite(kept.wipe);
     wipe = clamp(numberOf(kept.wipe, 0.5), 0, 1);
