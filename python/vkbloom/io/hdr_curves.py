@@ -39,7 +39,8 @@ def _from_pq(signal: NDArray[Any]) -> NDArray[np.float64]:
 def _hlg(colours: NDArray[Any]) -> NDArray[np.float64]:
     light = np.clip(_SCENE * np.nan_to_num(colours.astype(float)), 0, 1)
     bright = _A * np.log(np.maximum(12 * light - _B, 1e-9)) + _C
-    return np.where(light <= 1 / 12, np.sqrt(3 * light), bright)
+    signal: NDArray[np.float64] = np.where(light <= 1 / 12, np.sqrt(3 * light), bright)
+    return signal
 
 
 def _from_hlg(signal: NDArray[Any]) -> NDArray[np.float64]:
