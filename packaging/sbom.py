@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import base64
+import functools
 import hashlib
 import json
 import os
@@ -243,14 +244,20 @@ def add(wheel: Path, options: argparse.Namespace) -> None:
     print(f"{wheel.name}: {', '.join(LIBRARIES[one.key].name for one in components)}")
 
 
-def check(path: Path) -> None:
-    """Validate a wheel's SBOM, and compare its hash of the binary."""
+@functools.cache
+def _schema() -> Any:
+    """Return CycloneDX' own schema; it takes a second to load."""
     from cyclonedx.schema import SchemaVersion  # noqa: PLC0415  (the build root has none)
     from cyclonedx.validation.json import JsonStrictValidator  # noqa: PLC0415
 
+    return JsonStrictValidator(SchemaVersion.V1_6)
+
+
+def check(path: Path) -> None:
+    """Validate a wheel's SBOM, and compare its hash of the binary."""
     with zipfile.ZipFile(path) as wheel:
         text = wheel.read(_in_dist_info(wheel, r"sboms/[^/]+\.cdx\.json")).decode()
-        if error := JsonStrictValidator(SchemaVersion.V1_6).validate_str(text):
+        if error := _schema().validate_str(text):
             raise SystemExit(f"{path}: {error}")
         for file in json.loads(text)["metadata"]["component"]["components"]:
             if file["hashes"] != _sha256(_digest(wheel.read(file["name"]))):
