@@ -18,6 +18,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -60,13 +61,14 @@ def free_port() -> int:
         return int(found.getsockname()[1])
 
 
-def wait_until(holds: Callable[[], object], what: str, seconds: float = 60) -> None:
-    """Wait for a condition; TimeoutError names it."""
+def wait_until(find: Callable[[], Any], what: str, seconds: float = 60) -> Any:
+    """Wait until a function returns something, and return it; TimeoutError names it."""
     latest = time.monotonic() + seconds
-    while not holds():
+    while not (found := find()):
         if time.monotonic() > latest:
             raise TimeoutError(f"{what}: not within {seconds:.0f} s")
         time.sleep(0.02)
+    return found
 
 
 def output(*command: str | Path, **environ: str) -> str:

@@ -91,8 +91,7 @@ class Trials:
                 raise RuntimeError(f"{name}: ended before anything was killed")
             return len(list(store.glob("done/c.*"))) >= share * CHUNKS
 
-        wait_until(lambda: done(0.05) and cluster.worker(NODES[0]), f"{name}: first points", 120)
-        end([cluster.worker(NODES[0]) or process])
+        end([wait_until(lambda: done(0.05) and cluster.worker(NODES[0]), f"{name}: points", 120)])
         wait_until(lambda: done(0.2), f"{name}: more points", 120)
         end(cluster.processes(NODES[1]))
         at = len(list(store.glob("done/c.*")))
@@ -159,7 +158,8 @@ class Trials:
     def images(self, cluster: Ray) -> None:
         """Run the example with Ray Data."""
         begun = time.perf_counter()
-        print(self.finish(self.start(sys.executable, "try_images.py", cluster=cluster)), end="")
+        text = self.finish(self.start(sys.executable, "try_images.py", cluster=cluster))
+        print("\n".join(line for line in text.splitlines() if line.startswith("images: ")))
         self.say("Ray Data", time.perf_counter() - begun)
 
 

@@ -40,7 +40,9 @@ def main() -> None:
         images = map(vkbloom.read, paths)
         begun = time.perf_counter()
         local = [f["final"] for f in renderer.apply_each(images, attachments="final")]
-        print(f"apply_each, {COUNT} images: {time.perf_counter() - begun:.2f} s")
+        print(
+            f"images: apply_each, {COUNT} of {WIDTH} x {HEIGHT}: {time.perf_counter() - begun:.2f} s"
+        )
 
     for actors in (1, 2):
         begun = time.perf_counter()
@@ -52,7 +54,7 @@ def main() -> None:
         assert [row["path"] for row in found] == [str(path) for path in paths]
         assert all(np.array_equal(row["final"], one) for row, one in zip(found, local, strict=True))
         print(
-            f"Ray Data, {actors} actors: {ended - begun:.2f} s, of which {started - begun:.2f} s "
+            f"images: Ray Data, {actors} actors: {ended - begun:.2f} s, of which {started - begun:.2f} s "
             "until the first picture; in order, the same bytes"
         )
 
@@ -65,7 +67,7 @@ def main() -> None:
     waiting = [
         sum(one <= now for one in made) - number for number, now in enumerate(taken, start=1)
     ]
-    print(f"slow reader: at most {max(waiting)} of {COUNT} pictures waited")
+    print(f"images: slow reader: at most {max(waiting)} of {COUNT} pictures waited")
     assert max(waiting) < COUNT // 2, waiting
 
 
