@@ -40,9 +40,8 @@ def main() -> None:
         images = map(vkbloom.read, paths)
         begun = time.perf_counter()
         local = [f["final"] for f in renderer.apply_each(images, attachments="final")]
-        print(
-            f"images: apply_each, {COUNT} of {WIDTH} x {HEIGHT}: {time.perf_counter() - begun:.2f} s"
-        )
+        seconds = time.perf_counter() - begun
+        print(f"images: apply_each, {COUNT} of {WIDTH} x {HEIGHT}: {seconds:.2f} s")
 
     for actors in (1, 2):
         begun = time.perf_counter()
@@ -54,8 +53,8 @@ def main() -> None:
         assert [row["path"] for row in found] == [str(path) for path in paths]
         assert all(np.array_equal(row["final"], one) for row, one in zip(found, local, strict=True))
         print(
-            f"images: Ray Data, {actors} actors: {ended - begun:.2f} s, of which {started - begun:.2f} s "
-            "until the first picture; in order, the same bytes"
+            f"images: Ray Data, {actors} actors: {ended - begun:.2f} s, of which "
+            f"{started - begun:.2f} s until the first picture; in order, the same bytes"
         )
 
     slow = images_on_ray.dataset(paths, actors=2, limit=WAITING * PICTURE_BYTES, actor=Timed)
