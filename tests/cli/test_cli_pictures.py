@@ -125,10 +125,13 @@ class TestSequences:
 def test_pipes(tmp_path: Path) -> None:
     path = store_png(tmp_path / "a.png", IMAGE)
     for kind in ("png", "exr"):
-        words = ["apply", "-", "-", "--pipe-format", kind]
-        done = CliRunner().invoke(program, words, input=path.read_bytes())
-        assert done.exit_code == 0, done.stderr
-        (tmp_path / f"piped.{kind}").write_bytes(done.stdout_bytes)
+        done = subprocess.run(
+            [sys.executable, "-m", "vkbloom.cli", "apply", "-", "-", "--pipe-format", kind],
+            input=path.read_bytes(),
+            capture_output=True,
+            check=True,
+        )
+        (tmp_path / f"piped.{kind}").write_bytes(done.stdout)
         assert run(path, tmp_path / f"b.{kind}", "--preset", "photo").exit_code == 0
         piped = vkbloom.read(tmp_path / f"piped.{kind}")
         assert np.array_equal(piped, vkbloom.read(tmp_path / f"b.{kind}"))

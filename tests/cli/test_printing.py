@@ -79,7 +79,7 @@ def test_verbose_tells_adapter_sizes_and_times(tmp_path: Path, dark: Path) -> No
 # The scripts that the documented lines load, called as the shell calls them at the Tab key.
 _LOAD = 'eval "$(_VKBLOOM_COMPLETE={shell}_source vkbloom)"\n'
 _BASH = """
-COMP_WORDS=({words}) COMP_CWORD={last}
+COMP_WORDS=({words}) COMP_CWORD={last} COMPREPLY=()
 _vkbloom_completion vkbloom
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """

@@ -31,8 +31,8 @@ def test_guide(
     subprocess.run([sys.executable, "dump.py"], cwd=pytester.path, check=True)
     options = ("-p", "vkbloom", "-p", "no:cacheprovider", "-W", "error")
     tests = sum(text.count("\ndef test_") for name, text in code.items() if name != "conftest.py")
-    pytester.runpytest_inprocess(*options, "--bloom-update").assert_outcomes(passed=tests)
-    again = pytester.runpytest_inprocess(*options, "--bloom-report=report")
+    pytester.runpytest_subprocess(*options, "--bloom-update").assert_outcomes(passed=tests)
+    again = pytester.runpytest_subprocess(*options, "--bloom-report=report")
     again.assert_outcomes(passed=tests)
     assert (pytester.path / "report" / "index.html").is_file()
     # A file that the guide shows.
