@@ -12,7 +12,7 @@ from tests.exhaustive import witness
 from tests.processes import output
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-SCRIPTS = sorted(FOLDER.glob("on_*.py"))
+SCRIPTS = sorted(FOLDER.glob("*on_*.py"))
 
 
 @witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
