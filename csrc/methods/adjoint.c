@@ -22,10 +22,10 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_box_down_frag, vkb_transpose_box},
     };
     const struct vkb_constants *constants = &pass->constants;
-    const bool inset = (pass->shader == &vkb_shader_pyramid_up_frag
-                        || pass->shader == &vkb_shader_gather_frag)
-                    && (constants->upsample == UPSAMPLE_INSET_LINEAR
-                        || constants->upsample == UPSAMPLE_INSET_CUBIC);
+    const bool inset =
+        (pass->shader == &vkb_shader_pyramid_up_frag || pass->shader == &vkb_shader_gather_frag)
+        && (constants->upsample == UPSAMPLE_INSET_LINEAR
+            || constants->upsample == UPSAMPLE_INSET_CUBIC);
 
     // Weights that depend on the brightness, and positions that are limited, have none.
     if (inset || constants->firefly_filter || constants->from_image)
@@ -148,7 +148,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
                        struct vkb_graph *graph, uint32_t *first, bool *possible,
                        struct vkb_error *error)
 {
-    struct vkb_adjoint adjoint = {.graph = graph};
+    struct vkb_adjoint adjoint = {.graph = graph, .sums = cotangents->sums};
 
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
@@ -161,7 +161,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
     done = done && add_passes(&adjoint, possible, error) && end_table(&adjoint, error);
-    if (done)
+    if (done && !cotangents->sums)
         show_results(&adjoint, image_count);
     vkb_free(adjoint.table.texels);
     vkb_free(adjoint.brought);

@@ -78,8 +78,8 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
 static bool bring_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter, bool rows,
                         uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
-    struct vkb_pass_row row = filter_row(
-        adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
+    struct vkb_pass_row row =
+        filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
     struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
     uint32_t start;
 
@@ -140,13 +140,12 @@ static struct vkb_size blocks_of(struct vkb_size size)
                              (size.height + SUM_SIDE - 1) / SUM_SIDE};
 }
 
-bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                    struct vkb_size size, const char *name, struct vkb_error *error)
+static bool add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                     struct vkb_size size, const char *name, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
     uint32_t image;
 
-    row.constants.by = BY_VALUES;
     read_nothing(&row);
     size = blocks_of(size);
     if (!add_row(adjoint, &row, size, &image, error))
@@ -160,4 +159,20 @@ bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *give
     snprintf(adjoint->graph->images[image].name, VKB_NAME_SIZE, "%s", name);
     adjoint->graph->images[image].framebuffer = true;
     return true;
+}
+
+bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                    struct vkb_size size, const char *name, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+    char squares[VKB_NAME_SIZE];
+
+    if (!adjoint->sums)
+        return true;
+    snprintf(squares, sizeof squares, "%s_squares", name);
+    row.constants.by = BY_VALUES;
+    if (!add_sums(adjoint, &row, size, name, error))
+        return false;
+    row.constants.by = BY_SQUARES;
+    return add_sums(adjoint, &row, size, squares, error);
 }

@@ -1,6 +1,6 @@
 // Adjoint passes: each takes the cotangents of its image back to those of an image that the forward
-// pass reads. All gather, so that their results have the same bits in every run, and all store single
-// floats.
+// pass reads. All gather, so that their results have the same bits in every run, and all store
+// single floats.
 #ifndef VKB_ADJOINT_H
 #define VKB_ADJOINT_H
 
@@ -13,9 +13,11 @@ struct vkb_adjoint {
     uint32_t table_image;
     uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
     uint32_t added;     // images so far
+    bool sums;          // the derivatives by fields are wanted, not those by images
 };
 
-// Adds the adjoint passes of a forward row, which is a copy: adding passes moves those of the graph.
+// Adds the adjoint passes of a forward row, which is a copy: adding passes moves those of the
+// graph.
 typedef bool vkb_transpose(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error);
 
@@ -34,8 +36,9 @@ bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint
 bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
-// Adds the row, which adds up blocks of `size`, and the passes that add up these sums to one pixel:
-// the framebuffer `name`.
+// If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
+// add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
+// values, which tell how exact the sum is.
 bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                     struct vkb_size size, const char *name, struct vkb_error *error);
 

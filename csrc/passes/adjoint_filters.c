@@ -49,8 +49,8 @@ static void add_taps(struct vkb_axis *axis, int kernel, double distance, double 
     }
 }
 
-// 13 taps are those of two kernels: nine around the centre, and four between them, each with half of
-// the weight.
+// 13 taps are those of two kernels: nine around the centre, and four between them, each with half
+// of the weight.
 bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {

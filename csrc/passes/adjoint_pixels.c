@@ -1,5 +1,5 @@
-// The adjoints of passes that compute each pixel from those at the same place: the composite, and the
-// threshold pass, which reduces the image before.
+// The adjoints of passes that compute each pixel from those at the same place: the composite, and
+// the threshold pass, which reduces the image before.
 #include "passes/adjoint.h"
 
 static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image)
@@ -43,7 +43,8 @@ static bool bring_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     if (vkb_same_size(adjoint->graph, image, target))
         return vkb_bring(adjoint, row, image, error);
     vkb_filter_begin(adjoint->graph, image, target, &filter);
-    // The cotangents of the target, complete, are replaced for a moment by those of what it samples.
+    // The cotangents of the target, complete, are replaced for a moment by those of what it
+    // samples.
     adjoint->brought[target] = VKB_NO_IMAGE;
     const bool done = vkb_bring(adjoint, row, target, error)
                    && vkb_bring_filter(adjoint, &filter, adjoint->brought[target], image, error);
@@ -68,6 +69,5 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
     if (!bring_sampled(adjoint, &row, pass->reads[0], target, error))
         return false;
     row.constants.by = BY_MASK;
-    return !pass->constants.masked
-        || bring_sampled(adjoint, &row, pass->reads[1], target, error);
+    return !pass->constants.masked || bring_sampled(adjoint, &row, pass->reads[1], target, error);
 }

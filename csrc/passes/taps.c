@@ -36,8 +36,8 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
 
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
-    return axis->from == axis->to && !axis->cubic && axis->count == 1
-        && axis->taps[0].offset == 0.0 && axis->taps[0].weights[0] == 1.0;
+    return axis->from == axis->to && !axis->cubic && axis->count == 1 && axis->taps[0].offset == 0.0
+        && axis->taps[0].weights[0] == 1.0;
 }
 
 double vkb_axis_readers(const struct vkb_axis *axis)
@@ -182,7 +182,7 @@ bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_ta
                         uint32_t *start, struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
-    double(*weights)[VKB_MOST_KERNELS] =
+    double (*weights)[VKB_MOST_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 

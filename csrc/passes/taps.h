@@ -1,5 +1,5 @@
-// A filter as taps along both axes, and its transpose as tables. The forward row of a family has the
-// same taps as parameters; the functions that return a filter read them from there.
+// A filter as taps along both axes, and its transpose as tables. The forward row of a family has
+// the same taps as parameters; the functions that return a filter read them from there.
 //
 // The table of an axis has a texel (first, count, place) for each texel that the filter reads: the
 // pixels that read it, and where their weights are. Edges fold back: a pixel whose taps are beyond

@@ -238,7 +238,8 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         Py_DECREF(self);
         return NULL;
     }
-    if (!build_graph(device, variants, &self->source, settings, portion, &self->plan.graph, &error)) {
+    if (!build_graph(device, variants, &self->source, settings, portion, &self->plan.graph,
+                     &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }
@@ -288,12 +289,14 @@ PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
     struct portion portion = {.cotangents = &cotangents};
     struct vkb_settings settings;
     struct vkb_error error = {0};
+    int sums;
 
-    if (!PyArg_ParseTuple(arguments, "O!OO!:adjoint", state->source_type, &source, &settings_object,
-                          &PyTuple_Type, &names)
+    if (!PyArg_ParseTuple(arguments, "O!OO!p:adjoint", state->source_type, &source,
+                          &settings_object, &PyTuple_Type, &names, &sums)
         || !vkb_read_settings(state, settings_object, &settings)
         || !vkb_read_names(names, cotangents.names, &cotangents.count))
         return NULL;
+    cotangents.sums = sums;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))

@@ -27,7 +27,7 @@ struct pipeline_key {
     VkRenderPass render_pass;
     struct vkb_hash vertex, shader;
     uint32_t geometry, reading;  // enum vkb_geometry, enum vkb_reading
-    uint16_t textured, blend;  // enum vkb_blend
+    uint16_t textured, blend;    // enum vkb_blend
     uint32_t target_count;
     uint32_t image_count;  // of the descriptors
     uint32_t layout;       // of a pass with resources

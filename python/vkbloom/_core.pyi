@@ -105,7 +105,7 @@ class Renderer:
         /,
     ) -> Plan: ...
     def adjoint(
-        self, source: Source, settings: object, names: tuple[str, ...], /
+        self, source: Source, settings: object, names: tuple[str, ...], sums: bool, /
     ) -> Plan | None: ...
     def bands(
         self, source: Source, settings: object, height: int, /

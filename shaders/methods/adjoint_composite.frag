@@ -111,11 +111,11 @@ vec4 by_values(ivec2 at)
     return vec4(by_intensity, p.by_curves, 0.0);
 }
 
-SUM_OF_BLOCK(by_values, size)
+SUM_OF_BLOCK(by_values)
 
 vec4 shade()
 {
-    if (BY == BY_VALUES)
+    if (BY >= BY_VALUES)
         return sum_of_block(textureSize(scene, 0));
     Pixel p = pixel_at(PIXEL);
     if (BY == BY_MASK)

@@ -14,7 +14,7 @@ vec4 value(ivec2 pixel)
     return texelFetch(source, pixel, 0);
 }
 
-SUM_OF_BLOCK(value, size)
+SUM_OF_BLOCK(value)
 
 vec4 shade()
 {

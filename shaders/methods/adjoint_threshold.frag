@@ -84,11 +84,11 @@ vec4 by_values(ivec2 pixel)
     return vec4(soft_factor(brightness).zw * whole, 0.0, 0.0);
 }
 
-SUM_OF_BLOCK(by_values, size)
+SUM_OF_BLOCK(by_values)
 
 vec4 shade()
 {
-    if (BY == BY_VALUES)
+    if (BY >= BY_VALUES)
         return sum_of_block(ivec2(params.target_width, params.target_height));
     vec4 colour = reduced(PIXEL), brought = cotangent(PIXEL);
     if (BY == BY_MASK) {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import check_emission, check_image, check_mask
 from vkbloom.core_access import HasCore
 from vkbloom.frames import Frames
-from vkbloom.gradients.passes import DeviceGradients, by_passes
+from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.image import Image
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import Gradients, check_cotangent, differentiable
@@ -55,7 +55,7 @@ def vjp(
     frames = renderer.apply(pixels, floats, **given)
     recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
     names = ("image", *sorted(given), *differentiable(settings))
-    if hasattr(settings, "psf"):
+    if callable(getattr(settings, "kernel", None)):
         names += ("kernel",)
 
     def by_reference(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
@@ -63,12 +63,11 @@ def vjp(
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        checked = {
-            name: check_cotangent(name, part, frames) for name, part in cotangents.items()
-        }
-        found = by_passes(renderer, pixels, floats, given, checked)
+        checked = {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
+        passes = Passes(renderer, pixels, floats, given, checked)
+        found = passes.images()
         if found is None:
             return by_reference(checked)
-        return DeviceGradients(found, names, lambda: by_reference(checked))
+        return DeviceGradients(found, names, passes.fields, lambda: by_reference(checked))
 
     return frames, pullback
