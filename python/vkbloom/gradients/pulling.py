@@ -25,7 +25,8 @@ Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
 
 
 class _Renderer(HasCore, Protocol):
-    def apply(self, image: NDArray[Any], settings: Settings, **given: Any) -> Frames: ...
+    @property
+    def apply(self) -> Callable[..., Frames]: ...
 
 
 def vjp(
