@@ -11,7 +11,7 @@ import vkbloom
 from tests.processes import output
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-SCRIPTS = sorted(FOLDER.glob("on_*.py"))
+SCRIPTS = sorted(FOLDER.glob("*on_*.py"))
 
 
 def test_on_this_machine(tmp_path: Path) -> None:
