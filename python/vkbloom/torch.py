@@ -24,8 +24,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.checks import import_extra
-from vkbloom.gradients import Pullback
+from vkbloom.checks import check_emission, check_image, check_mask, import_extra
+from vkbloom.gradients import Pullback, pullback_of
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import differentiable
@@ -323,13 +323,19 @@ def _split(names: str) -> list[str]:
     return names.split(",") if names else []
 
 
-def _vjp(arrays: dict[str, Any], settings: Settings, renderer: int) -> tuple[Any, Pullback]:
-    """Return framebuffers and pullback: of the reference for float64, else of the renderer."""
+def _pullback(arrays: dict[str, Any], settings: Settings, renderer: int) -> Pullback:
+    """Return the pullback: of the reference for float64, else of the renderer."""
     given = dict(arrays)
     image = given.pop("image")
     if image.dtype == np.float64:
-        return reference_vjp(image, settings, **given)
-    return _renderer(renderer).vjp(image, settings, **given)
+        return reference_vjp(image, settings, **given)[1]
+    pixels = check_image(image)
+    checks = {
+        "mask": lambda part: check_mask(part, (pixels.shape[0], pixels.shape[1])),
+        "emission": lambda part: check_emission(part, pixels),
+    }
+    checked = {name: checks[name](part) for name, part in given.items()}
+    return pullback_of(_renderer(renderer), pixels, settings, checked)
 
 
 def _operator(name: str, parameters: str, result: str) -> Any:
@@ -429,8 +435,7 @@ def _backward(  # noqa: PLR0917
     }
     wanted = cotangent.detach().cpu().numpy()
     for index, arrays, one in _each(image, mask, emission, values, names, settings):
-        _, pullback = _vjp(arrays, one, renderer)
-        gradients = pullback({"final": wanted[index]})
+        gradients = _pullback(arrays, one, renderer)({"final": wanted[index]})
         for name, total in found.items():
             if name in inputs:
                 total[index] = gradients[name]
