@@ -69,7 +69,7 @@ def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
 def test_a_convolution_is_transposed(renderer: Renderer, boundary: Any) -> None:
     """By kernels of even sides, and larger than the image."""
     random = np.random.default_rng(1)
-    for shape, size in (((4, 5, 3), (11, 14)), ((13, 6, 3), (7, 8)), ((3, 3, 3), (1, 9))):
+    for shape, size in (((4, 5, 3), (11, 14)), ((13, 6, 3), (7, 1))):
         kernel = random.random(shape)
         settings = vkbloom.Convolution(psf=kernel, boundary=boundary, threshold=0.3, knee=0.5)
         image = random_image(*size, channels=3, seed=1).astype(np.float32)
