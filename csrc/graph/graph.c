@@ -6,6 +6,7 @@ void vkb_graph_destroy(struct vkb_graph *graph)
 {
     vkb_free(graph->images);
     vkb_free(graph->passes);
+    vkb_free(graph->owned);
     *graph = (struct vkb_graph){0};
 }
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_emission, check_image, check_mask
+from vkbloom.core_access import HasCore
 from vkbloom.frames import Frames
+from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.image import Image
 from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import Gradients, check_cotangent
+from vkbloom.reference.derivatives import Gradients, check_cotangent, differentiable
 from vkbloom.settings import Settings
 
 __all__ = ["Pullback", "vjp"]
@@ -22,8 +24,13 @@ __all__ = ["Pullback", "vjp"]
 Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
 
 
+class _Renderer(HasCore, Protocol):
+    @property
+    def apply(self) -> Callable[..., Frames]: ...
+
+
 def vjp(
-    apply: Callable[..., Frames],
+    renderer: _Renderer,
     image: object,
     settings: Settings,
     mask: object | None,
@@ -45,13 +52,23 @@ def vjp(
         given["mask"] = np.array(check_mask(mask, (pixels.shape[0], pixels.shape[1])))
     if emission is not None:
         given["emission"] = np.array(check_emission(emission, pixels))
-    frames = apply(pixels, settings.replace(format="rgba32float"), **given)
+    floats = settings.replace(format="rgba32float")
+    frames = renderer.apply(pixels, floats, **given)
     recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
+    names = ("image", *sorted(given), *differentiable(settings))
+    if callable(getattr(settings, "kernel", None)):
+        names += ("kernel",)
 
-    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        for name, part in cotangents.items():
-            check_cotangent(name, part, frames)
+    def by_reference(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
         found = recorded()(cotangents)
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        checked = {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
+        passes = Passes(renderer, pixels, floats, given, checked)
+        found = passes.images()
+        if found is None:
+            return by_reference(checked)
+        return DeviceGradients(found, names, passes.fields, lambda: by_reference(checked))
 
     return frames, pullback
