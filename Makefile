@@ -23,6 +23,9 @@ WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # One thread of lavapipe in each of them: with more they take a quarter more time from each other.
 test exhaustive check sanitize: export LP_NUM_THREADS := 1
+# Python keeps compiled modules, also where the environment says otherwise: each process would compile
+# the package again, and each run the tests' assertions.
+test exhaustive check sanitize: export PYTHONDONTWRITEBYTECODE :=
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
