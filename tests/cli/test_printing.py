@@ -17,6 +17,8 @@ from click.testing import CliRunner, Result
 import vkbloom
 from vkbloom.cli.program import program
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 
 

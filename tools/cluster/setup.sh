@@ -4,13 +4,23 @@
 # Slurm and SSH.
 set -eu
 
-if ! command -v slurmctld slurmd sbatch munged sshd >/dev/null; then
+missing=""
+for program in slurmctld slurmd sbatch munged sshd; do
+    command -v $program >/dev/null || missing="$missing $program"
+done
+if [ -n "$missing" ]; then
     if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
-        echo "install Slurm, MUNGE and an SSH server (Debian: slurm-wlm munge openssh-server)" >&2
+        echo "missing:$missing (Debian: slurm-wlm munge openssh-server)" >&2
         exit 1
     fi
-    # Debian starts services when they are installed, unless this runlevel is named.
-    export DEBIAN_FRONTEND=noninteractive RUNLEVEL=1
+    # Debian starts services when they are installed, unless this program forbids it.
+    policy=/usr/sbin/policy-rc.d
+    if [ ! -e $policy ]; then
+        trap 'rm $policy' EXIT
+        printf '#!/bin/sh\nexit 101\n' >$policy
+        chmod +x $policy
+    fi
+    export DEBIAN_FRONTEND=noninteractive
     apt-get update -qq
     apt-get install -qq -y --no-install-recommends slurm-wlm munge openssh-server >/dev/null
 fi
