@@ -23,7 +23,7 @@ test -z "$missing" || { echo "packaging/aarch64.sh needs: apt install$missing" >
 mkdir -p "$work" dist
 if test ! -d "$root"; then
     mmdebstrap --mode=root --arch=arm64 --variant=extract --quiet --skip=check/qemu \
-        --include=python3,libpython3.11-dev,mesa-vulkan-drivers,libvulkan1,libvulkan-volk-dev \
+        --include=python3,libpython3.11-dev,libvulkan-volk-dev,mesa-vulkan-drivers,libvulkan1,vulkan-validationlayers \
         bookworm "$root.part" "deb $mirror bookworm main"
     mv "$root.part" "$root"
 fi
@@ -62,11 +62,7 @@ tests="vkbloom[images,cli,quality,grid,fit] pytest pytest-xdist hypothesis"
     --find-links "$work/source/dist" --python-version 3.11 --implementation cp \
     --platform manylinux2014_aarch64 --platform manylinux_2_28_aarch64 --platform "$platform" $tests
 test $# -gt 0 || set -- tests/core/test_frames.py
-# The tests without the package's source beside them.
-rm -rf "$work/try"
-mkdir "$work/try"
-cp -r tests examples docs tools pyproject.toml README.md "$work/try/"
-cd "$work/try"
+cd "$work/source"
 start=$(date +%s)
 PYTHONPATH=$site VKBLOOM_CACHE_DIR=$work/cache LP_NUM_THREADS=2 \
     VK_DRIVER_FILES=$root/usr/share/vulkan/icd.d/lvp_icd.aarch64.json \
