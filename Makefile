@@ -9,6 +9,8 @@
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
 #   which comes as packages of Debian 13 that are unpacked, not installed.
+# make cluster: renders grids under Slurm, SSH and Ray with two nodes on this machine, and kills some;
+#   installs them (with apt, as root). CLUSTER="--driver MANIFEST": a driver that they must refuse.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -21,6 +23,9 @@ WORKERS := $(shell nproc 2>/dev/null || echo 2)
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # One thread of lavapipe in each of them: with more they take a quarter more time from each other.
 test exhaustive check sanitize: export LP_NUM_THREADS := 1
+# Python keeps compiled modules, also where the environment says otherwise: each process would compile
+# the package again, and each run the tests' assertions.
+test exhaustive check sanitize: export PYTHONDONTWRITEBYTECODE :=
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
@@ -28,8 +33,8 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo wheels lint format \
-	sanitize clean
+.PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
+	format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -87,6 +92,14 @@ libplacebo: build/stamp/core build/libplacebo/apply_hook
 
 build/libplacebo/apply_hook: tools/libplacebo/build.sh tools/libplacebo/apply_hook.c
 	tools/libplacebo/build.sh build/libplacebo
+
+# Tries examples/cluster, and prints the times (docs/grids.md).
+cluster: build/stamp/core build/cluster/done
+	build/cluster/python/bin/python tools/cluster/run.py build/cluster examples/cluster $(CLUSTER)
+
+build/cluster/done: tools/cluster/setup.sh
+	tools/cluster/setup.sh $(@D) $(PYTHON)
+	touch $@
 
 lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .

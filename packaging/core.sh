@@ -6,12 +6,17 @@ source=$1
 wheels=$2
 . /srv/versions.sh
 python=/opt/python/bin/python3.11
+headers=/build/vulkan/usr/include
 
 cd "$source"
 # volk is compiled in, so its licence comes along.
 cp /build/vulkan/usr/share/doc/libvulkan-volk-dev/copyright LICENSE.volk
-export VKBLOOM_CFLAGS="-include packaging/glibc_2_28.h" VKBLOOM_LDFLAGS=-Wl,--strip-all
+export VKBLOOM_CFLAGS="-include packaging/glibc_2_28.h -ffile-prefix-map=$source=."
+export VKBLOOM_LDFLAGS=-Wl,--strip-all,-Map=build/core.map
 VULKAN_SDK=/build/vulkan/usr "$python" -m pip --quiet wheel \
     --no-deps --no-build-isolation --no-index --wheel-dir dist .
 "$python" -m wheel tags --remove --platform-tag "manylinux_${CORE_GLIBC}_x86_64" dist/*.whl
+"$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so build/core.map \
+    --symbols build/temp*/csrc/*/*.o --source volk - "$headers/volk.h" "$headers/volk.c" \
+    --source Vulkan-Headers - "$headers/vulkan/vulkan_core.h"
 mv dist/*.whl "$wheels"

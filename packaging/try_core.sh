@@ -1,14 +1,34 @@
 #!/bin/sh
-# Builds the core's wheel with what this system has, and renders with it in a fresh environment:
-# nothing of the working tree is imported. Argument: the Python that builds, with setuptools.
+# Builds the core's wheel with what this system has, with its SBOM where that is Debian, and renders
+# with it in a fresh environment: nothing of the working tree is imported. Arguments: the Python
+# that builds, with setuptools; "twice": builds in a second folder, too, and compares the wheels.
 set -eu
 python=$(realpath -s "$1")
 cd "$(dirname "$0")/.."
+. packaging/versions.sh
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$python" -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir "$work" .
+built() {
+    mkdir "$work/$1"
+    git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$work/$1"
+    cd "$work/$1"
+    VKBLOOM_CFLAGS="-ffile-prefix-map=$work/$1=." \
+        VKBLOOM_LDFLAGS="-Wl,--strip-all,-Map=build/core.map" \
+        "$python" -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
+    test -z "$(command -v dpkg-query)" ||
+        "$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so build/core.map \
+            --symbols build/temp*/csrc/*/*.o --source volk - /usr/include/volk.h \
+            --source Vulkan-Headers - /usr/include/vulkan/vulkan_core.h
+    cd - >/dev/null
+}
+built one
+if test "${2:-}" = twice; then
+    built another
+    cmp "$work"/one/dist/*.whl "$work"/another/dist/*.whl
+    echo "two builds are equal: $(sha256sum "$work"/one/dist/*.whl | cut -d ' ' -f 1)"
+fi
 "$python" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install --quiet "$work"/vkbloom-*.whl
+"$work/venv/bin/python" -m pip install --quiet "$work"/one/dist/vkbloom-*.whl
 cd "$work"
 VKBLOOM_CACHE_DIR="$work/cache" venv/bin/python - <<END
 import numpy as np

@@ -10,6 +10,8 @@ PYTHON=3.11.2
 # The newest glibc that the core, and the driver and the compiler, may need; it names their wheels.
 CORE_GLIBC=2_28
 DRIVER_GLIBC=2_31
+# cyclonedx-python-lib, which validates the SBOMs.
+CYCLONEDX=11.12.0
 # Timestamps inside the archives, so that two builds give the same bytes.
 SOURCE_DATE_EPOCH=1700000000
 export SOURCE_DATE_EPOCH

@@ -1,11 +1,30 @@
 #!/bin/sh
-# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang into dist/, as root on a system with mmdebstrap.
-# The root that they are built in is made once, in build/wheels; so is Mesa.
+# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang into dist/, each twice in two
+# folders, which must give equal files; as root on a system with mmdebstrap. The root that they are
+# built in is made once, in build/wheels; so are Mesa and glslang, in both folders.
+# STEPS: the scripts to run, by default all.
 set -eu
 cd "$(dirname "$0")/.."
 work=build/wheels
 root=$work/root
 . packaging/versions.sh
+
+missing=
+needs() {
+    test -n "$2" || missing="$missing
+    $1"
+}
+# What it needs is said before it starts, all at once.
+needs "to be run as root" "$(test "$(id -u)" != 0 || echo yes)"
+needs "mmdebstrap (apt install mmdebstrap)" "$(test -d "$root" && echo yes || command -v mmdebstrap)"
+needs "git (apt install git)" "$(command -v git)"
+needs "dpkg's keys (apt install debian-archive-keyring)" \
+    "$(ls /usr/share/keyrings/debian-archive-keyring.gpg 2>/dev/null)"
+needs "pip and venv (apt install python3-pip python3-venv)" \
+    "$(python3 -c 'import ensurepip, pip' 2>/dev/null && echo yes)"
+needs "5 GB of free disk in $PWD" \
+    "$(test "$(df -P -k . | awk 'END { print $4 }')" -lt 5000000 || echo yes)"
+test -z "$missing" || { echo "make wheels needs:$missing" >&2; exit 2; }
 
 test -d "$root" || packaging/build_root.sh "$root"
 cp packaging/versions.sh "$root/srv/"
@@ -21,15 +40,33 @@ chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
     /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
         --root-user-action=ignore --upgrade /srv/pypi/*.whl'
 
-rm -rf "$root/build/vkbloom" "$root/build/wheels"
-mkdir -p "$root/build/vkbloom" "$root/build/wheels" dist
-git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$root/build/vkbloom"
-for step in core.sh lavapipe/build.sh glslang/build.sh; do
-    folder=/build/vkbloom
-    test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
-    chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" \
-        sh "/build/vkbloom/packaging/$step" "$folder" /build/wheels
+# Builds in a folder of the root.
+build_in() {
+    rm -rf "$root$1/vkbloom" "$root$1/wheels"
+    mkdir -p "$root$1/vkbloom" "$root$1/wheels" dist
+    for source in "mesa-$MESA" "glslang-$GLSLANG"; do
+        test -d "$root$1/$source" || cp -r "$root/build/$source" "$root$1/"
+    done
+    tar -x -f "$work/source.tar" -C "$root$1/vkbloom"
+    for step in ${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}; do
+        folder=$1/vkbloom
+        test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
+        chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" BUILD="$1" \
+            sh "$1/vkbloom/packaging/$step" "$folder" "$1/wheels"
+    done
+}
+# Both from the same files, which may change meanwhile.
+git ls-files -z --cached --others --exclude-standard | tar -c --null -T - -f "$work/source.tar"
+build_in /build
+build_in /again
+for wheel in "$root"/build/wheels/*.whl; do
+    cmp "$wheel" "$root/again/wheels/$(basename "$wheel")"
+    echo "two builds are equal: $(sha256sum "$wheel" | cut -d ' ' -f 1) $(basename "$wheel")"
 done
+test -d "$work/check" || python3 -m venv "$work/check"
+"$work/check/bin/pip" install --quiet "cyclonedx-python-lib[json-validation]==$CYCLONEDX"
+"$work/check/bin/python" packaging/sbom.py check "$root"/build/wheels/*.whl
+
 # Names that promise more than the files keep must not leave here.
 check_glibc() {
     newest=$(chroot "$root" sh -c "objdump -T $2" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
@@ -37,8 +74,12 @@ check_glibc() {
     echo "$2 needs $newest; at most $most"
     test "$(printf '%s\n' "$newest" "$most" | sort -V | tail -n 1)" = "$most"
 }
-check_glibc "$CORE_GLIBC" '/build/vkbloom/build/lib*/vkbloom/_core.abi3.so'
-check_glibc "$DRIVER_GLIBC" /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so
-check_glibc "$DRIVER_GLIBC" /build/vkbloom-glslang/vkbloom_glslang/glslangValidator
+for step in ${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}; do
+    case $step in
+    core.sh) check_glibc "$CORE_GLIBC" '/build/vkbloom/build/lib*/vkbloom/_core.abi3.so' ;;
+    lavapipe/*) check_glibc "$DRIVER_GLIBC" /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so ;;
+    glslang/*) check_glibc "$DRIVER_GLIBC" /build/vkbloom-glslang/vkbloom_glslang/glslangValidator ;;
+    esac
+done
 cp "$root"/build/wheels/*.whl dist/
 ls -l dist

@@ -227,6 +227,12 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
+// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels.
+#define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, start_x) \
+    INPUT(B, int, start_y) \
+    INPUT(B, float, gain)
+
 // The composite of Godot.
 #define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT) \
@@ -308,6 +314,7 @@
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
+    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
@@ -458,6 +465,11 @@
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
+// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels that
+// is added up at once.
+#define TABLE_WIDTH 1024
+#define SUM_SIDE    8
+
 // The distance of Filament's taps in texels.
 #define FILAMENT_OFFSET 1.761629
 
@@ -471,7 +483,8 @@
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
 // is known to have no NaN and no infinity. With NEXT_PIXEL the outer taps of halve_grid.comp are between
 // the texels of the next pixel. With FROM_IMAGE, a downsampling to half the size reads
-// the image itself and applies the threshold. STORED is the format of the target (STORED_*). FIRST
+// the image itself and applies the threshold, and an adjoint pass writes the cotangents of a source's
+// image. BY is what these are of. STORED is the format of the target (STORED_*). FIRST
 // marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
 // a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
 // workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp)
@@ -516,7 +529,8 @@
     CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, ROLLED, rolled) \
     CONSTANT(37, FINITE, finite) \
-    CONSTANT(38, NEXT_PIXEL, next_pixel)
+    CONSTANT(38, NEXT_PIXEL, next_pixel) \
+    CONSTANT(39, BY, by)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -620,6 +634,12 @@
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KAWASE, 10, kawase) \
+    NAME(GROUPS_KINO, 11, kino) \
+    NAME(BY_SCENE, 0, by_scene) \
+    NAME(BY_BLOOM, 1, by_bloom) \
+    NAME(BY_MASK, 2, by_mask) \
+    NAME(BY_VALUES, 3, by_values) \
+    NAME(BY_SQUARES, 4, by_squares) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

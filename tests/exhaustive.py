@@ -7,10 +7,17 @@ import os
 from collections.abc import Iterable
 from typing import Any, Final, TypeVar
 
+import pytest
+
 #: Whether this run takes everything.
 EXHAUSTIVE: Final = os.environ.get("VKBLOOM_EXHAUSTIVE", "0") not in ("", "0")
 
 T = TypeVar("T")
+
+
+def witness(reason: str) -> pytest.MarkDecorator:
+    """Mark a test that only an exhaustive run takes; the reason names what states its main fact."""
+    return pytest.mark.skipif(not EXHAUSTIVE, reason=f"left to make exhaustive: {reason}")
 
 
 def some(cases: Iterable[T], count: int) -> list[T]:

@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-static bool read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count)
+bool vkb_read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count)
 {
     const Py_ssize_t given = PyTuple_Size(tuple);
 
@@ -34,8 +34,8 @@ bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyOb
     if (!vkb_require_tuple(tuple, "part") || !vkb_require_tuple(names, "names")
         || !PyArg_ParseTuple(tuple, "O&O!n:part", vkb_read_uint32, &part->height, &PyTuple_Type,
                              &levels, &first)
-        || !read_names(names, part->outputs, &part->output_count)
-        || !read_names(levels, part->levels, &part->level_count))
+        || !vkb_read_names(names, part->outputs, &part->output_count)
+        || !vkb_read_names(levels, part->levels, &part->level_count))
         return false;
     if (first < 0)
         return true;

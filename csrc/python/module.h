@@ -253,6 +253,9 @@ bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
 // A tuple of the names of images.
 PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);
 
+// A tuple of up to GATHERED_LEVELS names of images.
+bool vkb_read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count);
+
 // The part of a graph that makes the names, from (rows of the image, names of the levels that the
 // source brings, whether it is a band of the image).
 bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
@@ -270,6 +273,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 
 // Methods of the Renderer.
+PyObject *vkb_renderer_adjoint(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_bands(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);

@@ -2,6 +2,7 @@
 #include "python/module.h"
 
 #include "graph/dry_run.h"
+#include "methods/adjoint.h"
 
 #include <string.h>
 
@@ -107,6 +108,23 @@ static bool choose_outputs(struct vkb_plan *plan, PyObject *names)
     return true;
 }
 
+// The framebuffers from `first` on.
+static bool choose_derivatives(struct vkb_plan *plan, uint32_t first)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    struct vkb_error error;
+
+    plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
+    if (!plan->outputs) {
+        PyErr_NoMemory();
+        return false;
+    }
+    for (uint32_t i = first; i < graph->image_count; ++i)
+        if (graph->images[i].framebuffer)
+            plan->outputs[plan->output_count++] = i;
+    return true;
+}
+
 static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_image_row *row = &graph->images[image];
@@ -137,13 +155,24 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
     return tuple;
 }
 
+// What a plan is of, if not of all passes.
+struct portion {
+    const struct vkb_part *part;
+    const struct vkb_cotangents *cotangents;
+    uint32_t first;    // of the images of derivatives
+    bool is_possible;  // whether all passes have adjoints
+};
+
+// `portion` may be NULL.
 static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
-                        const struct vkb_part *part, struct vkb_graph *graph,
-                        struct vkb_error *error)
+                        struct portion *portion, struct vkb_graph *graph, struct vkb_error *error)
 {
-    return (part ? vkb_build_part(source, settings, part, graph, error)
-                 : vkb_source_build(source, settings, device->max_side, graph, error))
+    return (portion && portion->part ? vkb_build_part(source, settings, portion->part, graph, error)
+            : portion && portion->cotangents
+                ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
+                                    &portion->first, &portion->is_possible, error)
+                : vkb_source_build(source, settings, device->max_side, graph, error))
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error);
@@ -193,7 +222,7 @@ static bool hold_passes(const struct vkb_module_state *state, const struct vkb_d
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
                           enum vkb_variants variants, uint64_t renderer, PyObject *source,
                           PyObject *settings_object, struct vkb_settings *settings,
-                          const struct vkb_part *part, PyObject *names)
+                          struct portion *portion, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -204,11 +233,13 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     self->renderer = renderer;
     if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
         || !hold_kernel(state, device, settings_object, settings, self)
-        || !hold_passes(state, device, settings_object, part, settings, self)) {
+        || !hold_passes(state, device, settings_object, portion ? portion->part : NULL, settings,
+                        self)) {
         Py_DECREF(self);
         return NULL;
     }
-    if (!build_graph(device, variants, &self->source, settings, part, &self->plan.graph, &error)) {
+    if (!build_graph(device, variants, &self->source, settings, portion, &self->plan.graph,
+                     &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }
@@ -217,7 +248,9 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         vkb_release_kernel(&self->kernel);
         vkb_release_kernel(&self->dirt);
     }
-    if (!choose_outputs(&self->plan, names) || !(self->outputs = describe_outputs(&self->plan))) {
+    if (!(portion && portion->cotangents ? choose_derivatives(&self->plan, portion->first)
+                                         : choose_outputs(&self->plan, names))
+        || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;
     }
@@ -230,6 +263,7 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     PyObject *source, *settings_object, *names, *given = NULL;
     struct vkb_part part;
+    struct portion portion = {.part = &part};
     struct vkb_settings settings;
     struct vkb_error error = {0};
 
@@ -243,7 +277,36 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
     return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                    settings_object, &settings, given ? &part : NULL, names);
+                    settings_object, &settings, given ? &portion : NULL, names);
+}
+
+PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
+{
+    const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    PyObject *source, *settings_object, *names;
+    struct vkb_cotangents cotangents;
+    struct portion portion = {.cotangents = &cotangents};
+    struct vkb_settings settings;
+    struct vkb_error error = {0};
+    int sums;
+
+    if (!PyArg_ParseTuple(arguments, "O!OO!p:adjoint", state->source_type, &source,
+                          &settings_object, &PyTuple_Type, &names, &sums)
+        || !vkb_read_settings(state, settings_object, &settings)
+        || !vkb_read_names(names, cotangents.names, &cotangents.count))
+        return NULL;
+    cotangents.sums = sums;
+    if (!vkb_require_open(renderer, &error))
+        return vkb_raise(state, &error);
+    if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
+        return NULL;
+    PyObject *plan = new_plan(state, &renderer->device, renderer->variants, renderer->serial,
+                              source, settings_object, &settings, &portion, Py_None);
+    if (!plan || portion.is_possible)
+        return plan;
+    Py_DECREF(plan);
+    Py_RETURN_NONE;
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)

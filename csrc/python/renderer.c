@@ -243,6 +243,10 @@ static PyMethodDef methods[] = {
      "plan(source, settings, names, part=None) -> Plan. Makes no device call; names None: all "
      "framebuffers. A part is (rows of the image, names of the levels that the source has, whether "
      "it is a band of the image): of that part of the graph, and names are any images."},
+    {"adjoint", vkb_renderer_adjoint, METH_VARARGS,
+     "adjoint(source, settings, names, sums) -> Plan, or None: a pass has no adjoint. Of the "
+     "derivatives that cotangents of framebuffers, which are the source's levels, give, by images "
+     "or by fields: methods/adjoint.h."},
     {"bands", vkb_renderer_bands, METH_VARARGS,
      "bands(source, settings, height) -> (head, levels, step, reach) or None. How the final of an "
      "image of so many rows, of which the source has some, can be made of bands: see "

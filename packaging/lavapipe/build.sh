@@ -1,54 +1,61 @@
 #!/bin/sh
 # Runs in the build root: builds Mesa's lavapipe alone, with LLVM inside, and its wheel.
-# Arguments: this folder, and where to put the wheel.
+# Arguments: this folder, which is in packaging/, and where to put the wheel. BUILD: the folder that
+# has Mesa's source and gets all that is built.
 set -eu
 package=$1
 wheels=$2
+build=${BUILD:-/build}
 . /srv/versions.sh
-source=/build/mesa-$MESA
+source=$build/mesa-$MESA
 python=/opt/python/bin/python3.11
 
 cd "$source"
 test -f .patched || patch --quiet --strip=1 <"$package/mesa.patch"
 touch .patched
-cat >/build/native.ini <<END
+cat >"$build/native.ini" <<END
 [binaries]
 llvm-config = '/usr/lib/llvm-$LLVM/bin/llvm-config'
 python = '$python'
 END
 export PATH="/opt/python/bin:$PATH"
 # What LLVM asks the linker for, so that none of it is a shared library: the linker looks here first.
-# LLVM reads no XML and asks no solver here.
+# LLVM reads no XML and asks no solver here. (Links, so that the SBOM finds the packages.)
 libraries=/usr/lib/llvm-$LLVM/lib
-cp /usr/lib/x86_64-linux-gnu/libz.a /usr/lib/x86_64-linux-gnu/libzstd.a "$libraries/"
-cc -O2 -fPIC -c "$package/no_terminal.c" -o /build/no_terminal.o
-rm -f "$libraries/libtinfo.a" "$libraries/libxml2.a"
-ar rcD "$libraries/libtinfo.a" /build/no_terminal.o
-ar rcD "$libraries/libxml2.a"
-cp "$package/driver.sym" /build/
+ln -sf /usr/lib/x86_64-linux-gnu/libz.a /usr/lib/x86_64-linux-gnu/libzstd.a "$libraries/"
+mkdir -p "$build/stubs"
+cc -O2 -fPIC -c "$package/no_terminal.c" -o "$build/stubs/no_terminal.o"
+rm -f "$build"/stubs/*.a
+ar rcD "$build/stubs/libtinfo.a" "$build/stubs/no_terminal.o"
+ar rcD "$build/stubs/libxml2.a"
+ln -sf "$build/stubs/libtinfo.a" "$build/stubs/libxml2.a" "$libraries/"
+cp "$package/driver.sym" "$build/"
 
 # No window system, no DRM, no cache on disk, nothing found by chance: one library that needs libc.
-test -f /build/mesa/build.ninja || "$python" -m mesonbuild.mesonmain setup /build/mesa \
-    --native-file /build/native.ini --buildtype=release --auto-features=disabled -Db_ndebug=true \
+# No absolute path of a source is in it.
+flags="-ffunction-sections -fdata-sections -ffile-prefix-map=$build=."
+test -f "$build/mesa/build.ninja" || "$python" -m mesonbuild.mesonmain setup "$build/mesa" \
+    --native-file "$build/native.ini" --buildtype=release --auto-features=disabled -Db_ndebug=true \
     -Dplatforms= -Dvulkan-drivers=swrast -Dgallium-drivers=llvmpipe \
     -Dllvm=enabled -Dshared-llvm=disabled \
     -Dopengl=false -Dgles1=disabled -Dgles2=disabled -Dglx=disabled -Degl=disabled -Dgbm=disabled \
     -Dshader-cache=disabled -Dxmlconfig=disabled -Dzstd=disabled -Dzlib=disabled -Dexpat=disabled \
     -Dvideo-codecs= -Dbuild-tests=false \
-    -Dc_args='-ffunction-sections -fdata-sections' \
-    -Dcpp_args='-ffunction-sections -fdata-sections' \
+    -Dc_args="$flags" -Dcpp_args="$flags" \
     -Dc_link_args='-static-libgcc -Wl,--gc-sections,--as-needed' \
-    -Dcpp_link_args='-static-libgcc -static-libstdc++ -Wl,--gc-sections,--as-needed,--version-script=/build/driver.sym' \
-    >/build/mesa-setup.log
+    -Dcpp_link_args="-static-libgcc -static-libstdc++ -Wl,--gc-sections,--as-needed,--version-script=$build/driver.sym,-Map=$build/driver.map" \
+    >"$build/mesa-setup.log"
 library=src/gallium/targets/lavapipe/libvulkan_lvp.so
-ninja -C /build/mesa -j "${JOBS:-2}" "$library" >/build/mesa-build.log ||
-    { tail -n 40 /build/mesa-build.log; exit 1; }
+# Of all that is linked, the map of the driver must be the last.
+rm -f "$build/mesa/$library"
+ninja -C "$build/mesa" -j "${JOBS:-2}" "$library" >"$build/mesa-build.log" ||
+    { tail -n 40 "$build/mesa-build.log"; exit 1; }
 
-work=/build/vkbloom-lavapipe
+work=$build/vkbloom-lavapipe
 rm -rf "$work"
 cp -r "$package" "$work"
 cd "$work"
-cp "/build/mesa/$library" vkbloom_lavapipe/
+cp "$build/mesa/$library" vkbloom_lavapipe/
 strip --strip-unneeded vkbloom_lavapipe/libvulkan_lvp.so
 cat >vkbloom_lavapipe/_build.py <<END
 MESA = "$(cat "$source/VERSION")"
@@ -67,4 +74,7 @@ cp /usr/share/doc/libzstd-dev/copyright LICENSE.zstd
 cp /usr/share/doc/gcc-10-base/copyright LICENSE.gcc
 "$python" -m pip --quiet wheel --no-deps --no-build-isolation --no-index --wheel-dir dist .
 "$python" -m wheel tags --remove --python-tag py3 --abi-tag none --platform-tag "manylinux_${DRIVER_GLIBC}_x86_64" dist/*.whl
+"$python" "$package/../sbom.py" add dist/*.whl vkbloom_lavapipe/libvulkan_lvp.so \
+    "$build/driver.map" --own "$build" --symbols "$build/mesa/$library" \
+    --source Mesa "$MESA" "mesa_$MESA.orig.tar.xz@$MESA_SHA256" "$package/mesa.patch"
 mv dist/*.whl "$wheels"

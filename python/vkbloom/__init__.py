@@ -20,6 +20,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from vkbloom import deprecations
 from vkbloom._core import (
     AdapterNotFoundError,
     DeviceLostError,
@@ -182,6 +183,10 @@ def __getattr__(name: str) -> Any:
     kind = METHODS.class_named(name) or STAGES.class_named(name)
     if kind is not None:
         return kind
+    if (renamed := deprecations.NAMES.get(name)) is not None:
+        new = renamed._replace(new=f"vkbloom.{renamed.new}")
+        deprecations.warn(f"vkbloom.{name}", new)
+        return getattr(import_module(__name__), renamed.new)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

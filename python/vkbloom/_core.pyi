@@ -104,6 +104,9 @@ class Renderer:
         part: tuple[int, tuple[str, ...], int] = ...,
         /,
     ) -> Plan: ...
+    def adjoint(
+        self, source: Source, settings: object, names: tuple[str, ...], sums: bool, /
+    ) -> Plan | None: ...
     def bands(
         self, source: Source, settings: object, height: int, /
     ) -> tuple[str | None, int, tuple[str, ...], int, int] | None: ...

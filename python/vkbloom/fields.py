@@ -94,7 +94,9 @@ class FieldInfo:
         """The first sentence about the parameter in the docstring of the class, or of a base."""
         from vkbloom.views.descriptions import described_parameters  # noqa: PLC0415  rarely needed
 
-        texts = (described_parameters(kind).get(self.name) for kind in self.owner.__mro__)
+        texts = (
+            described_parameters(kind.__doc__ or "").get(self.name) for kind in self.owner.__mro__
+        )
         return self.text or next(filter(None, texts), "")
 
     @property

@@ -21,6 +21,7 @@ from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
 from vkbloom.io import image_reading
 from vkbloom.io.array_files import divided, has_straight, premultiplied
+from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
 from vkbloom.io.rows import Rows, opened_rows, written_rows
@@ -64,6 +65,8 @@ def apply_file(
     subimage: int | None = None,
     input_colour: Colour | None = None,
     output_colour: SavedColour | None = None,
+    primaries: str = "rec709",
+    view: str | None = None,
     raw: bool = False,
     half: bool | None = None,
     expand: float | None = None,
@@ -96,8 +99,13 @@ def apply_file(
     input_colour : str, optional
         "linear", "srgb" or a colour space of OpenColorIO's built-in configuration. Default: that of
         the file, as for `read`.
-    output_colour : {"linear", "srgb"}, optional
-        Encoding of the written colours. Default: "srgb" for integers, "linear" for floats.
+    output_colour : {"linear", "srgb", "gamma22", "pq", "hlg"}, optional
+        Encoding of the written colours. Default: "srgb" for integers, "linear" for floats. "pq" and
+        "hlg" are written with 16 bits where the format has them.
+    primaries : {"rec709", "rec2020", "p3"}
+        Primaries of the written colours, as for `write`.
+    view : str, optional
+        A view instead of `output_colour` and `primaries`, as for `write`.
     raw : bool, default False
         Whether to use the values of an 8-bit file without decoding and encoding them.
     half : bool, optional
@@ -144,6 +152,8 @@ def apply_file(
     ...     vkbloom.read(f"{folder}/out.exr").shape
     (64, 48, 3)
     """
+    saved = Saved(output_colour, primaries, view)
+    check_saved(saved)
     chosen = presets["bevy_natural"] if settings is None else check_settings(settings)
     reading = _Reading(
         os.fspath(source),
@@ -160,9 +170,9 @@ def apply_file(
     work = _Work(reading, chosen, progress)
     if renderer is None:
         with Renderer() as own:
-            work.write(core_of(own), Path(target), output_colour, quality)
+            work.write(core_of(own), Path(target), saved, quality)
     else:
-        work.write(core_of(renderer), Path(target), output_colour, quality)
+        work.write(core_of(renderer), Path(target), saved, quality)
     return tuple(work.notes)
 
 
@@ -181,9 +191,7 @@ class _Work:
         self._done = 0
         self.notes: dict[str, None] = {}
 
-    def write(
-        self, core: _core.Renderer, target: Path, colour: SavedColour | None, quality: int | None
-    ) -> None:
+    def write(self, core: _core.Renderer, target: Path, saved: Saved, quality: int | None) -> None:
         """Render the file and write the result."""
         facts = {
             "Software": f"vkbloom {installed_version()}",
@@ -192,7 +200,7 @@ class _Work:
         height = self._reading.height
         with ExitStack() as stack:
             finals = self._finals(core, stack)
-            write = stack.enter_context(written_rows(target, height, colour, facts, quality))
+            write = stack.enter_context(written_rows(target, height, saved, facts, quality))
             for final in finals:
                 losses = write(self._reading.result(final, self._settings))
                 self.notes.update(dict.fromkeys(losses))

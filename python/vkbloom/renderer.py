@@ -581,7 +581,7 @@ class Renderer:
         """
         from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
 
-        return vjp(self.apply, image, check_settings(settings, of_image=True), mask, emission)
+        return vjp(self, image, check_settings(settings, of_image=True), mask, emission)
 
     @checked
     def apply_many(

@@ -43,29 +43,32 @@ vec3 tonemap_khronos_neutral(vec3 c)
 
 // AgX (Sobotka) in the variant of three.js (r160, tonemapping_pars_fragment): Rec. 2020 inset, log2
 // range, sixth-order fit of the sigmoid, outset. The result is linear.
-vec3 tonemap_agx(vec3 c)
-{
-    const mat3 REC709_TO_REC2020 = mat3(0.6274, 0.0691, 0.0164,
-                                        0.3293, 0.9195, 0.0880,
-                                        0.0433, 0.0113, 0.8956);
-    const mat3 REC2020_TO_REC709 = mat3(1.6605, -0.1246, -0.0182,
-                                        -0.5876, 1.1329, -0.1006,
-                                        -0.0728, -0.0083, 1.1187);
-    const mat3 INSET = mat3(0.856627153315983, 0.137318972929847, 0.11189821299995,
+const mat3 REC709_TO_REC2020 =
+    mat3(0.6274, 0.0691, 0.0164, 0.3293, 0.9195, 0.0880, 0.0433, 0.0113, 0.8956);
+const mat3 REC2020_TO_REC709 =
+    mat3(1.6605, -0.1246, -0.0182, -0.5876, 1.1329, -0.1006, -0.0728, -0.0083, 1.1187);
+const mat3 AGX_INSET = mat3(0.856627153315983, 0.137318972929847, 0.11189821299995,
                             0.0951212405381588, 0.761241990602591, 0.0767994186031903,
                             0.0482516061458583, 0.101439036467562, 0.811302368396859);
-    const mat3 OUTSET = mat3(1.1271005818144368, -0.1413297634984383, -0.14132976349843826,
+const mat3 AGX_OUTSET = mat3(1.1271005818144368, -0.1413297634984383, -0.14132976349843826,
                              -0.11060664309660323, 1.157823702216272, -0.11060664309660294,
                              -0.016493938717834573, -0.016493938717834257, 1.2519364065950405);
-    const float LOW = -12.47393;
-    const float HIGH = 4.026069;
-    vec3 x = max(INSET * (REC709_TO_REC2020 * c), 1e-10);
-    x = clamp((log2(x) - LOW) / (HIGH - LOW), 0.0, 1.0);
+const float AGX_LOW = -12.47393;
+const float AGX_HIGH = 4.026069;
+
+vec3 agx_contrast(vec3 x)
+{
     vec3 x2 = x * x;
     vec3 x4 = x2 * x2;
-    x = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x
-      - 0.00232;
-    x = OUTSET * x;
+    return 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x
+         - 0.00232;
+}
+
+vec3 tonemap_agx(vec3 c)
+{
+    vec3 x = max(AGX_INSET * (REC709_TO_REC2020 * c), 1e-10);
+    x = agx_contrast(clamp((log2(x) - AGX_LOW) / (AGX_HIGH - AGX_LOW), 0.0, 1.0));
+    x = AGX_OUTSET * x;
     x = pow(max(x, 0.0), vec3(2.2));
     return clamp(REC2020_TO_REC709 * x, 0.0, 1.0);
 }

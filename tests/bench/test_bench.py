@@ -16,7 +16,7 @@ import pytest
 from benchmarks import BENCHMARKS, Plan, Report, peers, run, write
 from benchmarks.__main__ import command as program
 from benchmarks.cost import Line
-from benchmarks.image import SETTINGS, full_kernel
+from benchmarks.image import SETTINGS, _time_one, full_kernel
 from benchmarks.inputs import REC709, THRESHOLD, pictures
 from benchmarks.machine import command
 from benchmarks.ours import contender
@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.conftest import ADAPTER
+from tests.exhaustive import EXHAUSTIVE
 
 # The tests do not require the peers. SciPy is installed with scikit-image, which the tests require.
 scipy_peer = importlib.import_module("benchmarks.peers.scipy")
@@ -136,6 +137,10 @@ def test_a_wrong_peer_is_told_and_not_timed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(scipy_peer, "image_bloom", spoiled)
+    monkeypatch.setattr(
+        "benchmarks.image.run",
+        lambda plan, section: _time_one(plan, section, (64, 36), np.dtype("float16"), 4),
+    )
     result = bench("--quick", "--only", "image", "-o", tmp_path / "b.md")
     assert result.exit_code == 1
     assert "float16, RGBA: SciPy: pictures differ by" in result.stderr
@@ -372,18 +377,23 @@ def test_results_are_written_before_a_later_failure(
 # All of it
 
 
+#: Those that take two seconds at most; make exhaustive runs all.
+RUN = [*BENCHMARKS] if EXHAUSTIVE else ["forward", "requests", "cost", "overhead", "separable"]
+RUN += [] if EXHAUSTIVE else [name for name in BENCHMARKS if name.endswith("-gpu")]
+
+
 @pytest.fixture(scope="module")
 def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, dict[str, Any], str]:
-    """A quick run of everything, its JSON and its page."""
+    """A quick run, its JSON and its page."""
     path = tmp_path_factory.mktemp("bench") / "all.md"
-    result = bench("--quick", "-o", path)
+    result = bench("--quick", "-o", path, *(word for name in RUN for word in ("--only", name)))
     return result, json.loads(path.with_suffix(".json").read_text()), path.read_text()
 
 
 def test_everything_runs(smoke: tuple[Result, dict[str, Any], str]) -> None:
     result, values, page = smoke
     assert (result.exit_code, result.stderr) == (0, "")
-    assert [section["id"] for section in values["sections"]] == list(BENCHMARKS)
+    assert [section["id"] for section in values["sections"]] == RUN
     for section in values["sections"]:
         assert f"(`{section['id']}`)" in page
         assert all(found["agrees"] for found in section["agreements"])
@@ -402,7 +412,8 @@ def test_everything_runs(smoke: tuple[Result, dict[str, Any], str]) -> None:
 def test_the_report_says_on_what(smoke: tuple[Result, dict[str, Any], str]) -> None:
     _, values, page = smoke
     machine = values["machine"]
-    assert machine["command"] == f"python -m benchmarks --adapter {ADAPTER} --quick"
+    only = "".join(f" --only {name}" for name in RUN)
+    assert machine["command"] == f"python -m benchmarks --adapter {ADAPTER}{only} --quick"
     assert machine["vkbloom"] == vkbloom.__version__
     assert machine["CPU"]
     with vkbloom.Renderer() as renderer:

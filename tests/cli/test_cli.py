@@ -27,6 +27,8 @@ from vkbloom.fields import fields_of
 from vkbloom.registry import METHODS
 from vkbloom.scene import Camera, Scene
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 oiio = pytest.importorskip("OpenImageIO")
 
 SAUCER = Path(__file__).parents[2] / "examples" / "saucer"

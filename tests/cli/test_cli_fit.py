@@ -12,6 +12,8 @@ from click.testing import CliRunner
 import vkbloom
 from vkbloom.cli.program import program
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 
 @pytest.fixture
 def files(tmp_path: Path) -> tuple[str, str]:

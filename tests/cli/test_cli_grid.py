@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import queue
 import signal
 import socket
 import subprocess
@@ -19,9 +20,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.exhaustive import witness
 from tests.framebuffers import noise
 from vkbloom import Pyramid, Renderer, Separable
 from vkbloom.cli.axis_options import axis_values
+from vkbloom.cli.grid import _loop_without_interrupts
 from vkbloom.cli.program import program
 from vkbloom.io.image_reading import load
 from vkbloom.io.image_writing import save
@@ -170,6 +173,17 @@ class TestStores:
         found, expected = (xr.open_zarr(tmp_path / name) for name in ("a.zarr", "b.zarr"))
         np.testing.assert_array_equal(found["final"].values, expected["final"].values)
 
+    def test_no_interrupt_reaches_the_workers(self) -> None:
+        """The thread that starts them has SIGINT blocked, which its child processes inherit."""
+        with _loop_without_interrupts() as loop:
+            seen: queue.Queue[str] = queue.Queue()
+            show = ["grep", "SigBlk", "/proc/self/status"]
+            loop.add_callback(lambda: seen.put(subprocess.check_output(show, text=True)))
+            blocked = int(seen.get(timeout=60).split()[1], 16)
+        assert blocked >> (signal.SIGINT - 1) & 1
+        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+    @witness("a cluster takes 8 s to start; the test before this one has who gets the signal")
     def test_an_interrupt_of_all_processes(self, tmp_path: Path) -> None:
         """Ctrl-C on a terminal also reaches the workers."""
         out = tmp_path / "a.zarr"

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.exhaustive import by_turns
 from vkbloom import large_files
 from vkbloom.banded import BloomByBands, ImageByBands
 from vkbloom.cli.program import program
@@ -176,8 +177,9 @@ def test_turned_pictures(
     assert result.shape == ((41, 50, 3) if orientation == 6 else (50, 41, 3))
 
 
-@pytest.mark.parametrize("height", [50, 512])
-@pytest.mark.parametrize("words", [(), ("--alpha", "max"), ("--half",)])
+@pytest.mark.parametrize(
+    ("words", "height"), by_turns([("--half",), (), ("--alpha", "max")], turns=[50, 512])
+)
 def test_mask_and_emission(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

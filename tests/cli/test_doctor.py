@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,9 @@ linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader w
 
 # What makes the loader look elsewhere than on a machine where nothing is set.
 VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
+# A manifest that is not there, and an environment in which not all is well.
+ABSENT = "/none/absent.json"
+PROBLEMS = {"VKBLOOM_ADAPTER": "nonsense", "VKBLOOM_CACHE_DIR": "/dev/null/cache"}
 
 
 def by_topic(findings: Iterable[Finding], topic: str) -> Finding:
@@ -70,6 +73,27 @@ def without_variables(monkeypatch: pytest.MonkeyPatch) -> None:
 # As a whole
 
 
+@pytest.fixture(scope="module")
+def answers() -> dict[object, child.Answer]:
+    return {}
+
+
+@pytest.fixture
+def remembered(answers: dict[object, child.Answer], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A question that was asked in the same environment is not asked again."""
+    ask = child.ask
+
+    def once(*question: str, environment: Mapping[str, str] | None = None) -> child.Answer:
+        variables = sorted(item for item in os.environ.items() if item[0].startswith("V"))
+        key = (question, tuple(variables), tuple(sorted((environment or {}).items())))
+        if key not in answers:
+            answers[key] = ask(*question, environment=environment)
+        return answers[key]
+
+    monkeypatch.setattr(child, "ask", once)
+
+
+@pytest.mark.usefixtures("remembered")
 def test_this_machine_can_render() -> None:
     status, answer, findings = examined()
     assert status == 0
@@ -86,8 +110,9 @@ def test_this_machine_can_render() -> None:
         assert chosen.startswith(renderer.info.summary)
 
 
+@pytest.mark.usefixtures("remembered")
 def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
-    status, _, findings = examined(VKBLOOM_ADAPTER="nonsense", VKBLOOM_CACHE_DIR="/dev/null/cache")
+    status, _, findings = examined(**PROBLEMS)
     assert status == 0
     chosen = by_topic(findings, "chosen adapter")
     assert chosen.status == "problem"
@@ -99,8 +124,9 @@ def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
         assert finding.advice or finding.status != "problem"
 
 
+@pytest.mark.usefixtures("remembered")
 def test_the_table_has_a_line_for_each_finding() -> None:
-    ended = CliRunner().invoke(program, ["doctor"], env={"VKBLOOM_ADAPTER": "nonsense"})
+    ended = CliRunner().invoke(program, ["doctor"], env=PROBLEMS)
     assert (ended.exit_code, ended.stderr) == (0, "")
     lines = ended.stdout.splitlines()
     chosen = next(index for index, line in enumerate(lines) if "chosen adapter" in line)
@@ -110,26 +136,29 @@ def test_the_table_has_a_line_for_each_finding() -> None:
 
 
 @linux_only
-@pytest.mark.parametrize("variable", ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"])
-def test_no_driver(without_variables: None, variable: str, tmp_path: Path) -> None:
-    absent = tmp_path / "absent.json"
-    status, answer, findings = examined(**{variable: str(absent)})
+@pytest.mark.usefixtures("remembered", "without_variables")
+def test_no_driver() -> None:
+    status, answer, findings = examined(VK_DRIVER_FILES=ABSENT)
     assert (status, answer["can_render"]) == (1, False)
     assert by_topic(findings, "Vulkan loader").status == "ok"
-    manifest = by_topic(findings, "driver absent.json")
-    assert manifest.status == "problem"
-    assert f"{absent}, from {variable}, cannot be read: No such file" in manifest.found
+    assert by_topic(findings, "driver absent.json").status == "problem"
     assert by_topic(findings, "adapters").status == "problem"
-    assert f"{variable}={absent}" in by_topic(findings, "environment").found
+    assert f"VK_DRIVER_FILES={ABSENT}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
+    ended = CliRunner().invoke(program, ["doctor"], env={"VK_DRIVER_FILES": ABSENT})
+    assert (ended.exit_code, ended.stderr) == (1, "")
+    assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
 
 
 @linux_only
-def test_no_driver_in_words(without_variables: None, tmp_path: Path) -> None:
-    absent = str(tmp_path / "absent.json")
-    ended = python("-m", "vkbloom.cli", "doctor", VK_DRIVER_FILES=absent)
-    assert (ended.returncode, ended.stderr) == (1, "")
-    assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
+@pytest.mark.parametrize("variable", ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"])
+def test_the_variable_of_a_manifest_is_named(
+    without_variables: None, monkeypatch: pytest.MonkeyPatch, variable: str
+) -> None:
+    monkeypatch.setenv(variable, ABSENT)
+    manifest = by_topic(manifests(), "driver absent.json")
+    assert manifest.status == "problem"
+    assert f"{ABSENT}, from {variable}, cannot be read: No such file" in manifest.found
 
 
 @linux_only
@@ -200,17 +229,27 @@ def test_no_loader(without_loader: dict[str, str]) -> None:
     assert "loader (libvulkan.so.1) is missing" in by_topic(findings, "adapters").found
 
 
+def validation() -> Finding:
+    """Return the finding about the validation layer."""
+    loader = child.ask("loader")
+    assert loader.value is not None
+    (finding,) = doctor._validation(loader.value["layers"], os.environ["VKBLOOM_ADAPTER"])
+    return finding
+
+
 @linux_only
-def test_no_validation_layer(tmp_path: Path) -> None:
-    status, _, findings = examined(VK_LAYER_PATH=str(tmp_path))
-    layer = by_topic(findings, "validation layer")
-    assert (status, layer.status) == (0, "note")
+def test_no_validation_layer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
+    layer = validation()
+    assert layer.status == "note"
     assert "is not installed" in layer.found
     assert "apt install vulkan-validationlayers" in layer.advice
 
 
 @linux_only
-def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
+def test_a_validation_layer_that_does_not_open(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     absent = tmp_path / "absent.so"
     (tmp_path / "layer.json").write_text(
         json.dumps(
@@ -227,9 +266,9 @@ def test_a_validation_layer_that_does_not_open(tmp_path: Path) -> None:
             }
         )
     )
-    status, _, findings = examined(VK_LAYER_PATH=str(tmp_path))
-    layer = by_topic(findings, "validation layer")
-    assert (status, layer.status) == (0, "problem")
+    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
+    layer = validation()
+    assert layer.status == "problem"
     assert "version 1.3.0 is installed, but the test render fails with it" in layer.found
 
 
@@ -243,6 +282,7 @@ def test_driver_without_adapters_is_a_problem(monkeypatch: pytest.MonkeyPatch) -
     assert "driver says no" in by_topic(report.findings, "adapters").found
 
 
+@pytest.mark.usefixtures("remembered")
 def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> None:
     ask = child.ask
 
@@ -367,10 +407,9 @@ def test_log_without_a_search_is_a_note(without_variables: None) -> None:
 
 
 @linux_only
-def test_empty_variable_hides_every_driver() -> None:
-    status, _, findings = examined(VK_DRIVER_FILES="")
-    assert status == 1
-    finding = by_topic(findings, "drivers")
+def test_empty_variable_hides_every_driver(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VK_DRIVER_FILES", "")
+    finding = by_topic(manifests(), "drivers")
     assert finding.status == "problem"
     assert finding.advice.startswith("Unset VK_DRIVER_FILES")
 

@@ -25,6 +25,8 @@ from vkbloom.named_settings import PRESETS
 from vkbloom.psf.base import functions
 from vkbloom.registry import STAGES
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 
 

@@ -17,6 +17,8 @@ from click.testing import CliRunner, Result
 import vkbloom
 from vkbloom.cli.program import program
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 pytest.importorskip("OpenImageIO")
 
 
@@ -77,18 +79,19 @@ def test_verbose_tells_adapter_sizes_and_times(tmp_path: Path, dark: Path) -> No
 # Completion
 
 # The scripts that the documented lines load, called as the shell calls them at the Tab key.
+_LOAD = 'eval "$(_VKBLOOM_COMPLETE={shell}_source vkbloom)"\n'
 _BASH = """
-eval "$(_VKBLOOM_COMPLETE=bash_source vkbloom)"
-COMP_WORDS=({words}) COMP_CWORD={last}
+COMP_WORDS=({words}) COMP_CWORD={last} COMPREPLY=()
 _vkbloom_completion vkbloom
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
 # zsh's own functions print here what they would offer.
+_ZSH_FUNCTIONS = """
+compdef() { :; }
+compadd() { print -l -- "${(@P)@[-1]}" }
+_describe() { print -l -- "${(@P)3%%:*}" }
+"""
 _ZSH = """
-compdef() {{ :; }}
-eval "$(_VKBLOOM_COMPLETE=zsh_source vkbloom)"
-compadd() {{ print -l -- "${{(@P)@[-1]}}" }}
-_describe() {{ print -l -- "${{(@P)3%%:*}}" }}
 words=({words}) CURRENT={last}
 _vkbloom_completion
 """
@@ -103,23 +106,30 @@ def test_completion(tmp_path: Path, shell: str) -> None:
     program_file.write_text(f"#!{sys.executable}\nfrom vkbloom.cli import main\n\nmain()\n")
     program_file.chmod(program_file.stat().st_mode | stat.S_IXUSR)
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
-    for words, expected in (
-        (["vkbloom", "gl"], {"glares"}),
-        (["vkbloom", "apply", "--thresh"], {"--threshold", "--threshold-scale"}),
-        (["vkbloom", "apply", "--preset", "unity"], {"unity_urp", "unity_hdrp"}),
+    script = (_ZSH_FUNCTIONS if shell == "zsh" else "") + _LOAD.format(shell=shell)
+    for words in (
+        ["vkbloom", "gl"],
+        ["vkbloom", "apply", "--thresh"],
+        ["vkbloom", "apply", "--preset", "unity"],
     ):
         quoted = " ".join(f"'{word}'" for word in words)
         # bash counts words from 0, zsh from 1.
-        script = (
+        script += (
             _BASH.format(words=quoted, last=len(words) - 1)
             if shell == "bash"
             else _ZSH.format(words=quoted, last=len(words))
         )
-        done = subprocess.run(
-            [found, "-f" if shell == "zsh" else "--norc", "-c", script],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert set(done.stdout.split()) == expected, done.stderr
+        script += "echo ---\n"
+    done = subprocess.run(
+        [found, "-f" if shell == "zsh" else "--norc", "-c", script],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert [set(part.split()) for part in done.stdout.split("---\n")] == [
+        {"glares"},
+        {"--threshold", "--threshold-scale"},
+        {"unity_urp", "unity_hdrp"},
+        set(),
+    ], done.stderr

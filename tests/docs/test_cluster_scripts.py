@@ -8,12 +8,14 @@ from pathlib import Path
 import pytest
 
 import vkbloom
+from tests.exhaustive import witness
 from tests.processes import output
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-SCRIPTS = sorted(FOLDER.glob("on_*.py"))
+SCRIPTS = sorted(FOLDER.glob("*on_*.py"))
 
 
+@witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
 def test_on_this_machine(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     xarray = pytest.importorskip("xarray")

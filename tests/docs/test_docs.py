@@ -15,6 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 import vkbloom
+from tests.exhaustive import witness
 from vkbloom import Renderer, Scene, Separable, presets, write
 from vkbloom.cli.program import program
 from vkbloom.io.image_writing import save
@@ -34,9 +35,12 @@ PAGES = [
     if page.name != "testing.md" and "```python" in page.read_text()
 ]
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
-# Commands of `sh` blocks that do not end, take long, or need a cluster: only their arguments are
-# parsed.
-ENDLESS = ("explore", "view")
+LONG = witness("the other notebooks take 9 s; the pages have the same calls")
+# Commands of `sh` blocks that do not end, need a cluster, or are tested as they stand elsewhere
+# (test_doctor.py): only their arguments are parsed.
+ENDLESS = ("explore", "view", "doctor")
+# What `vkbloom check` measures, for the same laws in less time.
+SMALL = ["--measure-size", "64x64", "--size", "64x48"]
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -101,7 +105,7 @@ def test_commands_of_pages(words: list[str], folder: Path, kept_renderers: None)
         assert command is not None
         command.make_context(words[0], words[1:], resilient_parsing=True)
         return
-    result = CliRunner().invoke(program, words)
+    result = CliRunner().invoke(program, [*words, *(SMALL if words[0] == "check" else [])])
     assert result.exit_code == 0, result.output
 
 
@@ -121,17 +125,31 @@ def kernel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     manager.cleanup_resources()
 
 
+def code_cells(path: Path) -> list[dict[str, Any]]:
+    return [one for one in json.loads(path.read_text())["cells"] if one["cell_type"] == "code"]
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
-def test_notebook(path: Path, folder: Path, kernel: Any) -> None:
-    notebook = json.loads(path.read_text())
-    # Stored as run from top to bottom by tools/run_notebooks.py.
-    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+def test_notebooks_are_stored_as_run(path: Path) -> None:
+    """From top to bottom, by tools/run_notebooks.py."""
+    code = code_cells(path)
     assert [cell["execution_count"] for cell in code] == list(range(1, len(code) + 1))
     stored = [output for cell in code for output in cell["outputs"]]
     assert any("image/png" in output.get("data", {}) for output in stored)
     assert not any(output["output_type"] == "error" for output in stored)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=() if path.stem == "forward_system" else LONG, id=path.name)
+        for path in NOTEBOOKS
+    ],
+)
+def test_notebook(path: Path, folder: Path, kernel: Any) -> None:
     shown: list[Any] = []
-    for source in ("%reset -f", f"%cd {folder}", *("".join(cell["source"]) for cell in code)):
+    sources = ("".join(cell["source"]) for cell in code_cells(path))
+    for source in ("%reset -f", f"%cd {folder}", *sources):
         reply = kernel.execute_interactive(source, timeout=120, output_hook=shown.append)
         assert reply["content"]["status"] == "ok", reply["content"]
     contents = [message["content"] for message in shown]

@@ -256,7 +256,7 @@ class TestViewer:
         begun = presets["tutorial"].replace(tonemap="aces", encoding="srgb")
         assert settings_from(answer["sides"]["a"]) == begun
         pictures = {}
-        for name, preset in some(presets.items(), 20):
+        for name, preset in some(presets.items(), 10):
             frame(viewer, preset.replace(tonemap="aces", encoding="srgb"))
             pictures[name] = viewer.frames["a"]["final"][..., :3].astype(int)
         for one, other in itertools.combinations(pictures, 2):
@@ -385,6 +385,12 @@ class TestViewer:
         assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         # Without a size, the scene's own.
         assert frame(viewer, settings)[0]["size"] == [64, 36]
+
+    def test_a_page_shows_sdr(self, viewer: Viewer) -> None:
+        settings = Separable(encoding="pq")
+        facts, _ = frame(viewer, settings, size=[16, 9])
+        assert facts["note"] == "this page shows SDR: final's pq signal is shown as sRGB"
+        assert not frame(viewer, settings, size=[16, 9], framebuffer="bloom")[0]["note"]
 
     @pytest.mark.parametrize("shading", ["forward", "deferred"])
     def test_every_framebuffer_can_be_looked_at(

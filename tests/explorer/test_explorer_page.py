@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import by_turns
+from tests.exhaustive import by_turns, witness
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, jupyterlab
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
@@ -46,24 +46,48 @@ def scene_url(
 
 
 @contextmanager
-def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
-    """Open a page and wait for its first picture. An error or warning of the page fails the
-    test."""
-    page = browser.new_page(viewport={"width": 980, "height": 640}, **options)
+def shown(page: Page, url: str) -> Iterator[None]:
+    """Show an address in a page and wait for its first picture. An error or warning of the page
+    fails the test."""
     complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
+
+    def note(said: Any) -> None:
+        complaints.append(str(getattr(said, "text", said)))
+
+    page.on("console", note)
+    page.on("pageerror", note)
+    page.set_viewport_size({"width": 980, "height": 640})
+    page.emulate_media(color_scheme="light")
+    page.mouse.move(0, 0)
+    # An address that differs after its # alone would not load the page again.
+    page.goto("about:blank")
     page.goto(url)
     page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
-    yield page
-    page.close()
+    yield
+    page.remove_listener("console", note)
+    page.remove_listener("pageerror", note)
     assert complaints == []
 
 
-@pytest.fixture
-def page(browser: Browser, scene_url: str) -> Iterator[Page]:
-    with opened(browser, scene_url) as page:
+@contextmanager
+def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
+    """Show an address in a page of its own."""
+    page = browser.new_page(**options)
+    with shown(page, url):
         yield page
+    page.close()
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Browser) -> Page:
+    """The page of all tests that need none of their own."""
+    return browser.new_page()
+
+
+@pytest.fixture
+def page(tab: Page, scene_url: str) -> Iterator[Page]:
+    with shown(tab, scene_url):
+        yield tab
 
 
 def see(page: Page, folder: Path) -> NDArray[np.uint8]:
@@ -166,9 +190,14 @@ def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_p
     wait_for_code(page, 'vkbloom.presets["jimenez2014"].replace(exposure=2.0)')
 
 
-def test_point_spread_functions(page: Page) -> None:
-    # A small picture, whose transforms are quick.
-    page.set_viewport_size({"width": 390, "height": 500})
+def test_point_spread_functions(tab: Page, serve: Any, renderer: Renderer) -> None:
+    # Transforms of a small picture are quick to compile.
+    url = serve(lambda: Viewer(np.ones((9, 16, 3), np.float32), renderer=renderer))
+    with shown(tab, url):
+        choose_point_spread_functions(tab)
+
+
+def choose_point_spread_functions(page: Page) -> None:
     page.get_by_label("preset").select_option("camera_lens")
     wait_for_code(page, 'vkbloom.presets["camera_lens"]')
     assert field(page, "psf").input_value() == "harvey_shack"
@@ -380,10 +409,11 @@ def test_pictures_follow_the_window(page: Page, tmp_path: Path) -> None:
     assert (area["width"], area["height"]) == (1280, 720)
 
 
-def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Path) -> None:
+def test_an_image(tab: Page, serve: Any, renderer: Renderer, tmp_path: Path) -> None:
     image = (np.random.default_rng(3).random((60, 80, 3)) ** 8 * 20).astype(np.float32)
     url = serve(lambda: Viewer(image, KinoBloom(), renderer=renderer))
-    with opened(browser, url) as page:
+    page = tab
+    with shown(page, url):
         assert page.get_by_label("time, in turns").count() == 0
         expected = renderer.apply(image, KinoBloom())["final"]
         # It is smaller than it is shown: rendered as it is, and enlarged with hard pixels.
@@ -402,7 +432,7 @@ def test_an_image(browser: Browser, serve: Any, renderer: Renderer, tmp_path: Pa
             assert time.monotonic() < deadline
 
 
-def test_a_server_that_stops_is_noticed(browser: Browser, serve: Any, renderer: Renderer) -> None:
+def test_a_server_that_stops_is_noticed(tab: Page, serve: Any, renderer: Renderer) -> None:
     class Failing(Viewer):
         def answer(self, message: Any, files: Any = ()) -> Any:
             if message["kind"] == "frame" and message["sides"]["a"]["bloom"] is False:
@@ -410,15 +440,16 @@ def test_a_server_that_stops_is_noticed(browser: Browser, serve: Any, renderer: 
             return super().answer(message, files)
 
     image = np.zeros((9, 16, 3), np.uint8)
-    with opened(browser, serve(lambda: Failing(image, renderer=renderer))) as page:
-        field(page, "bloom").uncheck()
-        page.get_by_role("alert").get_by_text("The server has stopped.").wait_for()
+    with shown(tab, serve(lambda: Failing(image, renderer=renderer))):
+        field(tab, "bloom").uncheck()
+        tab.get_by_role("alert").get_by_text("The server has stopped.").wait_for()
 
 
 def test_the_address_keeps_the_state(
-    browser: Browser, scene_url: str, renderer: Renderer, scene: Scene, tmp_path: Path
+    tab: Page, scene_url: str, renderer: Renderer, scene: Scene, tmp_path: Path
 ) -> None:
-    with opened(browser, scene_url) as page:
+    page = tab
+    with shown(page, scene_url):
         page.get_by_label("method").select_option("pyramid")
         field(page, "levels").fill("3")
         page.get_by_label("shading").select_option("deferred")
@@ -429,31 +460,32 @@ def test_the_address_keeps_the_state(
         page.wait_for_url("**%22glow%22%3A9**")
         page.wait_for_url("**wipe**")
         link = page.url
-    for other in (link, None):
-        with opened(browser, link) as page:
-            if other is None:
-                page.reload()
-                page.locator(".vkb-status", has_text="until shown").wait_for()
-            wait_for_code(page, "vkbloom.Pyramid(levels=3)")
-            assert page.get_by_label("wipe A | B").is_checked()
-            assert page.get_by_label("framebuffer").input_value() == "bloom"
-            assert page.get_by_label("shading").input_value() == "deferred"
-            page.get_by_label("wipe A | B").uncheck()
-            picture = see(page, tmp_path)
-            bright = dataclasses.replace(scene, glow_intensity=9)
-            expected = renderer.render(
-                bright, Pyramid(levels=3), size_of(picture), shading="deferred"
-            )["bloom"]
-            assert np.array_equal(
-                picture,
-                decode(picture_of(expected, "bloom", is_encoded=False, stops=0.0), tmp_path),
-            )
-    with opened(browser, scene_url + "#%7B%22a%22%3A3%2C%22zoom%22%3A%5B%22x%22%5D%7D") as page:
-        wait_for_code(page, "vkbloom.Separable()")
-    with opened(browser, link) as page:
+    with shown(page, link):
+        assert_is_as_left(page)
+        page.reload()
+        page.locator(".vkb-status", has_text="until shown").wait_for()
+        assert_is_as_left(page)
+        page.get_by_label("wipe A | B").uncheck()
+        picture = see(page, tmp_path)
+        bright = dataclasses.replace(scene, glow_intensity=9)
+        expected = renderer.render(bright, Pyramid(levels=3), size_of(picture), shading="deferred")[
+            "bloom"
+        ]
+        assert np.array_equal(
+            picture, decode(picture_of(expected, "bloom", is_encoded=False, stops=0.0), tmp_path)
+        )
         page.get_by_role("button", name="Reset").click()
         wait_for_code(page, "vkbloom.Separable()")
         page.wait_for_url(scene_url)
+    with shown(page, scene_url + "#%7B%22a%22%3A3%2C%22zoom%22%3A%5B%22x%22%5D%7D"):
+        wait_for_code(page, "vkbloom.Separable()")
+
+
+def assert_is_as_left(page: Page) -> None:
+    wait_for_code(page, "vkbloom.Pyramid(levels=3)")
+    assert page.get_by_label("wipe A | B").is_checked()
+    assert page.get_by_label("framebuffer").input_value() == "bloom"
+    assert page.get_by_label("shading").input_value() == "deferred"
 
 
 def test_zoom_and_pan(page: Page) -> None:
@@ -531,44 +563,24 @@ def test_files(page: Page, tmp_path: Path) -> None:
     page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
 
 
-def test_narrow_screens(browser: Browser, scene_url: str) -> None:
+def test_narrow_screens(page: Page) -> None:
     """At 390 pixels nothing is cut off, and the picture stays in view while controls are moved."""
-    with opened(browser, scene_url) as page:
-        page.set_viewport_size({"width": 390, "height": 844})
-        page.locator(".vkb-status", has_text="358 × 201").wait_for()
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390
-        # The title, then the picture, then the controls.
-        title, picture = page.locator(".vkb-title"), page.locator(".vkb-stage")
-        tops = [one.bounding_box() for one in (title, picture, page.locator(".vkb-head"))]
-        order = [box["y"] for box in tops if box is not None]
-        assert order == sorted(order)
-        assert order[1] < 80
-        field(page, "blur_strength").scroll_into_view_if_needed()
-        page.evaluate("window.scrollTo(0, document.documentElement.scrollHeight)")
-        assert page.evaluate("window.scrollY") > 100
-        area = page.locator("canvas").bounding_box()
-        assert area is not None
-        assert area["y"] >= 0
-        assert area["y"] + area["height"] <= 844 / 2
-
-
-@pytest.mark.parametrize(("theme", "width"), by_turns(["light", "dark"], turns=[980, 390]))
-def test_no_rule_of_accessibility_is_broken(
-    browser: Browser, scene_url: str, theme: Any, width: int
-) -> None:
-    """Deque's axe-core, with all that the page can show open, in both layouts."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    with opened(browser, scene_url, color_scheme=theme) as page:
-        page.get_by_label("wipe A | B").check()
-        page.get_by_text("More", exact=True).click()
-        page.get_by_text("Plan", exact=True).click()
-        # An error beside its field is shown, too.
-        field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
-        page.locator(".vkb-fields .vkb-error").wait_for()
-        page.set_viewport_size({"width": width, "height": 844})
-        page.wait_for_timeout(300)
-        found = axe.run(page)
-        assert found.violations_count == 0, found.generate_report()
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.locator(".vkb-status", has_text="358 × 201").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    # The title, then the picture, then the controls.
+    title, picture = page.locator(".vkb-title"), page.locator(".vkb-stage")
+    tops = [one.bounding_box() for one in (title, picture, page.locator(".vkb-head"))]
+    order = [box["y"] for box in tops if box is not None]
+    assert order == sorted(order)
+    assert order[1] < 80
+    field(page, "blur_strength").scroll_into_view_if_needed()
+    page.evaluate("window.scrollTo(0, document.documentElement.scrollHeight)")
+    assert page.evaluate("window.scrollY") > 100
+    area = page.locator("canvas").bounding_box()
+    assert area is not None
+    assert area["y"] >= 0
+    assert area["y"] + area["height"] <= 844 / 2
 
 
 def luminance(colour: str) -> float:
@@ -596,10 +608,23 @@ def assert_is_readable(page: Page, theme: str) -> None:
         assert (high + 0.05) / (low + 0.05) >= 4.5, (selector, text, ground)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_themes(browser: Browser, scene_url: str, theme: Any) -> None:
-    with opened(browser, scene_url, color_scheme=theme) as page:
-        assert_is_readable(page, theme)
+@pytest.mark.parametrize(("theme", "width"), by_turns(["light", "dark"], turns=[980, 390]))
+def test_no_rule_of_accessibility_is_broken(page: Page, theme: Any, width: int) -> None:
+    """The rules of contrast, and Deque's axe-core, with all that the page can show open, in both
+    layouts."""
+    page.emulate_media(color_scheme=theme)
+    assert_is_readable(page, theme)
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    page.get_by_label("wipe A | B").check()
+    page.get_by_text("More", exact=True).click()
+    page.get_by_text("Plan", exact=True).click()
+    # An error beside its field is shown, too.
+    field(page, "intensity").locator("xpath=following-sibling::input").fill("-1")
+    page.locator(".vkb-fields .vkb-error").wait_for()
+    page.set_viewport_size({"width": width, "height": 844})
+    page.wait_for_timeout(300)
+    found = axe.run(page)
+    assert found.violations_count == 0, found.generate_report()
 
 
 @pytest.fixture(scope="module")
@@ -622,6 +647,7 @@ def run_cell(browser: Browser, lab: str, theme: Any) -> Page:
     return page
 
 
+@witness("JupyterLab takes 20 s to start; test_explorer.py has the widget's messages")
 def test_jupyterlab(
     browser: Browser, lab: str, renderer: Renderer, scene: Scene, tmp_path: Path
 ) -> None:

@@ -8,14 +8,35 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
 
 import vkbloom
+from vkbloom.cli.program import program
 from vkbloom.reference import tone_map
 
 oiio = pytest.importorskip("OpenImageIO")
+pytestmark = pytest.mark.usefixtures("kept_renderers")
 RAMP = np.geomspace(1e-3, 20, 3 * 64, dtype=np.float32).reshape(1, 64, 3)
 SDR = "ACES 2.0 - SDR 100 nits (Rec.709)"
 HDR = "ACES 2.0 - HDR 1000 nits (Rec.2020)"
+# Half a code value of 10 bits.
+HALF = 0.5 / 1023
+BUILT_IN = "ocio://default"
+# OpenColorIO's curves. Its PQ has 100 cd/m2 for 1, its HLG three times the scene light of BT.2100.
+CURVES = """\
+ocio_profile_version: 2.4
+roles: {default: lin}
+colorspaces:
+  - !<ColorSpace> {name: lin}
+  - !<ColorSpace>
+    name: pq
+    from_scene_reference: !<BuiltinTransform> {style: CURVE - LINEAR_to_ST-2084}
+  - !<ColorSpace>
+    name: hlg
+    from_scene_reference: !<BuiltinTransform> {style: CURVE - HLG-OETF}
+"""
+TO_OPENCOLORIO = {"pq": 2.03, "hlg": 3 * 0.26496}
 
 
 def chunk(file: Path, name: bytes) -> bytes:
@@ -29,27 +50,83 @@ def stored(file: Path) -> Any:
     return oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT)
 
 
-@pytest.mark.parametrize(("encoding", "code"), [("pq", 16), ("hlg", 18)])
-@pytest.mark.parametrize(("primaries", "point"), [("rec709", 1), ("rec2020", 9), ("p3", 12)])
-def test_png_names_its_colours(
-    tmp_path: Path, encoding: Any, code: int, primaries: str, point: int
-) -> None:
-    file = vkbloom.write(tmp_path / "a.png", RAMP, encoding=encoding, primaries=primaries, bits=16)
-    assert chunk(file, b"cICP") == bytes([point, code, 0, 1])
-    spec = oiio.ImageInput.open(str(file)).spec()
-    assert tuple(spec.getattribute("CICP")) == (point, code, 0, 1)
-    if primaries == "rec709":
-        light = RAMP.astype(float)
-        expected = tone_map._pq(light, 203.0) if encoding == "pq" else tone_map._hlg(light)
-        np.testing.assert_allclose(stored(file), expected, atol=0.5 / 1023)
+def converted(values: NDArray[Any], source: str, target: str, config: str = BUILT_IN) -> Any:
+    made = oiio.ImageBufAlgo.colorconvert(
+        oiio.ImageBuf(np.ascontiguousarray(values, np.float32)),
+        source,
+        target,
+        False,
+        colorconfig=config,
+    )
+    assert not made.has_error, made.geterror()
+    return made.get_pixels(oiio.FLOAT)
 
 
-def test_pq_is_read_back_by_opencolorio(tmp_path: Path) -> None:
-    """The file's own space, rec2020 with PQ, gives the light that was written."""
-    file = vkbloom.write(tmp_path / "a.png", RAMP, encoding="pq", primaries="rec2020", bits=16)
-    again = vkbloom.read(file)
-    # OpenColorIO's PQ display has 100 cd/m2 for a value of 1.
-    np.testing.assert_allclose(again / again[0, -1], RAMP / RAMP[0, -1], rtol=0.02, atol=1e-4)
+def shown(values: NDArray[Any], display: str, view: str) -> Any:
+    made = oiio.ImageBufAlgo.ociodisplay(
+        oiio.ImageBuf(values), display, view, "lin_rec709_scene", "", False, colorconfig=BUILT_IN
+    )
+    return np.clip(made.get_pixels(oiio.FLOAT), 0, 1)
+
+
+@pytest.fixture(scope="module")
+def curves(tmp_path_factory: pytest.TempPathFactory) -> str:
+    file = tmp_path_factory.mktemp("ocio") / "curves.ocio"
+    file.write_text(CURVES)
+    return str(file)
+
+
+class TestHdr:
+    @pytest.mark.parametrize("curve", ["pq", "hlg"])
+    def test_curves_are_opencolorios(self, tmp_path: Path, curves: str, curve: Any) -> None:
+        """The reference, what is written, and what a renderer gives."""
+        light = RAMP[RAMP < 1 / 0.26496].reshape(1, -1, 3) if curve == "hlg" else RAMP
+        expected = converted(light * np.float32(TO_OPENCOLORIO[curve]), "lin", curve, curves)
+        formula = tone_map.ENCODINGS[curve](light.astype(float), 203.0)
+        np.testing.assert_allclose(formula, expected, atol=2e-5)
+        file = vkbloom.write(tmp_path / "a.png", light, encoding=curve, bits=16)
+        np.testing.assert_allclose(stored(file), expected, atol=4e-5)
+        with vkbloom.Renderer("software") as renderer:
+            final = renderer.apply(light, vkbloom.Separable(bloom=False, encoding=curve))["final"]
+        np.testing.assert_allclose(final, expected, atol=1e-3)
+
+    @pytest.mark.parametrize(("curve", "code"), [("pq", 16), ("hlg", 18), ("srgb", 13)])
+    @pytest.mark.parametrize(("primaries", "point"), [("rec709", 1), ("rec2020", 9), ("p3", 12)])
+    def test_png_comes_back(
+        self, tmp_path: Path, curve: Any, code: int, primaries: str, point: int
+    ) -> None:
+        """The chunk, as OpenImageIO reads it, and the light, within half a code value."""
+        light = np.minimum(RAMP, {"pq": 20, "hlg": 3.7, "srgb": 1}[curve]).astype(np.float32)
+        file = vkbloom.write(
+            tmp_path / "a.png", light, encoding=curve, primaries=primaries, bits=16
+        )
+        if (point, code) != (1, 13):
+            assert chunk(file, b"cICP") == bytes([point, code, 0, 1])
+            spec = oiio.ImageInput.open(str(file)).spec()
+            assert tuple(spec.getattribute("CICP")) == (point, code, 0, 1)
+        again, facts = vkbloom.read(file, metadata=True)
+        assert facts["notes"] == () or curve in facts["colour"]
+        encode = tone_map.ENCODINGS[curve]
+        np.testing.assert_allclose(
+            encode(again.astype(float), 203.0), encode(light.astype(float), 203.0), atol=HALF
+        )
+
+    def test_saved_frames_name_the_encoding(self, tmp_path: Path) -> None:
+        settings = vkbloom.Separable(bloom=False, encoding="hlg")
+        with vkbloom.Renderer("software") as renderer:
+            frames = renderer.apply(np.full((4, 6, 3), 128, np.uint8), settings)
+        frames.save(tmp_path)
+        assert chunk(tmp_path / "final.png", b"cICP") == bytes([1, 18, 0, 1])
+        assert np.array_equal(vkbloom.Frames.load(tmp_path)["final"], frames["final"])
+
+    def test_highlights_are_not_expanded(self, tmp_path: Path) -> None:
+        file = vkbloom.write(tmp_path / "a.png", RAMP, encoding="pq", bits=16)
+        assert np.array_equal(vkbloom.read(file, expand=8), vkbloom.read(file))
+
+    def test_primaries_are_opencolorios(self, tmp_path: Path) -> None:
+        file = vkbloom.write(tmp_path / "a.exr", RAMP, primaries="rec2020")
+        expected = converted(RAMP, "lin_rec709_scene", "lin_rec2020_scene")
+        np.testing.assert_allclose(stored(file), expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("primaries", ["rec2020", "p3"])
@@ -65,16 +142,77 @@ def test_exr_has_chromaticities(tmp_path: Path, primaries: str) -> None:
     assert (stored(file)[0, 0, :3] > 0).all()
 
 
-def test_views(tmp_path: Path) -> None:
-    sdr = vkbloom.write(tmp_path / "a.png", RAMP, view=SDR, bits=16)
-    hdr = vkbloom.write(tmp_path / "b.png", RAMP, view=f"Rec.2100-PQ - Display/{HDR}", bits=16)
-    assert chunk(sdr, b"cICP") == bytes([1, 13, 0, 1])
-    assert chunk(hdr, b"cICP") == bytes([9, 16, 0, 1])
-    shown = oiio.ImageBufAlgo.ociodisplay(
-        oiio.ImageBuf(RAMP), "sRGB - Display", SDR, "lin_rec709_scene", colorconfig="ocio://default"
+VIEWS = [
+    ("sRGB - Display", SDR, (1, 13)),
+    ("Gamma 2.2 Rec.709 - Display", SDR, (1, 4)),
+    ("Display P3 - Display", "ACES 2.0 - SDR 100 nits (P3 D65)", (12, 13)),
+    ("Rec.1886 Rec.709 - Display", SDR, (1, 1)),
+    ("Rec.2100-PQ - Display", HDR, (9, 16)),
+    ("ST2084-P3-D65 - Display", "ACES 2.0 - HDR 1000 nits (P3 D65)", (12, 16)),
+]
+
+
+@pytest.mark.parametrize(("display", "view", "points"), VIEWS)
+def test_views(tmp_path: Path, display: str, view: str, points: tuple[int, int]) -> None:
+    file = vkbloom.write(tmp_path / "a.png", RAMP, view=f"{display}/{view}", bits=16)
+    assert chunk(file, b"cICP") == bytes([*points, 0, 1])
+    np.testing.assert_allclose(stored(file), shown(RAMP, display, view), atol=1e-4)
+
+
+class TestCommandLine:
+    SETTINGS = ("--no-bloom", "--method", "separable")
+
+    def apply(self, folder: Path, out: str, *options: str, status: int = 0) -> tuple[Path, str]:
+        vkbloom.write(folder / "in.exr", RAMP)
+        arguments = ["apply", str(folder / "in.exr"), str(folder / out)]
+        done = CliRunner().invoke(program, [*arguments, *self.SETTINGS, *options])
+        assert done.exit_code == status, done.output
+        return folder / out, done.output
+
+    def test_view(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """8 bits for SDR and 16 for HDR; the same by bands of rows."""
+        file, _ = self.apply(tmp_path, "a.png", "--view", SDR)
+        assert str(oiio.ImageInput.open(str(file)).spec().format) == "uint8"
+        np.testing.assert_allclose(stored(file), shown(RAMP, "sRGB - Display", SDR), atol=0.6 / 255)
+        display = "Rec.2100-PQ - Display"
+        file, _ = self.apply(tmp_path, "b.png", "--view", f"{display}/{HDR}")
+        assert chunk(file, b"cICP") == bytes([9, 16, 0, 1])
+        np.testing.assert_allclose(stored(file), shown(RAMP, display, HDR), atol=HALF)
+        monkeypatch.setattr("vkbloom.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom.cli.apply.is_large", lambda *_: True)
+        again, _ = self.apply(tmp_path, "c.png", "--view", f"{display}/{HDR}")
+        assert np.array_equal(stored(again), stored(file))
+
+    def test_curve_and_primaries(self, tmp_path: Path) -> None:
+        options = ("--output-colour", "hlg", "--primaries", "rec2020")
+        file, _ = self.apply(tmp_path, "a.png", *options)
+        expected = vkbloom.write(
+            tmp_path / "b.png", RAMP, encoding="hlg", primaries="rec2020", bits=16
+        )
+        assert np.array_equal(stored(file), stored(expected))
+        assert chunk(file, b"cICP") == bytes([9, 18, 0, 1])
+        # Settings with an encoding give a file that names it, or a note.
+        file, _ = self.apply(tmp_path, "c.png", "--encoding", "pq")
+        assert chunk(file, b"cICP") == bytes([1, 16, 0, 1])
+        _, output = self.apply(tmp_path, "c.jpg", "--encoding", "pq")
+        assert "jpeg cannot name the colours rec709 and pq" in output
+
+    @pytest.mark.parametrize(
+        ("out", "options", "message"),
+        [
+            ("a.png", ("--view", "none"), "view: 'none' is not a view of OpenColorIO's"),
+            ("a.png", ("--view", SDR, "--primaries", "p3"), "leave them out"),
+            ("a.png", ("--view", SDR, "--encoding", "pq"), "leave out --view"),
+            ("a.png", ("--primaries", "p3", "--raw"), "leave out --input-colour and --primaries"),
+            ("a.avif", (), "this OpenImageIO is built without libheif; PNG can name"),
+        ],
     )
-    expected = np.clip(shown.get_pixels(oiio.FLOAT), 0, 1)
-    np.testing.assert_allclose(stored(sdr), expected, atol=1e-4)
+    def test_wrong_use(
+        self, tmp_path: Path, out: str, options: tuple[str, ...], message: str
+    ) -> None:
+        _, output = self.apply(tmp_path, out, *options, status=2)
+        assert message in " ".join(output.split())
+        assert not (tmp_path / out).exists()
 
 
 def test_what_is_refused(tmp_path: Path) -> None:
@@ -89,6 +227,10 @@ def test_what_is_refused(tmp_path: Path) -> None:
         vkbloom.write(file, np.zeros((2, 2, 3), np.uint8), primaries="p3")
     with pytest.raises(ValueError, match="write a file of integers"):
         vkbloom.write(tmp_path / "a.exr", RAMP, view=SDR)
-    with pytest.raises(ValueError, match="jpeg cannot name the colours p3 and srgb"):
+    with pytest.raises(ValueError, match="jpeg cannot name the colours p3 and srgb; write PNG or"):
         vkbloom.write(tmp_path / "a.jpg", RAMP, primaries="p3")
+    with pytest.raises(ValueError, match="tiff cannot name the colours rec2020 and pq; write PNG"):
+        vkbloom.write(tmp_path / "a.tif", RAMP, encoding="pq", primaries="rec2020", bits=16)
+    with pytest.raises(ValueError, match="cannot name the colours of Display P3 HDR - Display"):
+        vkbloom.write(file, RAMP, view="Display P3 HDR - Display/Un-tone-mapped")
     assert list(tmp_path.iterdir()) == []

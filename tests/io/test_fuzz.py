@@ -26,8 +26,8 @@ def test_a_short_run(tmp_path: Path) -> None:
     names += ["zarr", "images", "toml", "yaml"]
     # Of own methods tests/own tests mutations without the compiler, which takes most of the time.
     names += ["own"] if EXHAUSTIVE and GLSLANG else []
-    seconds = "2" if EXHAUSTIVE else "0.5"
-    printed = output(RUN, *names, "--plain", "--seconds", seconds, cwd=tmp_path)
+    amount = ["--seconds", "2"] if EXHAUSTIVE else ["--seconds", "0.2", "--inputs", "10"]
+    printed = output(RUN, *names, "--plain", *amount, cwd=tmp_path)
     assert printed.count("nothing found") == len(names)
     assert list(tmp_path.iterdir()) == []
 

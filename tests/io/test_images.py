@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tests.io.parts import store_parts
 from vkbloom.io import safe_writing
+from vkbloom.io.displayed import Saved
 from vkbloom.io.image_reading import decode, load
 from vkbloom.io.image_writing import check_writable, save
 from vkbloom.io.images import Picture, SavedColour, Window
@@ -467,7 +468,7 @@ class TestSave:
         self, tmp_path: Path, name: str, colour: SavedColour | None, expected: float
     ) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
-        save(linear_picture(pixels, "float"), tmp_path / name, colour)
+        save(linear_picture(pixels, "float"), tmp_path / name, Saved(colour))
         _, written = reread(tmp_path / name)
         assert np.allclose(written, expected, rtol=1e-6, atol=0)
         # And it says so: reading gives the light again.
@@ -490,7 +491,7 @@ class TestSave:
         with pytest.raises(
             ValueError, match=f"colour: 'srgb' needs a linear picture; this one is {encoding}"
         ):
-            save(made, tmp_path / "b.png", "srgb")
+            save(made, tmp_path / "b.png", Saved("srgb"))
 
     def test_integers_clip(self, tmp_path: Path) -> None:
         row = np.array([-5, -0.0, 1, 1.001, 1e30, np.nan, np.inf, -np.inf], np.float32)
@@ -582,7 +583,7 @@ class TestSave:
     ) -> None:
         # Any JPEG XL has one.
         store(tmp_path / "a.jxl", noise(64, 64, 3, numbers="uint8"), "uint8")
-        save(decode(load(tmp_path / "a.jxl"), read_as), tmp_path / "b.png", written_as)
+        save(decode(load(tmp_path / "a.jxl"), read_as), tmp_path / "b.png", Saved(written_as))
         kept, _ = reread(tmp_path / "b.png")
         original, _ = reread(tmp_path / "a.jxl")
         profile = kept.getattribute("ICCProfile")

@@ -17,6 +17,8 @@ from vkbloom.cli.program import program
 from vkbloom.own.compiler import find_compiler
 from vkbloom.verdicts import measuring
 
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
 # Small images: the figures are the same, the blooms narrow.
 SMALL = ["--measure-size", "64x64", "--size", "64x48"]
 

@@ -28,18 +28,15 @@ def write(project: pytest.Pytester, text: str, name: str = "test_one") -> None:
 
 
 def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    # Hypothesis would be imported anew in each run.
-    quick = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest")
-    return project.runpytest_inprocess(*quick, *arguments)
-
-
-def run_workers(
-    project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *arguments: str
-) -> pytest.RunResult:
-    """Run with two workers of xdist, without other plugins, which take most of their time."""
-    with monkeypatch.context() as patch:
+    """Run without other plugins, which take most of the time."""
+    with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
-        return run(project, "-p", "vkbloom", "-p", "xdist", "-n", "2", *arguments)
+        return project.runpytest_inprocess("-p", "no:cacheprovider", "-p", "vkbloom", *arguments)
+
+
+def run_workers(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    """Run with two workers of xdist."""
+    return run(project, "-p", "xdist", "-n", "2", *arguments)
 
 
 def references(project: pytest.Pytester, module: str = "test_one") -> list[str]:

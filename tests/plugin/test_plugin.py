@@ -141,7 +141,8 @@ class TestFrameFiles:
 class TestOptions:
     def test_without_the_plugin(self, project: pytest.Pytester) -> None:
         write(project, "def test_one(): pass\ndef test_two(bloom_renderer): pass")
-        result = run(project, "-p", "no:vkbloom")
+        options = ("no:cacheprovider", "no:hypothesispytest", "no:vkbloom")
+        result = project.runpytest_inprocess(*(word for one in options for word in ("-p", one)))
         result.assert_outcomes(passed=1, errors=1)
         result.stdout.fnmatch_lines(["*fixture 'bloom_renderer' not found*"])
 
@@ -164,11 +165,11 @@ class TestOptions:
     @pytest.mark.parametrize("option", ["--bloom-update", "--bloom-add"])
     def test_no_writing_by_workers(self, project: pytest.Pytester, option: str) -> None:
         write(project, ONE)
-        result = run(project, option, "-n", "2")
+        result = run_workers(project, option)
         assert result.ret == pytest.ExitCode.USAGE_ERROR
         result.stderr.fnmatch_lines(["*--bloom-update and --bloom-add write files*without -n*"])
         assert not (project.path / "bloom_references").exists()
-        run(project, option, "-n", "0").assert_outcomes(passed=1)
+        run(project, option, "-p", "xdist", "-n", "0").assert_outcomes(passed=1)
 
     @pytest.mark.parametrize(
         "options", [("--bloom-update", "--bloom-add"), ("--bloom-expect-adapter=",)]
@@ -245,7 +246,7 @@ class TestReportOfWorkers:
         run(project, "--bloom-update").assert_outcomes(passed=6)
         monkeypatch.setenv("SHIFT", "0.1")
         alone = run(project, "--bloom-report=alone")
-        shared = run_workers(project, monkeypatch, "--bloom-report=shared")
+        shared = run_workers(project, "--bloom-report=shared")
         outputs = []
         for result, folder in ((alone, "alone"), (shared, "shared")):
             result.assert_outcomes(passed=3, failed=3)

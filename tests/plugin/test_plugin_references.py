@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from typing import Any
 
 import OpenImageIO as oiio
 import pytest
@@ -107,118 +106,105 @@ class TestReferences:
             run(project, "--bloom-add").assert_outcomes(passed=1)
         assert len(references(project)) == 4
 
-    @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32"])
-    @pytest.mark.parametrize(
-        "shape", ["(5, 7)", "(5, 7, 1)", "(5, 7, 2)", "(1, 1, 3)", "(5, 7, 4)"]
-    )
-    def test_no_value_is_lost(self, project: pytest.Pytester, dtype: str, shape: str) -> None:
+    def test_no_value_is_lost(self, project: pytest.Pytester) -> None:
         write(
             project,
-            f"""
+            """
 import numpy as np
-def test_image(frame_regression):
+import pytest
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32"])
+@pytest.mark.parametrize("number", range(5))
+def test_image(frame_regression, dtype, number):
+    shape = [(5, 7), (5, 7, 1), (5, 7, 2), (1, 1, 3), (5, 7, 4)][number]
     generator = np.random.default_rng(1)
-    dtype, shape = np.dtype({dtype!r}), {shape}
+    dtype = np.dtype(dtype)
     # All bits, so that there are subnormals, NaN, infinities and colours under alpha 0.
     image = generator.integers(0, 256, (*shape, dtype.itemsize), np.uint8).view(dtype)[..., 0]
     if dtype.kind == "f":
         image.flat[:1] = -np.inf
     image = np.where(np.isnan(image), dtype.type(np.nan), image) if dtype.kind == "f" else image
     frame_regression.check(image, atol=0, allow_nan=True)
-    frame_regression.check(image, "named.one", atol=0, allow_nan=True)
+    frame_regression.check(image, f"named.{dtype}.{number}", atol=0, allow_nan=True)
 """,
         )
-        run(project, "--bloom-update").assert_outcomes(passed=1)
-        result = run(project, "--bloom-report=report")
-        result.assert_outcomes(passed=1)
+        run(project, "--bloom-update").assert_outcomes(passed=20)
+        run(project, "--bloom-report=report").assert_outcomes(passed=20)
         checks = json.loads((project.path / "report" / "report.json").read_text())["checks"]
-        assert [each["framebuffers"][0]["outcome"] for each in checks] == ["equal", "equal"]
+        assert [each["framebuffers"][0]["outcome"] for each in checks] == ["equal"] * 40
         folder = project.path / "bloom_references" / "test_one"
-        (file,) = folder.glob("named.one.image.*")
-        assert str(oiio.ImageBuf(str(file)).spec().format) == {
-            "float16": "half",
-            "float32": "float",
-        }.get(dtype, dtype)
+        stored = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
+        for dtype, kind in stored.items():
+            files = [*folder.glob(f"named.{dtype}.*.image.*")]
+            assert len(files) == 5
+            assert {str(oiio.ImageBuf(str(file)).spec().format) for file in files} == {kind}
 
-    @pytest.mark.parametrize(
-        ("image", "message"),
-        [
-            ("np.zeros((3, 4, 3))", "*image: float64 cannot be stored without loss*"),
-            ("np.zeros((3, 4, 5), np.float32)", "*image: shape (3, 4, 5) is not*"),
-            (
-                "np.full((3, 4, 3), np.nan, np.float32)",
-                "*image has NaN or infinity; set allow_nan*",
-            ),
-            ("{'a/b': np.zeros((3, 4), np.float32)}", "*'a/b' cannot name a framebuffer*"),
-            ("{}", "*TypeError: frames: * is not Frames, a mapping*"),
-            ("[[1.0]]", "*TypeError: frames: * is not Frames, a mapping*"),
-            ("{'a': [[1.0]]}", "*TypeError: frames: a: list is not a NumPy array*"),
-        ],
-    )
-    def test_wrong_reference_is_refused(
-        self, project: pytest.Pytester, image: str, message: str
-    ) -> None:
+    def test_wrong_reference_is_refused(self, project: pytest.Pytester) -> None:
+        told = {
+            "np.zeros((3, 4, 3))": "*image: float64 cannot be stored without loss*",
+            "np.zeros((3, 4, 5), np.float32)": "*image: shape (3, 4, 5) is not*",
+            "np.full((3, 4, 3), np.nan, np.float32)": "*image has NaN or infinity; set allow_nan*",
+            "{'a/b': np.zeros((3, 4), np.float32)}": "*'a/b' cannot name a framebuffer*",
+            "{}": "*TypeError: frames: {} is not Frames, a mapping*",
+            "[[1.0]]": "*TypeError: frames: * is not Frames, a mapping*",
+            "{'a': [[1.0]]}": "*TypeError: frames: a: list is not a NumPy array*",
+        }
         write(
             project,
             "import numpy as np\n"
-            f"def test_image(frame_regression): frame_regression.check({image})",
+            + "".join(
+                f"def test_{number}(frame_regression): frame_regression.check({image})\n"
+                for number, image in enumerate(told)
+            ),
         )
         result = run(project, "--bloom-update")
-        result.assert_outcomes(failed=1)
-        result.stdout.fnmatch_lines([message])
+        result.assert_outcomes(failed=len(told))
+        for message in told.values():
+            result.stdout.fnmatch_lines([message])
         assert not (project.path / "bloom_references").exists()
 
-    @pytest.mark.parametrize(
-        ("damage", "message"),
-        [
-            (lambda folder: (folder / "test_frames.glow.exr").unlink(), "*test_frames.glow.exr*"),
-            (
-                lambda folder: (folder / "test_frames.glow.exr").write_bytes(b"no"),
-                "*ValueError: *test_frames.glow.exr: is not a readable image*",
-            ),
-            (
-                lambda folder: shutil.copy(
-                    folder / "test_frames.final.png", folder / "test_frames.glow.exr"
-                ),
-                "*ValueError: *test_frames.glow.exr: holds uint8*, not float16*",
-            ),
-            (
-                lambda folder: (folder / "test_frames.json").write_text("{}"),
-                "*ValueError: *test_frames.json: not a list of references*",
-            ),
-            *(
-                (
-                    lambda folder, content=content: (folder / "test_frames.json").write_bytes(
-                        content
-                    ),
-                    "*ValueError: *test_frames.json: not a list of references*",
-                )
-                for content in (b"[1", b"\xff\xfe", b"[" * 100_000)
-            ),
-            *(
-                (
-                    lambda folder, was=was, now=now: edit(folder / "test_frames.json", was, now),
-                    f"*ValueError: *test_frames.json: not a list of references: {told}*",
-                )
-                for was, now, told in (
-                    ('"name": "glow"', '"names": "glow"', "no 'name'"),
-                    ('"name": "glow"', '"name": ["glow"]', "expected string"),
-                    ('"name": "glow"', '"name": "a/b"', "'a/b' cannot name a framebuffer"),
-                    ('"test_frames.glow.exr"', '"../glow.exr"', "'../glow.exr' is not in this"),
-                    ('"test_frames.glow.exr"', r'"\u0000"', "'?x00' is not in this folder"),
-                )
-            ),
-        ],
-    )
-    def test_damaged_files_are_named(
-        self, project: pytest.Pytester, damage: Any, message: str
-    ) -> None:
-        write(project, ONE)
-        run(project, "--bloom-update")
-        damage(project.path / "bloom_references" / "test_one")
+    def test_damaged_files_are_named(self, project: pytest.Pytester) -> None:
+        """Each of the tests finds other damage of its own reference."""
+        listed = "not a list of references"
+        # What the image of glow and the list become, or what is edited in the list; what is told.
+        damages: list[tuple[str | bytes | tuple[str, str], str]] = [
+            ("", "*-0.glow.exr*"),
+            ("no", "*ValueError: *-1.glow.exr: is not a readable image*"),
+            ("png", "*ValueError: *-2.glow.exr: holds uint8*, not float16*"),
+            *((text, listed) for text in (b"{}", b"[1", b"\xff\xfe", b"[" * 100_000)),
+            (('"name": "glow"', '"names": "glow"'), f"{listed}: no 'name'"),
+            (('"name": "glow"', '"name": ["glow"]'), f"{listed}: expected string"),
+            (('"name": "glow"', '"name": "a/b"'), f"{listed}: 'a/b' cannot name a framebuffer"),
+            (('"frames-10.glow.exr"', '"../glow.exr"'), f"{listed}: '../glow.exr' is not in this"),
+            (('"frames-11.glow.exr"', r'"\u0000"'), f"{listed}: '?x00' is not in this folder"),
+        ]
+        write(
+            project,
+            PROJECT
+            + f"@pytest.mark.parametrize('number', range({len(damages)}))\n"
+            + "def test_frames(frame_regression, number):\n"
+            + "    frame_regression.check(frames(), f'frames-{number}')\n",
+        )
+        run(project, "--bloom-update").assert_outcomes(passed=len(damages))
+        folder = project.path / "bloom_references" / "test_one"
+        for number, (damage, _) in enumerate(damages):
+            image, index = (folder / f"frames-{number}.{end}" for end in ("glow.exr", "json"))
+            if isinstance(damage, tuple):
+                edit(index, *damage)
+            elif isinstance(damage, bytes):
+                index.write_bytes(damage)
+            elif damage == "png":
+                shutil.copy(folder / f"frames-{number}.final.png", image)
+            elif damage:
+                image.write_text(damage)
+            else:
+                image.unlink()
         result = run(project)
-        result.assert_outcomes(failed=1)
-        result.stdout.fnmatch_lines([message])
+        result.assert_outcomes(failed=len(damages))
+        for number, (_, told) in enumerate(damages):
+            is_whole = told.startswith("*")
+            result.stdout.fnmatch_lines(
+                [told if is_whole else f"*ValueError: *frames-{number}.json: {told}*"]
+            )
 
     def test_names(self, project: pytest.Pytester) -> None:
         write(
@@ -268,10 +254,8 @@ class TestUnused:
     def test_is_listed(self, project: pytest.Pytester) -> None:
         run(project).stdout.fnmatch_lines([self.LINE])
 
-    def test_is_listed_of_workers(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        result = run_workers(project, monkeypatch)
+    def test_is_listed_of_workers(self, project: pytest.Pytester) -> None:
+        result = run_workers(project)
         result.assert_outcomes(passed=2)
         result.stdout.fnmatch_lines([self.LINE])
 
@@ -296,9 +280,8 @@ class TestUnused:
 class TestChecks:
     """What is compared, in which order."""
 
-    @pytest.mark.parametrize(
-        ("change", "arguments", "message"),
-        [
+    def test_fails(self, project: pytest.Pytester) -> None:
+        cases = [
             ("image[:5]", "", "*(shape and dtype): its shape is (5, 16, 3), not (12, 16, 3)*"),
             ("image.astype(np.float32)", "", "*(shape and dtype): its dtype is float32, not*"),
             ("image[:, :, 0]", "", "*(shape and dtype): its shape is (12, 16), not (12, 16, 3)*"),
@@ -323,22 +306,23 @@ class TestChecks:
             ),
             ("np.flip(image, 0)", "atol=9, ssim=0.9", "*(SSIM): SSIM * is under 0.9*"),
             ("np.flip(image, 0)", "atol=9, flip=0.01", "*(FLIP): FLIP * is over 0.01*"),
-        ],
-    )
-    def test_fails(
-        self, project: pytest.Pytester, change: str, arguments: str, message: str
-    ) -> None:
-        write(project, self.text(change, arguments))
-        run(project, "--bloom-update", "-k", "right").assert_outcomes(passed=1, deselected=1)
-        result = run(project, "-k", "changed")
-        result.assert_outcomes(failed=1, deselected=1)
-        result.stdout.fnmatch_lines(
-            ["*one: the first framebuffer that differs is image", "*image: FAILED " + message]
+        ]
+        write(project, self.text([case[:2] for case in cases]))
+        run(project, "--bloom-update", "-k", "right").assert_outcomes(
+            passed=len(cases), deselected=len(cases)
         )
+        result = run(project, "-k", "changed")
+        result.assert_outcomes(failed=len(cases), deselected=len(cases))
+        for number, (_, _, message) in enumerate(cases):
+            result.stdout.fnmatch_lines(
+                [
+                    f"*one-{number}: the first framebuffer that differs is image",
+                    "*image: FAILED " + message,
+                ]
+            )
 
-    @pytest.mark.parametrize(
-        ("change", "arguments"),
-        [
+    def test_passes(self, project: pytest.Pytester) -> None:
+        cases = [
             ("image + np.float16(0.01)", "atol=0.02"),
             ("image * np.float16(1.01)", "rtol=0.02"),
             ("spot", "atol=0.1, fail_percent=1, hard_fail=0.6"),
@@ -346,27 +330,28 @@ class TestChecks:
             ("np.flip(image, 0)", "atol=float('inf')"),
             # Equal images need no figure: this is too small for SSIM's window.
             ("image", "ssim=1.0, flip=0.0"),
-        ],
-    )
-    def test_passes(self, project: pytest.Pytester, change: str, arguments: str) -> None:
-        write(project, self.text(change, arguments))
-        run(project, "--bloom-update", "-k", "right").assert_outcomes(passed=1, deselected=1)
-        run(project, "-k", "changed").assert_outcomes(passed=1, deselected=1)
+        ]
+        write(project, self.text(cases))
+        run(project, "--bloom-update", "-k", "right").assert_outcomes(
+            passed=len(cases), deselected=len(cases)
+        )
+        run(project, "-k", "changed").assert_outcomes(passed=len(cases), deselected=len(cases))
 
     @staticmethod
-    def text(change: str, arguments: str) -> str:
-        return (
-            PROJECT
-            + f"""
-def test_right(frame_regression):
-    frame_regression.check(frames()["glow"], "one")
+    def text(cases: list[tuple[str, str]]) -> str:
+        """Return a project with two tests of each case, which are of one reference."""
+        return PROJECT + "".join(
+            f"""
+def test_right_{number}(frame_regression):
+    frame_regression.check(frames()["glow"], "one-{number}")
 
-def test_changed(frame_regression):
+def test_changed_{number}(frame_regression):
     image = frames()["glow"]
     spot = image.copy()
     spot[2, 3, 1] += 0.5
-    frame_regression.check({change}, "one", {arguments})
+    frame_regression.check({change}, "one-{number}", {arguments})
 """
+            for number, (change, arguments) in enumerate(cases)
         )
 
     def test_names_the_first_in_the_order_of_the_data(
@@ -407,12 +392,13 @@ def test_more(frame_regression):
         result.stdout.fnmatch_lines(["*  extra: FAILED (shape and dtype): the reference does not*"])
 
     def test_warns(self, project: pytest.Pytester) -> None:
-        write(project, self.text("image + np.float16(0.01)", "atol=0.02, warn=0.005"))
+        write(project, self.text([("image + np.float16(0.01)", "atol=0.02, warn=0.005")]))
         run(project, "--bloom-update", "-k", "right")
-        # Else the outer run's filter makes an error of it.
-        result = run(project, "-k", "changed", "-W", "default")
+        # Else the outer run's filter makes an error of it. The other warning is about the process.
+        filters = ("-W", "default", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+        result = run(project, "-k", "changed", *filters)
         result.assert_outcomes(passed=1, deselected=1, warnings=1)
-        result.stdout.fnmatch_lines(["*FrameDifferenceWarning: one: image: largest difference*"])
+        result.stdout.fnmatch_lines(["*FrameDifferenceWarning: one-0: image: largest difference*"])
 
     def test_compares_what_a_test_has_made(self, project: pytest.Pytester) -> None:
         write(
@@ -463,15 +449,18 @@ def test_unnamed(frame_regression):
         assert result.ret == pytest.ExitCode.INTERNAL_ERROR
         result.stdout.fnmatch_lines(["*told*", "report: report is not written: *index.html'"])
 
-    @pytest.mark.parametrize(
-        "argument",
-        ["atol=-1", "rtol=float('nan')", "fail_percent=101", "hard_fail=-1", "ssim=2", "flip=-1"],
-    )
-    def test_wrong_arguments(self, project: pytest.Pytester, argument: str) -> None:
+    def test_wrong_arguments(self, project: pytest.Pytester) -> None:
         write(
             project,
-            PROJECT + "def test_frames(frame_regression):\n"
-            f"    with pytest.raises(ValueError, match={argument.split('=', maxsplit=1)[0]!r}):\n"
-            f"        frame_regression.check(frames(), {argument})",
+            PROJECT
+            + """
+@pytest.mark.parametrize(("name", "value"), [
+    ("atol", -1), ("rtol", float("nan")), ("fail_percent", 101), ("hard_fail", -1), ("ssim", 2),
+    ("flip", -1),
+])
+def test_frames(frame_regression, name, value):
+    with pytest.raises(ValueError, match=name):
+        frame_regression.check(frames(), **{name: value})
+""",
         )
-        run(project).assert_outcomes(passed=1)
+        run(project).assert_outcomes(passed=6)

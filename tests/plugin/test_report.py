@@ -70,21 +70,33 @@ def browser() -> Iterator[Browser]:
         opened.close()
 
 
+@pytest.fixture(scope="module")
+def said() -> list[str]:
+    """Whatever the page complains about or asks for."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Browser, said: list[str]) -> Page:
+    """The page of all tests."""
+    opened = browser.new_page()
+    opened.on("console", lambda message: said.append(message.text))
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.on("dialog", lambda dialog: said.append(dialog.message))
+    opened.on("request", lambda request: said.append(request.url))
+    return opened
+
+
 @pytest.fixture
-def page(browser: Browser, report: Path) -> Iterator[Page]:
+def page(tab: Page, said: list[str], report: Path) -> Iterator[Page]:
     """The report, with whatever it complains about or asks for failing the test."""
-    opened = browser.new_page(viewport={"width": 1280, "height": 900})
-    complaints: list[str] = []
-    opened.on("console", lambda message: complaints.append(message.text))
-    opened.on("pageerror", lambda error: complaints.append(str(error)))
-    opened.on("dialog", lambda dialog: complaints.append(dialog.message))
-    requests: list[str] = []
-    opened.on("request", lambda request: requests.append(request.url))
-    opened.goto(report.as_uri())
-    yield opened
-    opened.close()
-    assert complaints == []
-    assert [url for url in requests if not url.startswith("data:")] == [report.as_uri()]
+    tab.set_viewport_size({"width": 1280, "height": 900})
+    tab.emulate_media(color_scheme="light")
+    tab.goto("about:blank")
+    said.clear()
+    tab.goto(report.as_uri())
+    yield tab
+    assert [text for text in said if not text.startswith("data:")] == [report.as_uri()]
 
 
 def test_names_the_first_to_differ_at_the_top(page: Page) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.exhaustive import by_turns
 from tests.scene.deferred_frames import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
 from tests.scene.gltf_documents import Document
 from tests.screens import DISTANCE, NOTHING, noise, screen
@@ -381,11 +382,14 @@ def test_bloom_is_the_blurred_brightness(frames: Frames) -> None:
     assert_close("bloom", frames["bloom"], expected, tolerance("float16", expected))
 
 
-@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
 @pytest.mark.parametrize(
-    "tonemap", ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+    ("tonemap", "encoding", "composite"),
+    by_turns(
+        ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"],
+        ["none", "gamma22", "srgb", "pq", "hlg"],
+        turns=["add", "mix", "screen"],
+    ),
 )
-@pytest.mark.parametrize("encoding", ["none", "gamma22", "srgb", "pq", "hlg"])
 def test_final_is_the_composite(
     renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
 ) -> None:

@@ -40,6 +40,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("targets", nargs="+", metavar="TARGET")
     parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--inputs", type=int, help="the most to start from of each target")
     parser.add_argument("--memory", type=int, default=1024)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--corpus", type=Path)
@@ -69,6 +70,11 @@ def main() -> int:
 
     # Readers load libraries when they read the first file.
     inputs = {name: targets.TARGETS[name].seeds() + kept(name) for name in options.targets}
+    # Evenly between the first and the last one.
+    inputs = {
+        name: seeds[:: -(-len(seeds) // (options.inputs or len(seeds)))]
+        for name, seeds in inputs.items()
+    }
     for name, seeds in inputs.items():
         for seed in seeds:
             run(name, seed)

@@ -25,7 +25,6 @@ from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command
 from vkbloom.cli.glow_options import accompanying, glow_options, note_step, uploaded
 from vkbloom.cli.image_files import (
-    COLOURS,
     check_input_colour,
     expand_option,
     input_colour_option,
@@ -43,8 +42,11 @@ from vkbloom.cli.terminal import detail, hides_progress, note, say, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import image_writing
 from vkbloom.io.array_files import premultiplied
+from vkbloom.io.displayed import PRIMARIES, Saved, check_saved
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.large_files import finished, is_large
+
+CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
 
 @click.command(cls=Command)
@@ -77,8 +79,23 @@ from vkbloom.large_files import finished, is_large
 @input_colour_option
 @click.option(
     "--output-colour",
-    type=click.Choice(COLOURS),
-    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]",
+    type=click.Choice(CURVES),
+    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]; pq and "
+    "hlg have 16 bits where the format has them",
+)
+@click.option(
+    "--primaries",
+    type=click.Choice([*PRIMARIES]),
+    default="rec709",
+    show_default=True,
+    help="Primaries of the colours in OUT, which PNG and OpenEXR can name.",
+)
+@click.option(
+    "--view",
+    metavar="VIEW",
+    help="A view of OpenColorIO's built-in configuration, such as 'ACES 2.0 - SDR 100 nits "
+    "(Rec.709)', or DISPLAY/VIEW. It has a tone curve, an encoding and primaries of its own. The "
+    "error for an unknown one lists all.",
 )
 @click.option(
     "--raw",
@@ -152,6 +169,8 @@ class _Options:
     attachments: str
     input_colour: Colour | None
     output_colour: SavedColour | None
+    primaries: str
+    view: str | None
     raw: bool
     half: bool | None
     overwrite: bool
@@ -168,6 +187,11 @@ class _Options:
         return "all" if self.attachments == "all" else ["final", *self.attachments.split(",")]
 
     @property
+    def saved(self) -> Saved:
+        """What the colours of OUT are to be."""
+        return Saved(self.output_colour, self.primaries, self.view)
+
+    @property
     def is_blended(self) -> bool:
         """Whether colours are multiplied by alpha."""
         return self.settings.alpha != "keep"
@@ -175,7 +199,7 @@ class _Options:
 
 def _planned(options: _Options, sources: list[str], out: str) -> list[tuple[str, str]]:
     """Check the options, and return the files to read, each with the file to write."""
-    _check_colours(options.settings, options.input_colour, options.output_colour, raw=options.raw)
+    _check_colours(options.settings, options.input_colour, options.saved, raw=options.raw)
     check_input_colour(options.input_colour)
     if out == PIPE and options.attachments != "final":
         raise click.UsageError("standard output takes only final; leave out --attachments")
@@ -238,6 +262,8 @@ class _Run:
                     subimage=options.subimage if was_given("subimage") else None,
                     input_colour=options.input_colour,
                     output_colour=options.output_colour,
+                    primaries=options.primaries,
+                    view=options.view,
                     raw=options.raw,
                     half=options.half,
                     expand=options.expand,
@@ -338,24 +364,28 @@ def _check_writable(target: str) -> None:
 def _check_colours(
     settings: vkbloom.Settings,
     input_colour: Colour | None,
-    output_colour: SavedColour | None,
+    saved: Saved,
     *,
     raw: bool,
 ) -> None:
     """Raise click.UsageError for options that do not go together."""
-    if raw and (input_colour or output_colour):
-        raise click.UsageError(
-            "--raw does not convert colours; leave out --input-colour and --output-colour"
-        )
+    options = {"--output-colour": saved.curve, "--view": saved.view}
+    options["--primaries"] = None if saved.primaries == "rec709" else saved.primaries
+    used = [name for name, value in options.items() if value is not None]
+    if raw and (input_colour or used):
+        left_out = " and ".join(["--input-colour", *(used or ["--output-colour"])])
+        raise click.UsageError(f"--raw does not convert colours; leave out {left_out}")
     if settings.encoding != "none" and settings.alpha != "keep":
         raise click.UsageError(
             f"--alpha {settings.alpha} needs linear colours; leave out --encoding: OUT is encoded "
             "for its format"
         )
-    if settings.encoding != "none" and output_colour:
+    if settings.encoding != "none" and used:
         raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out --output-colour"
+            f"--encoding {settings.encoding} already encodes the output; leave out {used[0]}"
         )
+    with as_wrong_use():
+        check_saved(saved)
 
 
 def _prepared(
@@ -389,7 +419,7 @@ def _written(
     notes = image_writing.save(
         finished(picture, frames["final"], frames.settings),
         target,
-        options.output_colour,
+        options.saved,
         {
             "Software": f"vkbloom {vkbloom.__version__}",
             "vkbloom:settings": json.dumps(frames.settings.to_dict()),

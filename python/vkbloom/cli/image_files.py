@@ -18,6 +18,7 @@ from vkbloom.cli.program import given
 from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
+from vkbloom.io.displayed import has_hdr_curve
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
 
@@ -120,8 +121,8 @@ def read_picture(
     return picture
 
 
-def has_integers(source: str) -> bool:
-    """Whether a file holds integers; of a folder or a glob the first file, of a pipe its content.
+def is_photograph(source: str) -> bool:
+    """Whether a file holds integers for SDR; of a folder the first file, of a pipe its content.
 
     False for what cannot be read: the error comes from the command that reads it.
     """
@@ -136,7 +137,9 @@ def has_integers(source: str) -> bool:
         files = sorted(glob.glob(re.sub(r"%0?\d*d", "*", source)))
     for file in files:
         with suppress(OSError, ValueError), image_reading.opened(file, "Reading images") as reader:
-            return str(reader.spec().format) in ("uint8", "uint16")
+            spec = reader.spec()
+            is_hdr = has_hdr_curve(image_reading.points_of(spec))
+            return str(spec.format) in ("uint8", "uint16") and not is_hdr
     return False
 
 

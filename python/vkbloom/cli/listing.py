@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
-from vkbloom.cli.image_files import has_integers, layer_option, read_picture
+from vkbloom.cli.image_files import is_photograph, layer_option, read_picture
 from vkbloom.cli.sequences import check_drawing
 from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
 from vkbloom.cli.terminal import hides_progress, say, show, tell_device
@@ -133,7 +133,7 @@ def _sheet(
     device: tuple[str, bool],
 ) -> bytes:
     """Return a PNG of a picture, then the picture with each entry."""
-    is_photo = has_integers(file)
+    is_photo = is_photograph(file)
     base = base_settings(is_photo)
     plain = _reduced(read_picture(file, 0, None, layer=layer).pixels)
     # As by vkbloom apply with the preset photo, and for what would show nothing otherwise.

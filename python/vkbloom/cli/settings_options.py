@@ -10,7 +10,7 @@ import click
 
 import vkbloom
 from vkbloom.cli import fields
-from vkbloom.cli.image_files import has_integers
+from vkbloom.cli.image_files import is_photograph
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.fields import fields_of
 from vkbloom.io.expansion import PHOTO_EXPANSION
@@ -58,7 +58,7 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
         if preset is None and method is None:
             image = _first_of(rest)
             preset = PRESET_OF_IMAGES if image else _PRESET_OF_SCENES
-            if "expand" in rest and not rest.get("raw") and has_integers(image):
+            if "expand" in rest and not rest.get("raw") and is_photograph(image):
                 preset = PRESET_OF_PHOTOS
         if preset == PRESET_OF_PHOTOS and "expand" in rest and rest["expand"] is None:
             rest["expand"] = PHOTO_EXPANSION

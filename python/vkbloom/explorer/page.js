@@ -445,7 +445,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
         ? `${passes.map(([name]) => name).join(", ")}: ${device.toFixed(1)} ms`
         : "nothing had to run";
       status.textContent =
-        `${setup.note ? `${setup.note} · ` : ""}${setup.adapter} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
+        `${[a.note, setup.note, setup.adapter].filter(Boolean).join(" · ")} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
         `${roundTrip.toFixed(0)} ms until shown`;
     }
     showError();

@@ -321,6 +321,7 @@ class Viewer:
                 "names": names,
                 "size": [frames[shown].shape[1], frames[shown].shape[0]],
                 "dtype": str(frames[shown].dtype),
+                "note": _note_of(settings, shown),
                 "code": as_code(settings),
                 "plan": [one._asdict() for one in plan],
                 "passes": _finite(frames.timings),
@@ -423,6 +424,13 @@ def _read(
         except (OSError, ValueError) as error:
             text = str(error).replace(str(path), name)
             raise ValueError(text if name in text else f"{name}: {text}") from error
+
+
+def _note_of(settings: Settings, shown: str) -> str:
+    """Return what a page says of a framebuffer that it cannot show as it is; "" for all others."""
+    if shown != "final" or settings.encoding not in ("pq", "hlg"):
+        return ""
+    return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"
 
 
 def _finite(timings: Mapping[str, float]) -> dict[str, float]:

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_emission, check_image, check_mask
+from vkbloom.core_access import HasCore
 from vkbloom.frames import Frames
+from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.image import Image
 from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import Gradients, check_cotangent
+from vkbloom.reference.derivatives import Gradients, check_cotangent, differentiable
 from vkbloom.settings import Settings
 
-__all__ = ["Pullback", "vjp"]
+__all__ = ["Pullback", "pullback_of", "vjp"]
 
 #: From cotangents by framebuffer to derivatives by name.
 Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
 
 
+class _Renderer(HasCore, Protocol):
+    @property
+    def apply(self) -> Callable[..., Frames]: ...
+
+
 def vjp(
-    apply: Callable[..., Frames],
+    renderer: _Renderer,
     image: object,
     settings: Settings,
     mask: object | None,
@@ -45,13 +52,39 @@ def vjp(
         given["mask"] = np.array(check_mask(mask, (pixels.shape[0], pixels.shape[1])))
     if emission is not None:
         given["emission"] = np.array(check_emission(emission, pixels))
-    frames = apply(pixels, settings.replace(format="rgba32float"), **given)
-    recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
+    frames = renderer.apply(pixels, settings.replace(format="rgba32float"), **given)
+    pulled = pullback_of(renderer, pixels, settings, given)
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        for name, part in cotangents.items():
-            check_cotangent(name, part, frames)
+        return pulled(
+            {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
+        )
+
+    return frames, pullback
+
+
+def pullback_of(
+    renderer: HasCore,
+    pixels: NDArray[Any],
+    settings: Settings,
+    given: Mapping[str, NDArray[Any]],
+) -> Pullback:
+    """Return the pullback alone, of checked arrays that do not change, and checked cotangents."""
+    floats = settings.replace(format="rgba32float")
+    recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
+    names = ("image", *sorted(given), *differentiable(settings))
+    if callable(getattr(settings, "kernel", None)):
+        names += ("kernel",)
+
+    def by_reference(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
         found = recorded()(cotangents)
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
 
-    return frames, pullback
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        passes = Passes(renderer, pixels, floats, given, cotangents)
+        found = passes.images()
+        if found is None:
+            return by_reference(cotangents)
+        return DeviceGradients(found, names, passes.fields, lambda: by_reference(cotangents))
+
+    return pullback

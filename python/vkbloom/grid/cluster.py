@@ -101,21 +101,24 @@ def _lay_out(grid: Grid, adapter: str, validation: bool) -> Layout:
         return lay_out(grid, renderer)
 
 
-def _check_origin(renderer: Renderer, layout: Layout) -> None:
-    """Raise ValueError for a worker whose results may differ from the other workers'."""
+def _refusal(renderer: Renderer, layout: Layout) -> str:
+    """Return why this worker's results may differ from the other workers'; "" if they cannot."""
     for what, own in origin(renderer).items():
         if own != getattr(layout, what):
-            raise ValueError(
+            return (
                 f"{what}: the worker's {own} is not the grid's {getattr(layout, what)}; their "
                 "pictures may differ, so all workers need the same adapter, driver and version"
             )
+    return ""
 
 
-def _render(grid: Grid, run: _Run) -> Tally:
-    """Render and write a run's blocks; called in a worker."""
+def _render(grid: Grid, run: _Run) -> Tally | str:
+    """Render and write a run's blocks; called in a worker. Text: why this worker may not."""
     renderer, lock = _renderer(run.adapter, run.validation)
     with lock:
-        _check_origin(renderer, run.layout)
+        # Returned and not raised, since Dask would repeat the task, perhaps on another worker.
+        if refusal := _refusal(renderer, run.layout):
+            return refusal
         total = Tally()
         try:
             filler = Filler(grid, run.layout, renderer)
@@ -203,7 +206,10 @@ def run_there(
 
     def take(future: Any) -> None:
         blocks = under_way.pop(future)
-        progress.add(future.result())
+        tally = future.result()
+        if isinstance(tally, str):
+            raise ValueError(tally)
+        progress.add(tally)
         sink.mark(blocks)
 
     client.register_plugin(_plugin(), name=_PLUGIN)
@@ -224,9 +230,9 @@ def run_there(
 
 def _stop(client: Client, under_way: dict[Any, tuple[Block, ...]], take: Any) -> None:
     """Mark the runs that are done, and cancel the others."""
-    # The cause of the failure, such as a full disk, may also prevent the marks.
-    with contextlib.suppress(OSError):
-        for future in list(under_way):
-            if future.status == "finished":
+    for future in list(under_way):
+        if future.status == "finished":
+            # Other workers may be refused, too, and a full disk may prevent the marks.
+            with contextlib.suppress(OSError, ValueError):
                 take(future)
     client.cancel(list(under_way), force=True)

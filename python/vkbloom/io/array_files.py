@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from vkbloom.argument_types import checked
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import displayed, image_reading, safe_writing
+from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.expansion import check_expansion
-from vkbloom.io.image_writing import as_numbers, check_quality, encoded, put
-from vkbloom.io.images import PIXEL_TYPES, Encoding, Picture, check_name, is_exr
+from vkbloom.io.image_writing import as_numbers, check_quality, described_as, put
+from vkbloom.io.images import PIXEL_TYPES, Picture, check_name, is_exr
 
 __all__ = ["divided", "has_straight", "multiplied", "premultiplied", "read", "write"]
 
@@ -122,7 +123,9 @@ def read(
     -----
     Profiles and colour spaces are converted with OpenColorIO's built-in configuration, which is
     part of OpenImageIO. Only profiles with a matrix and curves are used. With others (CMYK, grey,
-    tables) the colours are decoded as sRGB, and "notes" says so.
+    tables) the colours are decoded as sRGB, and "notes" says so. A cICP chunk with PQ gives 1 for
+    203 cd/m2, and one with HLG gives 1 for the signal 0.75, as `write` has it; such files are not
+    expanded.
 
     `expand` maps m = max(r, g, b) above the knee a = 0.8 to a + (m - a) / (1 - k (m - a)), with
     k = 1 / (1 - a) - 1 / (expand - a), and multiplies the colour by the ratio. Up to 0.8 (the level
@@ -162,15 +165,9 @@ def read(
     return pixels, facts
 
 
-def _check_conversions(
-    values: NDArray[Any],
-    encoding: str | None,
-    bits: int | None,
-    primaries: str,
-    view: str | None,
-) -> None:
+def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> None:
     """Raise ValueError for conversions of `write` that the values cannot have."""
-    is_float = values.dtype.kind == "f"
+    is_float, encoding = values.dtype.kind == "f", saved.curve
     if encoding is not None and (encoding not in _ENCODINGS or not is_float):
         raise ValueError(
             f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
@@ -181,11 +178,10 @@ def _check_conversions(
         own = 8 * values.dtype.itemsize
         if bits != own or is_float:
             raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
-    displayed.check_primaries(primaries)
-    if (view is not None or primaries != "rec709") and (not is_float or values.shape[2] < 3):
+    check_saved(saved)
+    needs_three = saved.view is not None or saved.primaries != "rec709"
+    if needs_three and (not is_float or values.shape[2] < 3):
         raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
-    if view is not None and (encoding is not None or primaries != "rec709"):
-        raise ValueError("view: it has its own encoding and primaries; leave them out")
 
 
 @checked
@@ -229,11 +225,12 @@ def write(
     primaries : {"rec709", "rec2020", "p3"}
         Primaries of the file. Linear floats of Rec. 709 are converted to them by OpenColorIO; with
         the encoding "none" they only name the colours. PNG has them in a cICP chunk, OpenEXR as
-        chromaticities.
+        chromaticities; other formats are refused.
     view : str, optional
         A view of OpenColorIO's built-in configuration, such as "ACES 2.0 - SDR 100 nits
         (Rec.709)", of the first display that has it, or "DISPLAY/VIEW". It replaces `encoding`
-        and `primaries`, and needs linear floats and a file of integers.
+        and `primaries`, and needs linear floats and a file of integers. The error for an unknown
+        one lists all.
     metadata : mapping of str to object, optional
         Metadata from `read`, or attributes by OpenImageIO's names: text, numbers, or sequences of
         them.
@@ -275,7 +272,8 @@ def write(
     target = Path(check_name(path))
     values = _checked(array)
     is_float = values.dtype.kind == "f"
-    _check_conversions(values, encoding, bits, primaries, view)
+    saved = Saved(encoding, primaries, view)
+    _check_conversions(values, saved, bits)
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
@@ -283,41 +281,22 @@ def write(
         is_integer = numbers.startswith("uint")
         if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
             values = divided(values) if premultiplied else multiplied(values)
-        curve = encoding or ("srgb" if is_integer else "linear")
         if view is not None and not is_integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
-        named = typed = _typed(oiio, metadata or {})
-        what: tuple[str, str] | str = (primaries, curve)
-        if view is not None:
-            what, values = displayed.viewed(oiio, values, view)
-        elif is_float:
-            values = _encoded_for(oiio, values, primaries, curve)
-        said: Encoding | None = None if curve == "none" or not is_float else curve
-        if view is not None or primaries != "rec709" or curve in ("pq", "hlg"):
-            # A profile of the source would name other colours.
-            kind = oiio.ImageOutput.create(str(temporary)).format_name()
-            typed = _without_profile(named) | displayed.attributes(oiio, kind, target, what)
-            said = None
+        picture = Picture.of_values(values, numbers, None, _typed(oiio, metadata or {}))
+        if is_float:
+            curve = encoding or ("srgb" if is_integer else "linear")
+            values, what = displayed.converted(oiio, values, saved, curve)
+            picture = described_as(oiio, picture, target, what)
         put(
             oiio,
             as_numbers(values, numbers),
-            Picture.of_values(values, numbers, said, typed),
+            picture,
             temporary,
             target,
             attributes={} if quality is None else {"CompressionQuality": quality},
         )
     return target
-
-
-def _encoded_for(oiio: Any, values: Any, primaries: str, curve: str) -> Any:
-    """Return linear values in other primaries and encoded; with "none" they stay."""
-    if curve != "none":
-        values = displayed.to_primaries(oiio, values, primaries)
-    return encoded(values, curve)
-
-
-def _without_profile(named: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in named.items() if name != "ICCProfile"}
 
 
 def _checked(array: NDArray[Any]) -> NDArray[Any]:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.io.displayed import from_primaries, of_code_points
+from vkbloom.io.hdr_curves import DECODERS
 from vkbloom.io.icc import Profile, read_profile
 from vkbloom.io.images import SPACES, Colour, StoredImage
 from vkbloom.io.srgb import decode_srgb
@@ -24,6 +26,8 @@ _CONFIGURATION: Final = "ocio://default"
 _LINEAR: Final = SPACES["linear"]
 # Spaces of an exponent. OpenColorIO's own powers are off by 2e-5.
 _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
+# Spaces with the curves of code points.
+_CURVES: Final[Mapping[str, str]] = {"gamma22": SPACES["gamma22"]}
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
 # Red, green, blue, white.
@@ -57,7 +61,7 @@ def linear(
     if values.dtype.kind == "f":
         return "linear", values, _notes_of_floats(stored)
     notes = []
-    if stored.profile is not None and not stored.is_signalled:
+    if stored.profile is not None and stored.code_points is None:
         said = f"its ICC profile {stored.profile_name!r}"
         try:
             profile = read_profile(stored.profile)
@@ -78,7 +82,9 @@ def linear(
 
 def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
     """As `linear`, of an image of integers without a profile."""
-    if stored.gamma is not None and not stored.is_signalled:
+    if stored.code_points is not None and (known := of_code_points(stored.code_points)):
+        return _by_code_points(values, stored, *known)
+    if stored.gamma is not None and stored.code_points is None:
         if stored.gamma == 1:
             return "linear", _decoded(values, "linear"), []
         is_known = stored.space in _EXPONENTS
@@ -94,6 +100,19 @@ def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[A
     except ValueError:
         return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
     return stored.space, made, [f"{said}; converted to linear Rec. 709"]
+
+
+def _by_code_points(
+    values: NDArray[Any], stored: StoredImage, primaries: str, curve: str
+) -> tuple[str, NDArray[Any], list[str]]:
+    """As `linear`. OpenImageIO takes several of these spaces as sRGB."""
+    made = _decoded(values, _CURVES.get(curve, curve))
+    if primaries == "rec709" and curve in ("srgb", "linear"):
+        return curve, made, []
+    is_named = stored.space not in ("", SPACES["srgb"])
+    space = stored.space if is_named else f"{curve}_{primaries}"
+    said = f"the file says {space} of its colours; converted to linear Rec. 709"
+    return space, from_primaries(made, primaries), [said]
 
 
 def _is_srgb(profile: Profile) -> bool:
@@ -138,7 +157,7 @@ def _decoded(values: NDArray[Any], space: str, exponent: float | None = None) ->
             made[:, :, :3] = _to_light(made[:, :, :3], space, exponent)
             return made.astype(values.dtype)
     made = _scaled(values)
-    if space == "srgb" or exponent is not None:
+    if space in ("srgb", *DECODERS) or exponent is not None:
         # A table with one entry per integer value, computed in float64.
         scale = np.iinfo(values.dtype).max
         table = _to_light(np.arange(scale + 1) / scale, space, exponent).astype(np.float32)
@@ -159,6 +178,8 @@ def _to_light(colours: NDArray[Any], space: str, exponent: float | None) -> NDAr
     """Return linear colours from floats of a space."""
     if space == "srgb":
         return decode_srgb(colours)
+    if space in DECODERS:
+        return DECODERS[space](colours)
     if exponent is not None:
         # Negative values are not changed, as OpenColorIO has it.
         made: NDArray[Any] = np.where(colours > 0, np.maximum(colours, 0) ** exponent, colours)

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.checks import import_extra
+from vkbloom.io.hdr_curves import ENCODERS
 from vkbloom.io.images import SPACES
+from vkbloom.io.srgb import encode_srgb
 
-__all__ = ["PRIMARIES", "TRANSFERS", "attributes", "check_primaries", "to_primaries", "viewed"]
+__all__ = [
+    "HDR_CURVES",
+    "PRIMARIES",
+    "Attributes",
+    "Saved",
+    "check_primaries",
+    "check_saved",
+    "converted",
+    "encoded",
+    "from_primaries",
+    "has_hdr_curve",
+    "is_hdr",
+    "of_code_points",
+    "with_names",
+]
+
+#: A file's attributes by OpenImageIO's names, each with its type and value.
+Attributes = Mapping[str, tuple[Any, Any]]
 
 _CONFIGURATION: Final = "ocio://default"
 #: Linear spaces of the built-in configuration.
@@ -21,26 +41,40 @@ PRIMARIES: Final[Mapping[str, str]] = {
     "rec2020": "lin_rec2020_scene",
     "p3": "lin_p3d65_scene",
 }
-# Code points of Rec. ITU-T H.273.
-_CICP_PRIMARIES: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
-#: The same for curves.
-TRANSFERS: Final = {"linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
+# Code points of Rec. ITU-T H.273, for primaries and for curves; 2 is an unknown curve.
+_PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
+_CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
+#: Curves for displays of HDR.
+HDR_CURVES: Final = ("pq", "hlg")
+# Curves that readers know or assume without code points.
+_PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
 _CHROMATICITIES: Final = {
     "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
     "rec2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
     "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
 }
-# Primaries and curve of the built-in displays; the others have no code points.
+# Code points of the built-in displays; the others have none.
 _DISPLAYS: Final[Mapping[str, tuple[int, int]]] = {
     "sRGB - Display": (1, 13),
+    "Gamma 2.2 Rec.709 - Display": (1, 4),
     "Display P3 - Display": (12, 13),
     "Rec.1886 Rec.709 - Display": (1, 1),
     "Rec.2100-PQ - Display": (9, 16),
     "ST2084-P3-D65 - Display": (12, 16),
 }
-# OpenImageIO's names of the formats that can name colours by code points.
-_WITH_CODE_POINTS: Final = ("png", "heif", "avif")
+
+
+class Saved(NamedTuple):
+    """What the colours of a file are to be.
+
+    - `curve`: None: "srgb" for integers and "linear" for floats.
+    - `view`: A view instead of a curve and primaries.
+    """
+
+    curve: str | None = None
+    primaries: str = "rec709"
+    view: str | None = None
 
 
 def check_primaries(primaries: str) -> None:
@@ -49,35 +83,147 @@ def check_primaries(primaries: str) -> None:
         raise ValueError(f"primaries: {primaries!r} is not one of {', '.join(PRIMARIES)}")
 
 
-def to_primaries(oiio: ModuleType, values: NDArray[Any], primaries: str) -> NDArray[Any]:
-    """Convert the colours of linear Rec. 709 floats (H, W, 3 or 4) to other primaries."""
-    if primaries == "rec709":
-        return values
-    source = oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
-    made = oiio.ImageBufAlgo.colorconvert(
-        source, PRIMARIES["rec709"], PRIMARIES[primaries], False, colorconfig=_CONFIGURATION
-    )
-    return _with_colours(values, made).astype(values.dtype)
+def check_saved(saved: Saved) -> None:
+    """Raise ValueError for primaries and views that do not exist or do not go together."""
+    check_primaries(saved.primaries)
+    if saved.view is None:
+        return
+    if saved != Saved(view=saved.view):
+        raise ValueError("view: it has its own encoding and primaries; leave them out")
+    _display_of(import_extra("OpenImageIO", "images", "Views"), saved.view)
 
 
-def viewed(oiio: ModuleType, values: NDArray[Any], view: str) -> tuple[str, NDArray[np.float32]]:
-    """Return the display of a view, and linear Rec. 709 floats as it shows them.
+def has_hdr_curve(points: Sequence[int] | None) -> bool:
+    """Whether code points of a file have the curve PQ or HLG."""
+    return points is not None and points[1] in (_CURVE_POINTS[curve] for curve in HDR_CURVES)
 
-    `view`: "VIEW", of the first display that has it, or "DISPLAY/VIEW".
+
+def is_hdr(saved: Saved) -> bool:
+    """Whether a file is for HDR displays, and needs more than 8 bits."""
+    if saved.view is None:
+        return saved.curve in HDR_CURVES
+    oiio = import_extra("OpenImageIO", "images", "Views")
+    return has_hdr_curve(_DISPLAYS.get(_display_of(oiio, saved.view)[0]))
+
+
+def converted(
+    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str
+) -> tuple[NDArray[Any], tuple[str, str] | str]:
+    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
+
+    - `curve`: That of `saved`, or the file's own.
+    - Returns: The values, and their primaries and curve or their display. With the curve "none"
+      values do not change.
     """
+    if saved.view is not None:
+        display, view = _display_of(oiio, saved.view)
+        made = oiio.ImageBufAlgo.ociodisplay(
+            _colours_of(oiio, values), display, view, *_FROM_LINEAR, colorconfig=_CONFIGURATION
+        )
+        return _with_colours(values, made), display
+    if curve != "none" and saved.primaries != "rec709":
+        values = _between(oiio, values, "rec709", saved.primaries).astype(values.dtype)
+    return encoded(values, curve), (saved.primaries, curve)
+
+
+# The space of what a view gets, no look, and colours that alpha does not divide.
+_FROM_LINEAR: Final = (PRIMARIES["rec709"], "", False)
+
+
+def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:
+    """Return linear colours (H, W, 3 or 4) of these primaries in those of Rec. 709."""
+    if primaries == "rec709":
+        return colours.astype(np.float32, copy=False)
+    oiio = import_extra("OpenImageIO", "images", "Converting colours")
+    return _between(oiio, colours, primaries, "rec709")
+
+
+def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
+    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
+
+    - `curve`: "none" and "linear" return the values themselves.
+    - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
+    """
+    if curve in ("none", "linear"):
+        return values
+    made = values.astype(np.float32)
+    colours = made[:, :, : made.shape[2] - (made.shape[2] in (2, 4))]
+    if curve == "srgb":
+        colours[:] = encode_srgb(colours)
+    elif curve in ENCODERS:
+        colours[:] = ENCODERS[curve](colours)
+    else:
+        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
+    return made
+
+
+def with_names(
+    oiio: ModuleType, attributes: Attributes, target: Path, what: tuple[str, str] | str
+) -> tuple[bool, Attributes]:
+    """Return attributes by which a file names its colours.
+
+    - `attributes`: Those that it gets anyway.
+    - `what`: Primaries and curve, or a display. ValueError: the format cannot name them.
+    - Returns: Whether the curve alone describes the colours, and the attributes.
+    """
+    if isinstance(what, str):
+        points, name, curve = _DISPLAYS.get(what), what, ""
+    else:
+        curve = what[1]
+        points, name = (_PRIMARY_POINTS[what[0]], _CURVE_POINTS[curve]), " and ".join(what)
+        if what[0] == "rec709" and curve in _PLAIN:
+            return True, attributes
+    writer = oiio.ImageOutput.create(target.name)
+    kind = writer.format_name()
+    # A profile of the source would name other colours.
+    kept = {name: value for name, value in attributes.items() if name != "ICCProfile"}
+    if kind == "openexr" and curve in ("linear", "none"):
+        numbers = oiio.TypeDesc("float[8]"), _CHROMATICITIES[what[0]]
+        return False, {**kept, "chromaticities": numbers}
+    if points is None:
+        known = ", ".join(_DISPLAYS)
+        raise ValueError(f"view: files cannot name the colours of {name}; take one of {known}")
+    if writer.supports("cicp"):
+        return False, {**kept, "CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+    if points == _DISPLAYS["sRGB - Display"]:
+        return False, kept
+    cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
+    raise ValueError(f"{target}: {kind} cannot name the colours {name}; {cure}")
+
+
+def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
+    """Return primaries and curve of a file's code points; None: one of them is not known."""
+    primaries = [name for name, point in _PRIMARY_POINTS.items() if point == points[0]]
+    curves = [name for name, point in _CURVE_POINTS.items() if point == points[1] != 2]
+    return (primaries[0], curves[0]) if primaries and curves else None
+
+
+def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
+    """Return display and view of "VIEW", of the first display that has it, or "DISPLAY/VIEW"."""
     config = oiio.ColorConfig(_CONFIGURATION)
     named = [
         (shown, one) for shown in config.getDisplayNames() for one in config.getViewNames(shown)
     ]
-    found = [pair for pair in named if view in (pair[1], "/".join(pair))]
-    if not found:
-        listed = ", ".join("/".join(pair) for pair in named)
-        raise ValueError(f"view: {view!r} is not a view of OpenColorIO's configuration: {listed}")
-    source = oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
-    made = oiio.ImageBufAlgo.ociodisplay(
-        source, *found[0], PRIMARIES["rec709"], "", False, colorconfig=_CONFIGURATION
+    for pair in named:
+        if view in (pair[1], "/".join(pair)):
+            return pair
+    listed = ", ".join("/".join(pair) for pair in named)
+    raise ValueError(f"view: {view!r} is not a view of OpenColorIO's configuration: {listed}")
+
+
+def _between(oiio: ModuleType, values: NDArray[Any], old: str, new: str) -> NDArray[np.float32]:
+    made = oiio.ImageBufAlgo.colorconvert(
+        _colours_of(oiio, values),
+        PRIMARIES[old],
+        PRIMARIES[new],
+        False,
+        colorconfig=_CONFIGURATION,
     )
-    return found[0][0], _with_colours(values, made)
+    return _with_colours(values, made)
+
+
+def _colours_of(oiio: ModuleType, values: NDArray[Any]) -> Any:
+    return oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
 
 
 def _with_colours(values: NDArray[Any], colours: Any) -> NDArray[np.float32]:
@@ -86,25 +232,3 @@ def _with_colours(values: NDArray[Any], colours: Any) -> NDArray[np.float32]:
     made = values.astype(np.float32)
     made[:, :, :3] = colours.get_pixels()
     return made
-
-
-def attributes(
-    oiio: ModuleType, kind: str, target: Path, what: tuple[str, str] | str
-) -> dict[str, tuple[Any, Any]]:
-    """Return the attributes by which a file names its colours.
-
-    - `kind`: OpenImageIO's name of the format.
-    - `what`: Primaries and curve, or a display. ValueError: the format cannot name them.
-    """
-    if kind == "openexr" and not isinstance(what, str) and what[1] == "linear":
-        return {"chromaticities": (oiio.TypeDesc("float[8]"), _CHROMATICITIES[what[0]])}
-    if isinstance(what, str):
-        points = _DISPLAYS.get(what)
-    else:
-        points = (_CICP_PRIMARIES[what[0]], TRANSFERS[what[1]]) if what[1] in TRANSFERS else None
-    if kind in _WITH_CODE_POINTS:
-        return {"CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))} if points else {}
-    if points in ((1, 13), (1, 8)):
-        return {}
-    name = what if isinstance(what, str) else " and ".join(what)
-    raise ValueError(f"{target}: {kind} cannot name the colours {name}; write PNG or OpenEXR")

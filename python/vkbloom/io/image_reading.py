@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io.colour import linear
+from vkbloom.io.displayed import has_hdr_curve
 from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
     DTYPES,
@@ -218,9 +219,15 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
-        is_signalled=spec.getattribute("CICP") is not None,
+        code_points=points_of(spec),
     )
     return replace(found, parts=tuple(_parts(reader)))
+
+
+def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
+    """Return the code points of a file's colours, if it has them."""
+    points = spec.getattribute("CICP")
+    return None if points is None else tuple(points)
 
 
 def _stated_curve(
@@ -232,7 +239,7 @@ def _stated_curve(
         return space, spec.get_float_attribute("oiio:Gamma", 0.0) or None
     gamma = png_gamma(name)
     # OpenImageIO takes an exponent of 0, which PNG does not allow, as linear.
-    is_stated = gamma is not None or spec.getattribute("CICP") is not None
+    is_stated = gamma is not None or points_of(spec) is not None
     return space if is_stated else SPACES["srgb"], gamma
 
 
@@ -326,7 +333,8 @@ def decode(
     if not raw:
         taken_as, values, said = linear(values, stored, colour)
         notes += said
-        if numbers in ("uint8", "uint16"):
+        is_hdr = colour is None and has_hdr_curve(stored.code_points)
+        if numbers in ("uint8", "uint16") and not is_hdr:
             values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     return Picture(

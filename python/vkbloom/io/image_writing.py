@@ -13,22 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import check_index, import_extra
-from vkbloom.io import safe_writing
+from vkbloom.io import displayed, safe_writing
+from vkbloom.io.displayed import Saved
 from vkbloom.io.images import (
     DTYPES,
     PIXEL_TYPES,
     SPACES,
-    Encoding,
     Picture,
-    SavedColour,
     is_exr,
 )
-from vkbloom.io.srgb import encode_srgb
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["as_numbers", "check_quality", "check_writable", "encoded", "put", "save"]
+__all__ = ["as_numbers", "check_quality", "check_writable", "put", "save"]
 
 # Number types to write, in order of preference, by the number type of the picture. For floats
 # uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
@@ -39,6 +37,8 @@ _PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
     "float": ("float", "half", "uint8", "uint16"),
     "double": ("float", "half", "uint8", "uint16"),
 }
+# What HDR curves need, whatever the picture has.
+_DEEP: Final = ("uint16", "half", "float", "uint8")
 # OpenImageIO's names of the formats that have a quality, 1 to 100.
 _LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
@@ -66,7 +66,7 @@ def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
 def save(
     picture: Picture,
     path: str | os.PathLike[str],
-    colour: SavedColour | None = None,
+    saved: Saved | None = None,
     attributes: Mapping[str, str] | None = None,
     quality: int | None = None,
 ) -> tuple[str, ...]:
@@ -76,12 +76,16 @@ def save(
     display windows are kept if the format has them, else pixels outside the display window are cut
     off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
 
-    `colour`: Encoding of the colours in the file. Default: integers are sRGB and floats linear.
+    `saved`: The colours in the file, for linear pictures. With HDR curves, files of integers have
+    16 bits where the format has them.
     """
-    if colour is not None and picture.encoding != "linear":
+    saved = saved or Saved()
+    if saved != Saved() and picture.encoding != "linear":
         raise ValueError(
-            f"colour: {colour!r} needs a linear picture; this one is {picture.encoding}"
+            f"colour: {saved.view or saved.curve or saved.primaries!r} needs a linear picture; "
+            f"this one is {picture.encoding}"
         )
+    displayed.check_saved(saved)
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
@@ -89,39 +93,75 @@ def save(
     added = {} if quality is None else {"CompressionQuality": quality}
     with safe_writing.replacing(oiio, target, picture.values.nbytes) as temporary:
         return _write(
-            oiio, picture, colour, temporary, target, attributes={**(attributes or {}), **added}
+            oiio, picture, saved, temporary, target, attributes={**(attributes or {}), **added}
         )
 
 
 def _write(
     oiio: ModuleType,
     picture: Picture,
-    colour: SavedColour | None,
+    saved: Saved,
     temporary: Path,
     target: Path,
     *,
     attributes: Mapping[str, str | int],
 ) -> tuple[str, ...]:
+    picture = in_colour(picture, saved)
     writer = oiio.ImageOutput.create(str(temporary))
-    layout = chosen_layout(oiio, picture, writer, temporary, target)
-    values, encoding, notes = prepared(picture, *layout, colour, target)
-    described = dataclasses.replace(picture, encoding=encoding)
+    layout = chosen_layout(oiio, picture, writer, temporary, target, is_hdr=displayed.is_hdr(saved))
+    values, described, notes = prepared(oiio, picture, layout, saved, target)
     put(oiio, values, described, temporary, target, attributes=attributes)
     return notes
 
 
+def in_colour(picture: Picture, saved: Saved) -> Picture:
+    """Return a grey picture with three channels, where a view or other primaries need them."""
+    needs_three = saved.view is not None or saved.primaries != "rec709"
+    return dataclasses.replace(picture, grey=False) if needs_three else picture
+
+
 def prepared(
-    picture: Picture, channels: int, numbers: str, colour: SavedColour | None, target: Path
-) -> tuple[NDArray[Any], Encoding | None, tuple[str, ...]]:
-    """Return the values to write in a layout, their encoding, and notes about lost information."""
+    oiio: ModuleType,
+    picture: Picture,
+    layout: tuple[int, str],
+    saved: Saved,
+    target: Path,
+) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:
+    """Return the values to write in a layout, what describes them, and notes about losses."""
+    channels, numbers = layout
     values = next(one for one in _layouts(picture, True) if one.shape[2] == channels)
     integer = numbers.startswith("uint")
     has_alpha = channels in (2, 4)
     notes = _losses(picture, target, values, has_alpha, integer)
-    encoding = picture.encoding
-    if encoding == "linear" and (colour or ("srgb" if integer else "linear")) == "srgb":
-        values, encoding = encoded(values, "srgb"), "srgb"
-    return as_numbers(values, numbers), encoding, tuple(notes)
+    if picture.encoding is None:
+        return as_numbers(values, numbers), picture, tuple(notes)
+    what: tuple[str, str] | str = ("rec709", picture.encoding)
+    if picture.encoding == "linear":
+        if saved.view is not None and not integer:
+            raise ValueError(f"view: {target} has linear floats; write a file of integers")
+        curve = saved.curve or ("srgb" if integer else "linear")
+        values, what = displayed.converted(oiio, values, saved, curve)
+    try:
+        described = described_as(oiio, picture, target, what)
+    except ValueError as error:
+        if picture.encoding == "linear":
+            raise
+        # The settings made these colours, not the file's options.
+        described = dataclasses.replace(picture, encoding=None)
+        notes.append(str(error))
+    return as_numbers(values, numbers), described, tuple(notes)
+
+
+def described_as(
+    oiio: ModuleType, picture: Picture, target: Path, what: tuple[str, str] | str
+) -> Picture:
+    """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
+    is_plain, attributes = displayed.with_names(oiio, picture.stored.attributes, target, what)
+    stored = dataclasses.replace(picture.stored, attributes=attributes)
+    if is_plain:
+        curve: Any = None if what[1] == "none" else what[1]
+        return dataclasses.replace(picture, encoding=curve, stored=stored)
+    return dataclasses.replace(picture, encoding=None, stored=dataclasses.replace(stored, space=""))
 
 
 def put(
@@ -196,10 +236,15 @@ def chosen_layout(
     writer: OpenImageIO.ImageOutput,
     temporary: Path,
     target: Path,
+    *,
+    is_hdr: bool,
 ) -> tuple[int, str]:
-    """Return the closest number of channels and number type that the format supports."""
+    """Return the closest number of channels and number type that the format supports.
+
+    `is_hdr`: The curve needs more than 8 bits.
+    """
     for values in _layouts(picture, writer.supports("alpha") != 0):
-        for numbers in _PREFERENCES[picture.numbers]:
+        for numbers in _DEEP if is_hdr else _PREFERENCES[picture.numbers]:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
                 return values.shape[2], numbers
     raise ValueError(
@@ -239,44 +284,6 @@ def _losses(
     if integer and is_float and not np.isfinite(values).all():
         notes.append(f"{target} has integers: NaN is written as 0, infinity as 1")
     return notes
-
-
-def _pq(colours: NDArray[Any]) -> NDArray[Any]:
-    """Inverse EOTF of PQ (Rec. ITU-R BT.2100, table 4); 1 is 203 cd/m2."""
-    power = (np.clip(np.nan_to_num(colours.astype(float)), 0, 1e4 / 203) * 203e-4) ** (2610 / 16384)
-    signal: NDArray[Any] = (3424 / 4096 + 2413 / 128 * power) / (1 + 2392 / 128 * power)
-    return signal ** (2523 / 32)
-
-
-def _hlg(colours: NDArray[Any]) -> NDArray[Any]:
-    """OETF of HLG (Rec. ITU-R BT.2100, table 5); 1 becomes 0.75."""
-    light = np.clip(0.26496 * np.nan_to_num(colours.astype(float)), 0, 1)
-    a, b = 0.17883277, 0.28466892
-    high = a * np.log(np.maximum(12 * light - b, 1e-9)) + 0.5 - a * np.log(4 * a)
-    signal: NDArray[Any] = np.where(light <= 1 / 12, np.sqrt(3 * light), high)
-    return signal
-
-
-_ENCODERS: Final = {"pq": _pq, "hlg": _hlg}
-
-
-def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
-    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
-
-    - `curve`: "none" and "linear" return the values themselves.
-    - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
-    """
-    if curve in ("none", "linear"):
-        return values
-    made = values.astype(np.float32)
-    colours = made[:, :, : made.shape[2] - (made.shape[2] in (2, 4))]
-    if curve == "srgb":
-        colours[:] = encode_srgb(colours)
-    elif curve in ("pq", "hlg"):
-        colours[:] = _ENCODERS[curve](colours)
-    else:
-        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
-    return made
 
 
 def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:

@@ -44,8 +44,8 @@ __all__ = [
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
-SavedColour = Literal["linear", "srgb"]
-Encoding = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
+SavedColour = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
+Encoding = SavedColour
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
 
@@ -105,13 +105,13 @@ class StoredImage:
     - `associated`: Whether the file's format says that colours are multiplied by alpha.
     - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
     - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
-      than `space`, and has precedence unless `is_signalled`.
+      than `space`, and has precedence unless there are `code_points`.
     - `attributes`: Those of which `is_kept` is true, by OpenImageIO's names.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
     - `profile_name`: The name in the ICC profile; "" without a profile.
-    - `is_signalled`: Whether `space` is from a cICP chunk, which has precedence over a profile
-      (PNG, third edition).
+    - `code_points`: Those of the file's colours (Rec. ITU-T H.273), as in a cICP chunk, which has
+      precedence over a profile (PNG, third edition): primaries, curve, matrix, range.
     """
 
     pixels: NDArray[Any]
@@ -124,7 +124,7 @@ class StoredImage:
     attributes: Mapping[str, tuple[Any, Any]]
     parts: tuple[str, ...] = ("",)
     profile_name: str = ""
-    is_signalled: bool = False
+    code_points: tuple[int, ...] | None = None
     gamma: float | None = None
 
     @property

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.io import image_reading, image_writing, safe_writing
-from vkbloom.io.images import DTYPES, Picture, SavedColour, StoredImage, complete
+from vkbloom.io import displayed, image_reading, image_writing, safe_writing
+from vkbloom.io.displayed import Saved
+from vkbloom.io.images import DTYPES, Picture, StoredImage, complete
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -128,7 +129,7 @@ def _read_rows(
 def written_rows(
     path: str | os.PathLike[str],
     height: int,
-    colour: SavedColour | None,
+    saved: Saved,
     attributes: Mapping[str, str],
     quality: int | None,
 ) -> Iterator[Callable[[Picture], tuple[str, ...]]]:
@@ -140,6 +141,7 @@ def written_rows(
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
     image_writing.check_quality(target, quality)
+    displayed.check_saved(saved)
     told: dict[str, str | int] = {**attributes}
     if quality is not None:
         told["CompressionQuality"] = quality
@@ -148,10 +150,13 @@ def written_rows(
 
     def add(picture: Picture) -> tuple[str, ...]:
         nonlocal layout, row
+        picture = image_writing.in_colour(picture, saved)
         if layout is None:
-            layout = image_writing.chosen_layout(oiio, picture, writer, temporary, target)
-        values, encoding, notes = image_writing.prepared(picture, *layout, colour, target)
-        described = replace(picture, encoding=encoding)
+            is_hdr = displayed.is_hdr(saved)
+            layout = image_writing.chosen_layout(
+                oiio, picture, writer, temporary, target, is_hdr=is_hdr
+            )
+        values, described, notes = image_writing.prepared(oiio, picture, layout, saved, target)
         if row == 0:
             shape = height, *values.shape[1:]
             spec = image_writing.spec_of(

@@ -49,6 +49,11 @@ Steps: TypeAlias = tuple[Any, Path, Callable[[bool], None]]
 # Formats of OpenImageIO that discard the picture or print it on the terminal.
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
 
+# Formats that OpenImageIO has only where it is built with a library.
+_MISSING: Final = dict.fromkeys(
+    (".avif", ".heic", ".heif"), "libheif; PNG can name PQ, HLG and primaries, too"
+)
+
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _READ_BYTES: Final = 64 << 20  # bytes read at a time
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
@@ -61,7 +66,11 @@ def check_extension(oiio: ModuleType, suffix: str) -> None:
     if writer is None:
         oiio.geterror()
     if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:
-        raise ValueError(f"path: {suffix!r} is not the extension of a writable image format")
+        reason = _MISSING.get(suffix.lower())
+        raise ValueError(
+            f"path: {suffix!r} is not the extension of a writable image format"
+            + (f": this OpenImageIO is built without {reason}" if reason else "")
+        )
 
 
 def reserve(file: Path, size: int) -> Path:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import itertools
 import re
+from collections.abc import Mapping
 
 __all__ = ["described_parameters"]
 
 
-def described_parameters(kind: type) -> dict[str, str]:
-    """Return the first sentence about each parameter from a class's numpydoc docstring."""
-    lines = inspect.cleandoc(kind.__doc__ or "").splitlines()
+# By the text, not the class: a class of a file that is loaded again must not be kept.
+@functools.lru_cache(maxsize=128)
+def described_parameters(docstring: str) -> Mapping[str, str]:
+    """Return the first sentence about each parameter of a numpydoc docstring."""
+    lines = inspect.cleandoc(docstring).splitlines()
     texts: dict[str, list[str]] = {}
     names: list[str] = []
     start = lines.index("Parameters") + 2 if "Parameters" in lines else len(lines)

@@ -1,0 +1,181 @@
+#include "methods/adjoint.h"
+
+#include "passes/adjoint.h"
+
+#include <stdio.h>
+#include <string.h>
+
+// A family of passes. Those whose weights depend on the brightness have an adjoint of their own.
+struct family {
+    const struct vkb_shader *shader;
+    vkb_transpose *transpose, *weighted;
+};
+
+static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
+{
+    static const struct family families[] = {
+        {&vkb_shader_composite_frag, vkb_transpose_composite, NULL},
+        {&vkb_shader_threshold_frag, vkb_transpose_threshold, NULL},
+        {&vkb_shader_blur_frag, vkb_transpose_blur, NULL},
+        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_weighted_down},
+        {&vkb_shader_pyramid_up_frag, vkb_transpose_up, NULL},
+        {&vkb_shader_gather_frag, vkb_transpose_gather, NULL},
+        {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down, NULL},
+        {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up, NULL},
+        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_weighted_box},
+        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_bevy, NULL},
+        {&vkb_shader_urp_prefilter_frag, vkb_transpose_urp, NULL},
+        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_unreal, NULL},
+        {&vkb_shader_kino_prefilter_frag, vkb_transpose_kino, NULL},
+    };
+    const struct vkb_constants *constants = &pass->constants;
+
+    // Positions that are limited have none.
+    if ((pass->shader == &vkb_shader_pyramid_up_frag || pass->shader == &vkb_shader_gather_frag)
+        && (constants->upsample == UPSAMPLE_INSET_LINEAR
+            || constants->upsample == UPSAMPLE_INSET_CUBIC))
+        return NULL;
+    for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
+        if (families[i].shader == pass->shader)
+            return constants->firefly_filter ? families[i].weighted : families[i].transpose;
+    return NULL;
+}
+
+// The image of a framebuffer's cotangents, which the source brings.
+static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source *source,
+                           const struct vkb_cotangents *cotangents, uint32_t number,
+                           struct vkb_error *error)
+{
+    const char *name = cotangents->names[number];
+    const uint32_t image = vkb_graph_find(adjoint->graph, name);
+    const struct vkb_level *level = &source->image.levels[number];
+
+    if (image == VKB_NO_IMAGE || number >= source->image.level_count
+        || adjoint->brought[image] != VKB_NO_IMAGE)
+        return vkb_fail(error, VKB_ERROR_VALUE, "cotangents: unknown framebuffer '%s'", name);
+    struct vkb_image_row row = {
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .width = adjoint->graph->images[image].width,
+        .height = adjoint->graph->images[image].height,
+        .input = (enum vkb_input_kind)(VKB_INPUT_LEVEL + number),
+    };
+    snprintf(row.name, sizeof row.name, "cotangents_%u", number);
+    if (level->format != row.format || level->size.width != row.width
+        || level->size.height != row.height)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "cotangents: %s is of another size or format than its framebuffer", name);
+    return vkb_graph_add_image(adjoint->graph, &row, &adjoint->brought[image], error);
+}
+
+// The image of the weights, which are complete when all passes are there.
+static bool add_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
+{
+    const struct vkb_image_row row = {
+        .name = "adjoint_weights",
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .width = TABLE_WIDTH,
+        .height = 1,
+        .serial = 1,
+    };
+
+    return vkb_graph_add_image(adjoint->graph, &row, &adjoint->table_image, error);
+}
+
+// FNV-1a of the words.
+static uint64_t hash_of(const void *bytes, size_t size)
+{
+    const unsigned char *given = bytes;
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+
+    for (size_t i = 0; i < size; i += sizeof(uint32_t)) {
+        uint32_t word;
+        memcpy(&word, given + i, sizeof word);
+        hash = (hash ^ word) * UINT64_C(0x100000001b3);
+    }
+    return hash ? hash : 1;
+}
+
+// Fills the rest of the last row of weights, and gives them to the graph.
+static bool end_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
+{
+    struct vkb_table *table = &adjoint->table;
+    const size_t rows = table->count / TABLE_WIDTH + 1, texels = rows * TABLE_WIDTH;
+    struct vkb_image_row *row = &adjoint->graph->images[adjoint->table_image];
+
+    if (!vkb_grow(error, &table->texels, &table->capacity, texels, sizeof *table->texels))
+        return false;
+    memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
+    row->height = (uint32_t)rows;
+    row->pixels = adjoint->graph->owned[0] = table->texels;
+    row->serial = hash_of(table->texels, texels * sizeof *table->texels);
+    *table = (struct vkb_table){0};
+    return true;
+}
+
+// Adds the adjoint passes, from the last pass to the first.
+static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
+                       bool *possible, struct vkb_error *error)
+{
+    const float *prefilter = settings->kernel.prefilter;
+    const bool convolves =
+        settings->method == VKB_METHOD_CONVOLUTION && prefilter[0] > prefilter[1];
+
+    for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
+        const struct vkb_pass_row pass = adjoint->graph->passes[i];
+        vkb_transpose *transpose = find_transpose(&pass);
+        if (pass.target_count != 1 || vkb_brought(adjoint, &pass) == VKB_NO_IMAGE)
+            continue;
+        const bool convolved = pass.block == VKB_BLOCK_fft && convolves;
+        *possible = convolved || transpose;
+        if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
+                      : transpose && !transpose(adjoint, &pass, error))
+            return false;
+    }
+    return true;
+}
+
+// Makes the cotangents of the source's images framebuffers.
+static void show_results(struct vkb_adjoint *adjoint, uint32_t image_count)
+{
+    static const char *const names[VKB_INPUT_COUNT] = {
+        [VKB_INPUT_IMAGE] = "by_image",
+        [VKB_INPUT_EMISSION] = "by_emission",
+        [VKB_INPUT_MASK] = "by_mask",
+    };
+
+    for (uint32_t i = 0; i < image_count; ++i) {
+        const struct vkb_image_row *forward = &adjoint->graph->images[i];
+        const uint32_t brought = adjoint->brought[i];
+        if (forward->input == VKB_INPUT_NONE || brought == VKB_NO_IMAGE)
+            continue;
+        struct vkb_image_row *row = &adjoint->graph->images[brought];
+        snprintf(row->name, sizeof row->name, "%s", names[forward->input]);
+        row->framebuffer = true;
+        row->channels = forward->input == VKB_INPUT_MASK ? 0 : forward->channels;
+    }
+}
+
+bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
+                       const struct vkb_cotangents *cotangents, uint32_t max_side,
+                       struct vkb_graph *graph, uint32_t *first, bool *possible,
+                       struct vkb_error *error)
+{
+    struct vkb_adjoint adjoint = {.graph = graph, .sums = cotangents->sums};
+
+    if (!vkb_source_build(source, settings, max_side, graph, error))
+        return false;
+    const uint32_t image_count = *first = graph->image_count;
+    adjoint.brought = vkb_alloc(error, image_count, sizeof *adjoint.brought);
+    bool done = adjoint.brought && add_table(&adjoint, error);
+    for (uint32_t i = 0; adjoint.brought && i < image_count; ++i)
+        adjoint.brought[i] = VKB_NO_IMAGE;
+    for (uint32_t i = 0; done && i < cotangents->count; ++i)
+        done = add_cotangents(&adjoint, source, cotangents, i, error);
+    *possible = true;
+    done = done && add_passes(&adjoint, settings, possible, error) && end_table(&adjoint, error);
+    if (done && !cotangents->sums)
+        show_results(&adjoint, image_count);
+    vkb_free(adjoint.table.texels);
+    vkb_free(adjoint.brought);
+    return done;
+}

@@ -1,0 +1,211 @@
+#include "passes/adjoint.h"
+
+#include <stdio.h>
+
+// A filter whose texels are read by no more pixels than this is one pass, not one for each axis.
+static const double MOST_IN_ONE_PASS = 20.0;
+
+uint32_t vkb_brought(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass)
+{
+    return adjoint->brought[pass->targets[0]];
+}
+
+struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
+                                    uint32_t count)
+{
+    struct vkb_pass_row row = vkb_fullscreen_row("", shader, VKB_NO_IMAGE);
+
+    while (row.read_count < count) {
+        row.reads[row.read_count] = reads[row.read_count];
+        ++row.read_count;
+    }
+    return row;
+}
+
+// Adds the row with a new image as its target.
+static bool add_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, struct vkb_size size,
+                    uint32_t *image, struct vkb_error *error)
+{
+    char name[VKB_NAME_SIZE];
+
+    snprintf(name, sizeof name, "adjoint_%u", adjoint->added++);
+    if (!vkb_add_target(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image, error))
+        return false;
+    snprintf(row->name, sizeof row->name, "%s", name);
+    row->targets[0] = *image;
+    return vkb_graph_add_pass(adjoint->graph, row, error);
+}
+
+// Every binding of the shader must be filled, also those that a pass does not read.
+static void read_nothing(struct vkb_pass_row *row)
+{
+    row->reads[row->read_count++] = row->reads[0];
+    row->reads[row->read_count++] = row->reads[0];
+}
+
+bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given, uint32_t image,
+               struct vkb_error *error)
+{
+    const struct vkb_image_row *forward = &adjoint->graph->images[image];
+    const struct vkb_size size = {forward->width, forward->height};
+    struct vkb_pass_row row = *given;
+    uint32_t *brought = &adjoint->brought[image];
+
+    read_nothing(&row);
+    row.constants.add_own = *brought != VKB_NO_IMAGE;
+    if (row.constants.add_own)
+        row.reads[row.read_count - 2] = *brought;
+    row.constants.from_image =
+        forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
+    if (row.constants.from_image)
+        row.reads[row.read_count - 1] = image;
+    return add_row(adjoint, &row, size, brought, error);
+}
+
+static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
+                                      const struct vkb_filter *filter, enum vkb_mode direction,
+                                      uint32_t cotangents)
+{
+    const uint32_t reads[] = {cotangents, adjoint->table_image};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 2);
+
+    row.constants.direction = direction;
+    row.block = VKB_BLOCK_adjoint_filter;
+    row.params.adjoint_filter.gain = (float)filter->gain;
+    return row;
+}
+
+static bool bring_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter, bool rows,
+                        uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
+    struct vkb_pass_row row =
+        filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
+    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
+    uint32_t start;
+
+    if (!vkb_axis_transpose(rows ? &filter->x : &filter->y, false, &adjoint->table, &start, error))
+        return false;
+    *(rows ? &params->start_x : &params->start_y) = (int)start;
+    return vkb_bring(adjoint, &row, image, error);
+}
+
+// Along one axis to an image between, then along the other one.
+static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                        uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
+    const struct vkb_axis *x = &filter->x, *y = &filter->y;
+    const bool rows = (uint64_t)x->from * y->to <= (uint64_t)x->to * y->from;
+    const struct vkb_size size = {rows ? x->from : x->to, rows ? y->to : y->from};
+    struct vkb_filter first = *filter;
+    uint32_t start, between;
+
+    first.gain = 1.0;
+    struct vkb_pass_row row =
+        filter_row(adjoint, &first, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
+    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
+    read_nothing(&row);
+    if (!vkb_axis_transpose(rows ? x : y, false, &adjoint->table, &start, error))
+        return false;
+    *(rows ? &params->start_x : &params->start_y) = (int)start;
+    return add_row(adjoint, &row, size, &between, error)
+        && bring_along(adjoint, filter, !rows, between, image, error);
+}
+
+bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
+    struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
+    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
+    uint32_t start_x, start_y;
+
+    if (filter->kernels == 1) {
+        if (vkb_axis_is_identity(&filter->y))
+            return bring_along(adjoint, filter, true, cotangents, image, error);
+        if (vkb_axis_is_identity(&filter->x))
+            return bring_along(adjoint, filter, false, cotangents, image, error);
+        if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MOST_IN_ONE_PASS)
+            return bring_twice(adjoint, filter, cotangents, image, error);
+    }
+    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
+        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
+        return false;
+    params->start_x = (int)start_x;
+    params->start_y = (int)start_y;
+    return vkb_bring(adjoint, &row, image, error);
+}
+
+bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                      struct vkb_error *error)
+{
+    struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
+    uint32_t start_x, start_y;
+
+    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
+        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
+        return false;
+    row.params.adjoint_filter.start_x = (int)start_x;
+    row.params.adjoint_filter.start_y = (int)start_y;
+    read_nothing(&row);
+    return add_row(adjoint, &row, size, image, error);
+}
+
+bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                       struct vkb_error *error)
+{
+    const uint32_t kept = adjoint->brought[target];
+
+    if (vkb_axis_is_identity(&filter->x) && vkb_axis_is_identity(&filter->y))
+        return vkb_bring(adjoint, row, image, error);
+    // The cotangents of the target, complete, are replaced for a moment by those of what it
+    // samples.
+    adjoint->brought[target] = VKB_NO_IMAGE;
+    const bool done = vkb_bring(adjoint, row, target, error)
+                   && vkb_bring_filter(adjoint, filter, adjoint->brought[target], image, error);
+    adjoint->brought[target] = kept;
+    return done;
+}
+
+static struct vkb_size blocks_of(struct vkb_size size)
+{
+    return (struct vkb_size){(size.width + SUM_SIDE - 1) / SUM_SIDE,
+                             (size.height + SUM_SIDE - 1) / SUM_SIDE};
+}
+
+static bool add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                     struct vkb_size size, const char *name, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+    uint32_t image;
+
+    read_nothing(&row);
+    size = blocks_of(size);
+    if (!add_row(adjoint, &row, size, &image, error))
+        return false;
+    while (size.width > 1 || size.height > 1) {
+        row = vkb_adjoint_row(&vkb_shader_adjoint_sum_frag, &image, 1);
+        size = blocks_of(size);
+        if (!add_row(adjoint, &row, size, &image, error))
+            return false;
+    }
+    snprintf(adjoint->graph->images[image].name, VKB_NAME_SIZE, "%s", name);
+    adjoint->graph->images[image].framebuffer = true;
+    return true;
+}
+
+bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                    struct vkb_size size, const char *name, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+    char squares[VKB_NAME_SIZE];
+
+    if (!adjoint->sums)
+        return true;
+    snprintf(squares, sizeof squares, "%s_squares", name);
+    row.constants.by = BY_VALUES;
+    if (!add_sums(adjoint, &row, size, name, error))
+        return false;
+    row.constants.by = BY_SQUARES;
+    return add_sums(adjoint, &row, size, squares, error);
+}

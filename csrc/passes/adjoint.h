@@ -1,0 +1,62 @@
+// Adjoint passes: each takes the cotangents of its image back to those of an image that the forward
+// pass reads. All gather, so that their results have the same bits in every run, and all store
+// single floats.
+#ifndef VKB_ADJOINT_H
+#define VKB_ADJOINT_H
+
+#include "passes/pass.h"
+#include "passes/taps.h"
+
+struct vkb_adjoint {
+    struct vkb_graph *graph;
+    struct vkb_table table;  // of all filters
+    uint32_t table_image;
+    uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
+    uint32_t added;     // images so far
+    bool sums;          // the derivatives by fields are wanted, not those by images
+};
+
+// Adds the adjoint passes of a forward row, which is a copy: adding passes moves those of the
+// graph.
+typedef bool vkb_transpose(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                           struct vkb_error *error);
+
+// The cotangents of what the pass writes.
+uint32_t vkb_brought(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass);
+
+// A row of a shader that includes adjoint.glsl and, before what that reads, has these images.
+struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
+                                    uint32_t count);
+
+// Adds the row, whose result is added to the cotangents of a forward image.
+bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t image,
+               struct vkb_error *error);
+
+// Brings the transpose of a filter of an image.
+bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, uint32_t image, struct vkb_error *error);
+
+// The same as a new image of `size`, to which no other cotangents are added.
+bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                      struct vkb_error *error);
+
+// Brings the transpose of a filter of an image, of the row's result at the pixels of `target`.
+bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                       struct vkb_error *error);
+
+// If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
+// add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
+// values, which tell how exact the sum is.
+bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                    struct vkb_size size, const char *name, struct vkb_error *error);
+
+// The families of passes.
+vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
+vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_transpose_gather,
+    vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box;
+vkb_transpose vkb_transpose_weighted_down, vkb_transpose_weighted_box, vkb_transpose_bevy,
+    vkb_transpose_urp, vkb_transpose_unreal, vkb_transpose_kino;
+
+#endif

@@ -1,0 +1,180 @@
+// The adjoints of linear filters. Each reads its taps from the parameters of the forward row.
+#include "passes/adjoint.h"
+#include "passes/blur.h"
+#include "passes/levels.h"
+
+#include <math.h>
+
+static void set_line(const struct vkb_blur_params *params, int radius, double step,
+                     struct vkb_axis *axis)
+{
+    axis->count = 0;
+    for (int tap = -radius; tap <= radius; ++tap) {
+        const int weight = tap < 0 ? -tap : tap;
+        axis->taps[axis->count++] = (struct vkb_tap){
+            .offset = tap * step,
+            .weights = {params->weights[weight / 4][weight % 4]},
+        };
+    }
+}
+
+bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const struct vkb_blur_params *params = &pass->params.blur;
+    const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
+    const int radius = pass->constants.radius;
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    filter.gain = params->gain;
+    if (direction != DIRECTION_VERTICAL)
+        set_line(params, radius, params->step_x, &filter.x);
+    if (direction != DIRECTION_HORIZONTAL)
+        set_line(params, radius, params->step_y, &filter.y);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+// Taps at a distance on both sides, and in the middle, with the weights of one kernel.
+static void add_taps(struct vkb_axis *axis, int kernel, double distance, double side, double middle)
+{
+    const double offsets[] = {-distance, 0.0, distance}, shares[] = {side, middle, side};
+
+    for (int i = 0; i < 3; ++i) {
+        if (shares[i] == 0.0)
+            continue;
+        struct vkb_tap *tap = &axis->taps[axis->count++];
+        *tap = (struct vkb_tap){.offset = offsets[i]};
+        tap->weights[kernel] = shares[i];
+    }
+}
+
+// 13 taps are those of two kernels: nine around the centre, and four between them, each with half
+// of the weight.
+bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const struct vkb_pyramid_params *params = &pass->params.pyramid;
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    filter.kernels = 2;
+    filter.gain = 0.5;
+    filter.x.count = filter.y.count = 0;
+    add_taps(&filter.x, 0, 2.0 * params->step_x, 0.25, 0.5);
+    add_taps(&filter.y, 0, 2.0 * params->step_y, 0.25, 0.5);
+    add_taps(&filter.x, 1, params->step_x, 0.5, 0.0);
+    add_taps(&filter.y, 1, params->step_y, 0.5, 0.0);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                       struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    filter.x.count = filter.y.count = 0;
+    add_taps(&filter.x, 0, 1.0, 0.5, 0.0);
+    add_taps(&filter.y, 0, 1.0, 0.5, 0.0);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+// False: the taps depend on the position in another way.
+static bool set_upsampling(enum vkb_mode kind, double step, struct vkb_axis *axis)
+{
+    switch ((int)kind) {
+    case UPSAMPLE_LINEAR:
+        return true;
+    case UPSAMPLE_CUBIC:
+        axis->cubic = true;
+        return true;
+    case UPSAMPLE_UNIT_TENT:
+    case UPSAMPLE_TENT:
+        axis->count = 0;
+        add_taps(axis, 0, kind == UPSAMPLE_TENT ? step : 1.0, 0.25, 0.5);
+        return true;
+    default:
+        return false;
+    }
+}
+
+bool vkb_transpose_up(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                      struct vkb_error *error)
+{
+    const struct vkb_pyramid_params *params = &pass->params.pyramid;
+    const enum vkb_mode kind = (enum vkb_mode)pass->constants.upsample;
+    const uint32_t cotangents = vkb_brought(adjoint, pass);
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    if (!set_upsampling(kind, params->step_x, &filter.x)
+        || !set_upsampling(kind, params->step_y, &filter.y))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "adjoint: pass %s has an unknown filter",
+                        pass->name);
+    filter.gain = params->coarse;
+    if (!vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[0], error))
+        return false;
+    if (!pass->constants.add_own)
+        return true;
+    vkb_filter_begin(adjoint->graph, pass->reads[1], pass->targets[0], &filter);
+    filter.gain = params->own;
+    return vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[1], error);
+}
+
+bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                          struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    for (int level = 0; level < pass->constants.levels; ++level) {
+        vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
+        filter.gain = pass->params.gather.shares[level / 4][level % 4];
+        if (!set_upsampling((enum vkb_mode)pass->constants.upsample, 0.0, &filter.x)
+            || !set_upsampling((enum vkb_mode)pass->constants.upsample, 0.0, &filter.y))
+            return vkb_fail(error, VKB_ERROR_GENERAL, "adjoint: pass %s has an unknown filter",
+                            pass->name);
+        if (!vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[level],
+                              error))
+            return false;
+    }
+    return true;
+}
+
+// The centre, and four taps around it.
+bool vkb_transpose_kawase_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                               struct vkb_error *error)
+{
+    const double distance = 0.5 * pass->params.kawase.offset;
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    filter.kernels = 2;
+    filter.gain = 0.5;
+    filter.x.count = filter.y.count = 0;
+    add_taps(&filter.x, 0, 0.0, 0.0, 1.0);
+    add_taps(&filter.y, 0, 0.0, 0.0, 1.0);
+    add_taps(&filter.x, 1, distance, 0.5, 0.0);
+    add_taps(&filter.y, 1, distance, 0.5, 0.0);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+// Two taps along rows, two along columns, and four diagonal ones.
+bool vkb_transpose_kawase_up(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    const double distance = pass->params.kawase.offset;
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    filter.kernels = 3;
+    filter.gain = 1.0 / 12.0;
+    filter.x.count = filter.y.count = 0;
+    add_taps(&filter.x, 0, distance, 1.0, 0.0);
+    add_taps(&filter.y, 0, 0.0, 0.0, 1.0);
+    add_taps(&filter.x, 1, 0.0, 0.0, 1.0);
+    add_taps(&filter.y, 1, distance, 1.0, 0.0);
+    add_taps(&filter.x, 2, 0.5 * distance, 1.0, 0.0);
+    add_taps(&filter.y, 2, 0.5 * distance, 2.0, 0.0);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}

@@ -1,0 +1,77 @@
+// The adjoints of passes that compute each pixel from those at the same place: the composite, and
+// the threshold pass, which reduces the image before.
+#include "passes/adjoint.h"
+
+static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image)
+{
+    const struct vkb_image_row *row = &adjoint->graph->images[image];
+
+    return (struct vkb_size){row->width, row->height};
+}
+
+// Whether the derivatives by images depend on the bloom. Otherwise it need not be rendered for
+// them.
+static bool depends_on_bloom(const struct vkb_pass_row *pass)
+{
+    const struct vkb_constants *constants = &pass->constants;
+
+    return constants->composite == COMPOSITE_SCREEN || constants->tonemap != TONEMAP_NONE
+        || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
+        || pass->params.composite.limit < (float)SINGLE_LIMIT;
+}
+
+bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
+                              vkb_brought(adjoint, pass)};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_composite_frag, reads, 4);
+
+    row.constants = pass->constants;
+    row.constants.dither = 0;
+    row.block = VKB_BLOCK_composite;
+    row.params.composite = pass->params.composite;
+    if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
+        return false;
+    if (!depends_on_bloom(pass))
+        row.reads[1] = row.reads[0];
+    for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
+        row.constants.by = by;
+        if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
+            || (by == BY_MASK && !pass->constants.masked))
+            continue;
+        if (!vkb_bring(adjoint, &row, pass->reads[by], error))
+            return false;
+    }
+    return true;
+}
+
+// Brings what is at the pixels of the target to an image that these sample linearly.
+static bool bring_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                          uint32_t image, uint32_t target, struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, image, target, &filter);
+    return vkb_bring_through(adjoint, row, &filter, image, target, error);
+}
+
+bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    const uint32_t target = pass->targets[0];
+    const uint32_t reads[] = {pass->reads[0], pass->reads[1], vkb_brought(adjoint, pass)};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_threshold_frag, reads, 3);
+
+    row.constants = pass->constants;
+    row.block = VKB_BLOCK_threshold;
+    row.params.threshold = pass->params.threshold;
+    if (pass->constants.threshold_mode == THRESHOLD_KNEE
+        && !vkb_bring_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
+        return false;
+    row.constants.by = BY_SCENE;
+    if (!bring_sampled(adjoint, &row, pass->reads[0], target, error))
+        return false;
+    row.constants.by = BY_MASK;
+    return !pass->constants.masked || bring_sampled(adjoint, &row, pass->reads[1], target, error);
+}

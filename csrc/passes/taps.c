@@ -1,0 +1,198 @@
+#include "passes/taps.h"
+
+#include <math.h>
+#include <string.h>
+
+// Lists of weights that are compared with the next one. Sizes in a simple ratio have as many.
+enum { RECENT = 8 };
+
+// Floats count up to this number.
+enum { MOST_TEXELS = 1 << 24 };
+
+static void begin_axis(uint32_t from, uint32_t to, struct vkb_axis *axis)
+{
+    const struct vkb_tap centre = {.weights = {1.0}};
+
+    *axis = (struct vkb_axis){.from = from, .to = to};
+    vkb_axis_set(axis, &centre, 1);
+}
+
+void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
+                      struct vkb_filter *filter)
+{
+    const struct vkb_image_row *source = &graph->images[from], *target = &graph->images[to];
+
+    begin_axis(source->width, target->width, &filter->x);
+    begin_axis(source->height, target->height, &filter->y);
+    filter->kernels = 1;
+    filter->gain = 1.0;
+}
+
+void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count)
+{
+    memcpy(axis->taps, taps, count * sizeof *taps);
+    axis->count = count;
+}
+
+bool vkb_axis_is_identity(const struct vkb_axis *axis)
+{
+    return axis->from == axis->to && !axis->cubic && axis->count == 1 && axis->taps[0].offset == 0.0
+        && axis->taps[0].weights[0] == 1.0;
+}
+
+double vkb_axis_readers(const struct vkb_axis *axis)
+{
+    double low = 0.0, high = 0.0;
+
+    for (uint32_t i = 0; i < axis->count; ++i) {
+        low = fmin(low, axis->taps[i].offset);
+        high = fmax(high, axis->taps[i].offset);
+    }
+    return (high - low + (axis->cubic ? 4.0 : 2.0)) * axis->to / axis->from;
+}
+
+// The texels from `first` on that a pixel samples with a tap, and their shares.
+struct sample {
+    double first;
+    uint32_t count;
+    double shares[4];
+};
+
+static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, double offset)
+{
+    const double place = axis->aligned ? pixel : (pixel + 0.5) * axis->from / axis->to - 0.5;
+    double position = place + offset;
+    // A texel's centre is met with roundings.
+    const double nearest = floor(position + 0.5);
+
+    if (fabs(position - nearest) < 1e-9)
+        position = nearest;
+    const double texel = floor(position), part = position - texel, rest = 1.0 - part;
+    if (!axis->cubic)
+        return (struct sample){texel, part > 0.0 ? 2 : 1, {rest, part}};
+    return (struct sample){
+        texel - 1.0,
+        4,
+        {rest * rest * rest / 6.0, (4.0 - 3.0 * part * part * (2.0 - part)) / 6.0,
+         (4.0 - 3.0 * rest * rest * (2.0 - rest)) / 6.0, part * part * part / 6.0},
+    };
+}
+
+static uint32_t clamped(const struct vkb_axis *axis, double texel)
+{
+    return (uint32_t)fmin(fmax(texel, 0.0), axis->from - 1.0);
+}
+
+// The pixels that read a texel, and where their weights begin.
+struct readers {
+    uint32_t first, end;
+    size_t start;
+};
+
+static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
+{
+    size_t total = 0;
+
+    for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
+        for (uint32_t tap = 0; tap < axis->count; ++tap) {
+            const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
+            for (uint32_t i = 0; i < sample.count; ++i) {
+                struct readers *texel = &readers[clamped(axis, sample.first + i)];
+                if (!texel->end)
+                    texel->first = pixel;
+                texel->end = pixel + 1;
+            }
+        }
+    for (uint32_t texel = 0; texel < axis->from; ++texel) {
+        readers[texel].start = total;
+        total += readers[texel].end - readers[texel].first;
+    }
+    return total;
+}
+
+static void add_weights(const struct vkb_axis *axis, const struct readers *readers,
+                        double (*weights)[VKB_MOST_KERNELS])
+{
+    for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
+        for (uint32_t tap = 0; tap < axis->count; ++tap) {
+            const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
+            for (uint32_t i = 0; i < sample.count; ++i) {
+                const struct readers *texel = &readers[clamped(axis, sample.first + i)];
+                double *sums = weights[texel->start + pixel - texel->first];
+                for (int kernel = 0; kernel < VKB_MOST_KERNELS; ++kernel)
+                    sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];
+            }
+        }
+}
+
+// Lists of weights in a table.
+struct list {
+    size_t place, count;
+};
+
+// Where the list at the end of the table is already; its own place if it is new.
+static size_t place_list(struct vkb_table *table, size_t count, struct list lists[RECENT],
+                         uint32_t *next)
+{
+    const size_t size = count * sizeof *table->texels;
+
+    for (int i = 0; i < RECENT; ++i)
+        if (lists[i].count == count
+            && memcmp(table->texels[lists[i].place], table->texels[table->count], size) == 0)
+            return lists[i].place;
+    lists[(*next)++ % RECENT] = (struct list){table->count, count};
+    table->count += count;
+    return table->count - count;
+}
+
+static bool write_table(const struct vkb_axis *axis, bool kernels, const struct readers *readers,
+                        double (*weights)[VKB_MOST_KERNELS], struct vkb_table *table,
+                        struct vkb_error *error)
+{
+    const size_t start = table->count;
+    struct list lists[RECENT] = {0};
+    uint32_t next = 0;
+
+    if (!vkb_grow(error, &table->texels, &table->capacity, start + axis->from,
+                  sizeof *table->texels))
+        return false;
+    table->count += axis->from;
+    for (uint32_t texel = 0; texel < axis->from; ++texel) {
+        const struct readers *row = &readers[texel];
+        const uint32_t count = row->end - row->first, size = kernels ? count : (count + 3) / 4;
+        if (!vkb_grow(error, &table->texels, &table->capacity, table->count + size,
+                      sizeof *table->texels))
+            return false;
+        float *to = table->count < table->capacity ? table->texels[table->count] : NULL;
+        for (uint32_t i = 0; i < 4 * size; ++i) {
+            const uint32_t reader = kernels ? i / 4 : i, kernel = kernels ? i % 4 : 0;
+            to[i] = reader < count ? (float)weights[row->start + reader][kernel] : 0.0f;
+        }
+        const size_t place = place_list(table, size, lists, &next);
+        table->texels[start + texel][0] = (float)row->first;
+        table->texels[start + texel][1] = (float)count;
+        table->texels[start + texel][2] = (float)place;
+        table->texels[start + texel][3] = 0.0f;
+    }
+    return table->count <= MOST_TEXELS
+        || vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
+                    table->count, MOST_TEXELS);
+}
+
+bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_table *table,
+                        uint32_t *start, struct vkb_error *error)
+{
+    struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
+    double (*weights)[VKB_MOST_KERNELS] =
+        readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
+    bool done = weights != NULL;
+
+    *start = (uint32_t)table->count;
+    if (done) {
+        add_weights(axis, readers, weights);
+        done = write_table(axis, kernels, readers, weights, table, error);
+    }
+    vkb_free(weights);
+    vkb_free(readers);
+    return done;
+}

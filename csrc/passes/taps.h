@@ -1,0 +1,62 @@
+// A filter as taps along both axes, and its transpose as tables. The forward row of a family has
+// the same taps as parameters; the functions that return a filter read them from there.
+//
+// The table of an axis has a texel (first, count, place) for each texel that the filter reads: the
+// pixels that read it, and where their weights are. Edges fold back: a pixel whose taps are beyond
+// the first or the last texel reads that one. Equal weights of several texels are there once.
+#ifndef VKB_TAPS_H
+#define VKB_TAPS_H
+
+#include "graph/graph.h"
+
+enum {
+    VKB_MOST_TAPS = 2 * MAX_WEIGHTS,
+    VKB_MOST_KERNELS = 4,
+};
+
+// A sample at a distance from the position of a pixel, in texels, with a weight for each kernel.
+struct vkb_tap {
+    double offset, weights[VKB_MOST_KERNELS];
+};
+
+// How `to` pixels sample `from` texels: linearly, or with a cubic B-spline.
+struct vkb_axis {
+    uint32_t from, to;
+    bool cubic;
+    bool
+        aligned;  // the position of a pixel is the texel of the same number, whatever the sizes are
+    uint32_t count;
+    struct vkb_tap taps[VKB_MOST_TAPS];
+};
+
+// The sum over the kernels of (rows x columns), times the gain.
+struct vkb_filter {
+    struct vkb_axis x, y;
+    uint32_t kernels;
+    double gain;
+};
+
+// Makes both axes those of a pass that reads `from` and writes `to`, each with one tap at the
+// position of the pixel.
+void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
+                      struct vkb_filter *filter);
+// Replaces the taps of an axis.
+void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count);
+
+struct vkb_table {
+    float (*texels)[4];
+    size_t count, capacity;
+};
+
+// Whether the axis leaves an image as it is.
+bool vkb_axis_is_identity(const struct vkb_axis *axis);
+
+// About how many pixels read a texel.
+double vkb_axis_readers(const struct vkb_axis *axis);
+
+// Adds the transpose of an axis to the table. A texel of weights has those of four pixels, of one
+// kernel; with `kernels` it has those of one pixel, of all kernels.
+bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_table *table,
+                        uint32_t *start, struct vkb_error *error);
+
+#endif

@@ -1,0 +1,144 @@
+"""Derivatives by passes on the device: those of the reference, with the same bits in every run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.methods.reference_cases import random_image
+from vkbloom import (
+    BevyBloom,
+    DualKawase,
+    KinoBloom,
+    Pyramid,
+    Renderer,
+    Separable,
+    UnrealBloom,
+    UrpBloom,
+    reference,
+)
+from vkbloom.gradients.passes import DeviceGradients
+
+SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
+#: Those whose fields are checked, too, in all sizes.
+COMPLETE = ("knee", "pyramid")
+BEVY = BevyBloom(max_mip_dimension=16)
+CASES: dict[str, Any] = {
+    "separable": Separable(),
+    "hard": Separable(threshold=0.5, bloom_scale=1.6),
+    "knee": Separable(threshold=0.6, knee=0.5, intensity=0.7, exposure=0.5),
+    "between texels": Separable(bloom_scale=0.37, blur_scale=1.7, threshold=0.4, knee=0.3),
+    "layers": Separable(loops=2, layers=((1.0, 0.5), (2.5, 0.25)), composite="mix", intensity=0.4),
+    "direct": Separable(direct=True, texel="x", composite="screen", intensity=0.4),
+    "alpha blur": Separable(alpha="blur", threshold=0.4, knee=0.5),
+    "alpha max": Separable(alpha="max", tonemap="reinhard", encoding="srgb"),
+    "aces": Pyramid(levels=3, tonemap="aces", encoding="gamma22"),
+    "exponential": Pyramid(levels=2, tonemap="exponential", encoding="hlg"),
+    "khronos": Separable(tonemap="khronos_neutral"),
+    "agx": Separable(tonemap="agx"),
+    "pq": Separable(encoding="pq"),
+    "off": Separable(bloom=False, tonemap="aces"),
+    "pyramid": Pyramid(
+        levels=4, threshold=0.3, knee=0.5, radius=1.3, level_weights=(0.5, 0.2, 0.2, 0.1)
+    ),
+    "firefly": Pyramid(levels=2, firefly_filter=True, scale_x=1.5),
+    "bevy": BEVY,
+    "bevy threshold": BEVY.replace(threshold=0.4, knee=0.5),
+    "kino": KinoBloom(radius=7.0, threshold=0.3, knee=0.5),
+    "urp": UrpBloom(threshold=0.3, knee=0.5, clamp_max=1.5),
+    "unreal": UnrealBloom(threshold=0.3, smooth_width=0.4),
+    "kawase": DualKawase(levels=3, offset=1.3),
+}
+
+
+def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
+    frames, pullback = renderer.vjp(image, settings, **given)
+    random = np.random.default_rng(5)
+    cotangents = {
+        name: random.standard_normal(frames[name].shape).astype(np.float32)
+        for name in ("glow", "bloom", "final")
+        if name in frames
+    }
+    return pullback, cotangents, reference.vjp(image, settings, **given)[1](cotangents)
+
+
+@pytest.mark.parametrize("boundary", ["zero", "edge", "wrap", "wrap_x"])
+def test_a_convolution_is_transposed(renderer: Renderer, boundary: Any) -> None:
+    """By kernels of even sides, and larger than the image."""
+    random = np.random.default_rng(1)
+    for shape, size in (((4, 5, 3), (11, 14)), ((13, 6, 3), (7, 1))):
+        kernel = random.random(shape)
+        settings = vkbloom.Convolution(psf=kernel, boundary=boundary, threshold=0.3, knee=0.5)
+        image = random_image(*size, channels=3, seed=1).astype(np.float32)
+        pullback, cotangents, expected = pulled(renderer, image, settings)
+        found = pullback(cotangents)
+        assert isinstance(found, DeviceGradients)
+        check(found, expected, "image")
+
+
+def check(found: Any, expected: Any, name: str) -> None:
+    limit = 1e-5 * max(np.abs(expected[name]).max(), 1e-3)
+    assert np.abs(found[name] - expected[name]).max() <= limit, name
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: str) -> None:
+    settings = CASES[name]
+    channels = 4 if settings.alpha != "keep" else 3
+    parts = ("image", "intensity", "exposure", "threshold", "knee")
+    for size in SIZES if name in COMPLETE else SIZES[:1]:
+        image = random_image(*size, channels=channels, seed=1).astype(np.float32)
+        pullback, cotangents, expected = pulled(renderer, image, settings)
+        found = pullback(cotangents)
+        assert isinstance(found, DeviceGradients)
+        assert [*found] == [*expected]
+        for part in parts if name in COMPLETE else parts[:1]:
+            check(found, expected, part)
+        again = pullback(cotangents)
+        assert np.array_equal(found["image"], again["image"])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])
+def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
+    random = np.random.default_rng(3)
+    image, emission = (
+        (random_image(13, 9, seed=seed).clip(0, 1) * (255 if dtype == np.uint8 else 1)).astype(
+            dtype
+        )
+        for seed in (1, 2)
+    )
+    mask = random.random((13, 9), np.float32)
+    separable = Separable(threshold=0.3, knee=0.5, composite="mix", intensity=0.3, bloom_scale=0.5)
+    both = {"mask": mask, "emission": emission}
+    for settings, given in ((separable, {"mask": mask}), (separable, both), (BEVY, both)):
+        pullback, cotangents, expected = pulled(renderer, image, settings, **given)
+        found = pullback(cotangents)
+        assert isinstance(found, DeviceGradients)
+        for name in ("image", *given):
+            check(found, expected, name)
+
+
+def test_what_is_not_finite_has_no_derivative(renderer: Renderer) -> None:
+    image = random_image(9, 8, seed=1).astype(np.float32)
+    image[2, 3, 1], image[5, 5, 0] = np.nan, np.inf
+    pullback, cotangents, expected = pulled(renderer, image, Pyramid(levels=2, threshold=0.2))
+    found = pullback(cotangents)
+    assert isinstance(found, DeviceGradients)
+    assert found["image"][2, 3, 1] == found["image"][5, 5, 0] == 0
+    check(found, expected, "image")
+
+
+def test_only_what_is_read_is_computed(renderer: Renderer) -> None:
+    """Derivatives by images run no sums, and those of a closed renderer come from the reference."""
+    image = random_image(9, 8, seed=1).astype(np.float32)
+    with vkbloom.Renderer(renderer.info.name) as own:
+        pullback, cotangents, expected = pulled(own, image, Separable(threshold=0.2, knee=0.5))
+        found = pullback(cotangents)
+    assert [*dict.keys(found)] == ["image"]
+    check(found, expected, "knee")
+    assert "blur_scale" in found
+    assert found.keys() == expected.keys()
+    assert not isinstance(pullback(cotangents), DeviceGradients)
