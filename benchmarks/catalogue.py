@@ -32,6 +32,7 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "separable": "two passes of N taps against one of N x N",
         "convolution": "convolution with large kernels against SciPy's transforms",
         "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",
+        "adjoint": "derivatives by the image against the framebuffer and against PyTorch",
         "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
     }
 )

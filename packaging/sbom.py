@@ -3,8 +3,8 @@
 `add` takes the objects and the archives that the linker used from its map (-Wl,-Map), and their
 Debian packages. What was compiled from source is given by `--source NAME VERSION FILE...`; the
 version "-" is that of a HEADER_VERSION in the first file, and a file may be "NAME@SHA-256". It
-fails if a library's symbols are in `--symbols` and the SBOM does not list it. `check` validates the
-SBOMs of wheels by cyclonedx-python-lib, and compares the binaries' hashes.
+fails if nm, or $NM, finds a library's symbols in `--symbols` that the SBOM does not list. `check`
+validates the SBOMs of wheels by cyclonedx-python-lib, and compares the binaries' hashes.
 """
 
 from __future__ import annotations
@@ -62,6 +62,10 @@ LIBRARIES: Final[Mapping[str, Library]] = {
         r"glslang::|spv::",
     ),
 }
+
+
+# Debian's source packages of cross compilers that have the files of another one.
+_SOURCES: Final = {"cross-toolchain-base": "glibc"}
 
 
 class Component(NamedTuple):
@@ -133,20 +137,20 @@ def of_packages(files: Iterable[Path], own: Path) -> list[Component]:
     """Return the Debian packages of files, except those in the folder `own`."""
     foreign = [str(file) for file in files if not file.is_relative_to(own)]
     owners = _output("dpkg-query", "--search", *foreign) if foreign else ""
-    found: dict[tuple[str, str], dict[str, str]] = {}
+    found: dict[tuple[str, ...], dict[str, str]] = {}
     for line in owners.splitlines():
         package, _, file = line.partition(": ")
-        form = "${source:Package} ${source:Version}"
-        source, version = _output("dpkg-query", "-W", f"-f={form}", package).split()
-        found.setdefault((source, version), {})[Path(file).name] = _digest(Path(file).read_bytes())
+        form = "${source:Package} ${source:Version} ${Version}"
+        names = tuple(_output("dpkg-query", "-W", f"-f={form}", package).split())
+        found.setdefault(names, {})[Path(file).name] = _digest(Path(file).read_bytes())
     components = []
-    for (source, version), digests in sorted(found.items()):
-        key = re.sub(r"-\d+$", "", source)
+    for (source, of_source, version), digests in sorted(found.items()):
+        key = re.sub(r"-\d+(-cross)?$", "", _SOURCES.get(source, source))
         if key not in LIBRARIES:
             raise SystemExit(
                 f"{source}: its licence is not known; add it to LIBRARIES in {__file__}"
             )
-        purl = f"pkg:deb/debian/{source}@{version.replace(':', '%3A')}?arch=source"
+        purl = f"pkg:deb/debian/{source}@{of_source.replace(':', '%3A')}?arch=source"
         components.append(Component(key, version, digests, purl))
     return components
 
@@ -160,7 +164,8 @@ def _output(*command: str) -> str:
 
 def libraries_in(binaries: Iterable[Path]) -> set[str]:
     """Return the keys of the libraries whose symbols nm finds in binaries."""
-    symbols = _output("nm", "--demangle", "--defined-only", *map(str, binaries))
+    nm = os.environ.get("NM", "nm")
+    symbols = _output(nm, "--demangle", "--defined-only", *map(str, binaries))
     names = re.findall(r"^[0-9a-f]+ [A-Za-z] (.+)$", symbols, re.MULTILINE)
     return {
         key

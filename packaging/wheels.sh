@@ -47,8 +47,7 @@ build_in() {
     for source in "mesa-$MESA" "glslang-$GLSLANG"; do
         test -d "$root$1/$source" || cp -r "$root/build/$source" "$root$1/"
     done
-    git ls-files -z --cached --others --exclude-standard |
-        tar -c --null -T - | tar -x -C "$root$1/vkbloom"
+    tar -x -f "$work/source.tar" -C "$root$1/vkbloom"
     for step in ${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}; do
         folder=$1/vkbloom
         test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
@@ -56,6 +55,8 @@ build_in() {
             sh "$1/vkbloom/packaging/$step" "$folder" "$1/wheels"
     done
 }
+# Both from the same files, which may change meanwhile.
+git ls-files -z --cached --others --exclude-standard | tar -c --null -T - -f "$work/source.tar"
 build_in /build
 build_in /again
 for wheel in "$root"/build/wheels/*.whl; do

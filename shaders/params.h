@@ -634,6 +634,7 @@
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KAWASE, 10, kawase) \
+    NAME(GROUPS_KINO, 11, kino) \
     NAME(BY_SCENE, 0, by_scene) \
     NAME(BY_BLOOM, 1, by_bloom) \
     NAME(BY_MASK, 2, by_mask) \

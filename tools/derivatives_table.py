@@ -13,6 +13,7 @@ import numpy as np
 
 import vkbloom
 from vkbloom.fields import fields_of
+from vkbloom.gradients import on_device
 from vkbloom.reference.derivatives import differentiable
 from vkbloom.registry import METHODS
 
@@ -66,7 +67,11 @@ def as_field(value: Any) -> Any:
 
 def table() -> str:
     """Return the table."""
-    lines = ["| method | linear | curved or piecewise | none |", "| --- | --- | --- | --- |"]
+    lines = [
+        "| method | by the image | linear | curved or piecewise | none |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    renderer = vkbloom.Renderer("software")
     for method in METHODS:
         settings = of_method(method)
         known = differentiable(settings)
@@ -77,7 +82,9 @@ def table() -> str:
             [name for name in fields_of(type(settings)) if name not in known],
         )
         cells = (", ".join(f"`{name}`" for name in names) for names in columns)
-        lines.append(f"| `{type(settings).__name__}` | {' | '.join(cells)} |")
+        place = "device" if on_device(renderer, settings) else "reference"
+        lines.append(f"| `{type(settings).__name__}` | {place} | {' | '.join(cells)} |")
+    renderer.close()
     return "\n".join(lines) + "\n"
 
 

@@ -6,7 +6,8 @@ void vkb_graph_destroy(struct vkb_graph *graph)
 {
     vkb_free(graph->images);
     vkb_free(graph->passes);
-    vkb_free(graph->owned);
+    vkb_free(graph->owned[0]);
+    vkb_free(graph->owned[1]);
     *graph = (struct vkb_graph){0};
 }
 

@@ -133,7 +133,7 @@ struct vkb_graph {
     struct vkb_pass_row *passes;
     uint32_t image_count, pass_count;
     size_t image_capacity, pass_capacity;
-    void *owned;  // pixels of an image, freed with the graph
+    void *owned[2];  // pixels of images, freed with the graph
 };
 
 void vkb_graph_destroy(struct vkb_graph *graph);

@@ -5,34 +5,39 @@
 #include <stdio.h>
 #include <string.h>
 
+// A family of passes. Those whose weights depend on the brightness have an adjoint of their own.
+struct family {
+    const struct vkb_shader *shader;
+    vkb_transpose *transpose, *weighted;
+};
+
 static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
 {
-    static const struct family {
-        const struct vkb_shader *shader;
-        vkb_transpose *transpose;
-    } families[] = {
-        {&vkb_shader_composite_frag, vkb_transpose_composite},
-        {&vkb_shader_threshold_frag, vkb_transpose_threshold},
-        {&vkb_shader_blur_frag, vkb_transpose_blur},
-        {&vkb_shader_pyramid_down_frag, vkb_transpose_down},
-        {&vkb_shader_pyramid_up_frag, vkb_transpose_up},
-        {&vkb_shader_gather_frag, vkb_transpose_gather},
-        {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down},
-        {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up},
-        {&vkb_shader_box_down_frag, vkb_transpose_box},
+    static const struct family families[] = {
+        {&vkb_shader_composite_frag, vkb_transpose_composite, NULL},
+        {&vkb_shader_threshold_frag, vkb_transpose_threshold, NULL},
+        {&vkb_shader_blur_frag, vkb_transpose_blur, NULL},
+        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_weighted_down},
+        {&vkb_shader_pyramid_up_frag, vkb_transpose_up, NULL},
+        {&vkb_shader_gather_frag, vkb_transpose_gather, NULL},
+        {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down, NULL},
+        {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up, NULL},
+        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_weighted_box},
+        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_bevy, NULL},
+        {&vkb_shader_urp_prefilter_frag, vkb_transpose_urp, NULL},
+        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_unreal, NULL},
+        {&vkb_shader_kino_prefilter_frag, vkb_transpose_kino, NULL},
     };
     const struct vkb_constants *constants = &pass->constants;
-    const bool inset =
-        (pass->shader == &vkb_shader_pyramid_up_frag || pass->shader == &vkb_shader_gather_frag)
-        && (constants->upsample == UPSAMPLE_INSET_LINEAR
-            || constants->upsample == UPSAMPLE_INSET_CUBIC);
 
-    // Weights that depend on the brightness, and positions that are limited, have none.
-    if (inset || constants->firefly_filter || constants->from_image)
+    // Positions that are limited have none.
+    if ((pass->shader == &vkb_shader_pyramid_up_frag || pass->shader == &vkb_shader_gather_frag)
+        && (constants->upsample == UPSAMPLE_INSET_LINEAR
+            || constants->upsample == UPSAMPLE_INSET_CUBIC))
         return NULL;
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)
-            return families[i].transpose;
+            return constants->firefly_filter ? families[i].weighted : families[i].transpose;
     return NULL;
 }
 
@@ -101,22 +106,29 @@ static bool end_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
         return false;
     memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
     row->height = (uint32_t)rows;
-    row->pixels = adjoint->graph->owned = table->texels;
+    row->pixels = adjoint->graph->owned[0] = table->texels;
     row->serial = hash_of(table->texels, texels * sizeof *table->texels);
     *table = (struct vkb_table){0};
     return true;
 }
 
 // Adds the adjoint passes, from the last pass to the first.
-static bool add_passes(struct vkb_adjoint *adjoint, bool *possible, struct vkb_error *error)
+static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
+                       bool *possible, struct vkb_error *error)
 {
+    const float *prefilter = settings->kernel.prefilter;
+    const bool convolves =
+        settings->method == VKB_METHOD_CONVOLUTION && prefilter[0] > prefilter[1];
+
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
         vkb_transpose *transpose = find_transpose(&pass);
         if (pass.target_count != 1 || vkb_brought(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        *possible = transpose != NULL;
-        if (transpose && !transpose(adjoint, &pass, error))
+        const bool convolved = pass.block == VKB_BLOCK_fft && convolves;
+        *possible = convolved || transpose;
+        if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
+                      : transpose && !transpose(adjoint, &pass, error))
             return false;
     }
     return true;
@@ -160,7 +172,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     for (uint32_t i = 0; done && i < cotangents->count; ++i)
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
-    done = done && add_passes(&adjoint, possible, error) && end_table(&adjoint, error);
+    done = done && add_passes(&adjoint, settings, possible, error) && end_table(&adjoint, error);
     if (done && !cotangents->sums)
         show_results(&adjoint, image_count);
     vkb_free(adjoint.table.texels);

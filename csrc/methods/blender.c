@@ -197,7 +197,7 @@ static bool add_convolution(struct glare *glare, uint32_t *light, struct vkb_err
 
     source.glow = glare->levels.downs[0];
     source.buffers = glare->levels.sizes[0];
-    return vkb_convolve(glare->settings, &source, &result, glare->levels.graph, light, error);
+    return vkb_convolve(glare->settings, &source, &result, "", glare->levels.graph, light, error);
 }
 
 // The recursive filter along one direction and back, at growing distances. The last pass adds

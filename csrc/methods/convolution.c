@@ -11,7 +11,7 @@
 #include "passes/fft.h"
 #include "passes/levels.h"
 
-#include <string.h>
+#include <stdio.h>
 
 // Of the kernel along an axis: its pixels, and the offsets that count.
 struct reach {
@@ -23,6 +23,7 @@ struct convolution {
     const struct vkb_settings *settings;
     const struct vkb_bloom_source *source;
     struct vkb_graph *graph;
+    const char *prefix;  // of the names of images
     struct vkb_fft_axis x, y;
     struct reach reach_x, reach_y;
 };
@@ -56,21 +57,32 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
 }
 
 // The kernel as the host gives it.
-static bool add_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph *graph,
-                       uint32_t *image, struct vkb_error *error)
+static bool add_kernel(const struct convolution *convolution, uint32_t *image,
+                       struct vkb_error *error)
 {
-    const struct vkb_image_row row = {
-        .name = "kernel",
+    const struct vkb_kernel_data *kernel = &convolution->settings->kernel;
+    struct vkb_image_row row = {
         .format = VKB_FORMAT_RGBA32_FLOAT,
         .width = kernel->width,
         .height = kernel->height,
         .channels = 3,
-        .framebuffer = true,
+        .framebuffer = !*convolution->prefix,
         .pixels = kernel->pixels,
         .serial = kernel->serial,
     };
 
-    return vkb_graph_add_image(graph, &row, image, error);
+    snprintf(row.name, sizeof row.name, "%skernel", convolution->prefix);
+    return vkb_graph_add_image(convolution->graph, &row, image, error);
+}
+
+static bool add_spectrum(const struct convolution *convolution, const char *name,
+                         struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    char named[VKB_NAME_SIZE];
+
+    snprintf(named, sizeof named, "%s%s", convolution->prefix, name);
+    return vkb_add_target(convolution->graph, named, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
+                          error);
 }
 
 // The pass that puts the kernel to its places in the padded lines.
@@ -226,8 +238,8 @@ static bool add_rows_back(const struct convolution *convolution, uint32_t column
 }
 
 bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  const struct vkb_image_row *result, struct vkb_graph *graph, uint32_t *target,
-                  struct vkb_error *error)
+                  const struct vkb_image_row *result, const char *prefix, struct vkb_graph *graph,
+                  uint32_t *target, struct vkb_error *error)
 {
     const int boundary = settings->choices[VKB_CHOICE_boundary];
     const bool wrap_x = boundary == BOUNDARY_WRAP_X;
@@ -236,10 +248,10 @@ bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_so
         .settings = settings,
         .source = source,
         .graph = graph,
+        .prefix = prefix,
         .reach_x.kernel = settings->kernel.width,
         .reach_y.kernel = settings->kernel.height,
     };
-    const enum vkb_format single = VKB_FORMAT_RGBA32_FLOAT;
     uint32_t kernel, spectrum, rows, columns;
 
     convolution.x =
@@ -250,10 +262,10 @@ bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_so
                   size.height, &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
     const struct vkb_size lines = {padded.width, size.height};
-    return add_kernel(&settings->kernel, graph, &kernel, error)
-        && vkb_add_target(graph, "kernel_spectrum", single, padded, false, &spectrum, error)
-        && vkb_add_target(graph, "rows_spectrum", single, lines, false, &rows, error)
-        && vkb_add_target(graph, "spectrum", single, padded, false, &columns, error)
+    return add_kernel(&convolution, &kernel, error)
+        && add_spectrum(&convolution, "kernel_spectrum", padded, &spectrum, error)
+        && add_spectrum(&convolution, "rows_spectrum", lines, &rows, error)
+        && add_spectrum(&convolution, "spectrum", padded, &columns, error)
         && vkb_add_target(graph, result->name, result->format, size, result->framebuffer, target,
                           error)
         && add_placing(&convolution, kernel, spectrum, error)
@@ -272,6 +284,6 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
         .name = "bloom", .format = source->format, .framebuffer = true};
     const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
 
-    return vkb_convolve(settings, source, same ? &whole : &part, graph, bloom, error)
+    return vkb_convolve(settings, source, same ? &whole : &part, "", graph, bloom, error)
         && (same || vkb_levels_enlarge(&levels, *bloom, 1.0, bloom, error));
 }

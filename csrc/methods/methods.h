@@ -53,8 +53,8 @@ struct vkb_levels;
 // Adds the convolution of source->glow with the kernel of the settings. `result` has the name and
 // the format of the image that it writes, and whether this is a framebuffer.
 bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  const struct vkb_image_row *result, struct vkb_graph *graph, uint32_t *target,
-                  struct vkb_error *error);
+                  const struct vkb_image_row *result, const char *prefix, struct vkb_graph *graph,
+                  uint32_t *target, struct vkb_error *error);
 
 // Adds an iteration of a ray of streaks from `from`, with the numbers of a stage, into the image
 // `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights.

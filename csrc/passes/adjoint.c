@@ -134,6 +134,39 @@ bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
     return vkb_bring(adjoint, &row, image, error);
 }
 
+bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                      struct vkb_error *error)
+{
+    struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
+    uint32_t start_x, start_y;
+
+    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
+        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
+        return false;
+    row.params.adjoint_filter.start_x = (int)start_x;
+    row.params.adjoint_filter.start_y = (int)start_y;
+    read_nothing(&row);
+    return add_row(adjoint, &row, size, image, error);
+}
+
+bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                       struct vkb_error *error)
+{
+    const uint32_t kept = adjoint->brought[target];
+
+    if (vkb_axis_is_identity(&filter->x) && vkb_axis_is_identity(&filter->y))
+        return vkb_bring(adjoint, row, image, error);
+    // The cotangents of the target, complete, are replaced for a moment by those of what it
+    // samples.
+    adjoint->brought[target] = VKB_NO_IMAGE;
+    const bool done = vkb_bring(adjoint, row, target, error)
+                   && vkb_bring_filter(adjoint, filter, adjoint->brought[target], image, error);
+    adjoint->brought[target] = kept;
+    return done;
+}
+
 static struct vkb_size blocks_of(struct vkb_size size)
 {
     return (struct vkb_size){(size.width + SUM_SIDE - 1) / SUM_SIDE,

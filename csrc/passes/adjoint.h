@@ -36,6 +36,16 @@ bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint
 bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
+// The same as a new image of `size`, to which no other cotangents are added.
+bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                      struct vkb_error *error);
+
+// Brings the transpose of a filter of an image, of the row's result at the pixels of `target`.
+bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                       struct vkb_error *error);
+
 // If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
 // add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
 // values, which tell how exact the sum is.
@@ -46,5 +56,7 @@ bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
 vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_transpose_gather,
     vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box;
+vkb_transpose vkb_transpose_weighted_down, vkb_transpose_weighted_box, vkb_transpose_bevy,
+    vkb_transpose_urp, vkb_transpose_unreal, vkb_transpose_kino;
 
 #endif

@@ -9,6 +9,17 @@ static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image
     return (struct vkb_size){row->width, row->height};
 }
 
+// Whether the derivatives by images depend on the bloom. Otherwise it need not be rendered for
+// them.
+static bool depends_on_bloom(const struct vkb_pass_row *pass)
+{
+    const struct vkb_constants *constants = &pass->constants;
+
+    return constants->composite == COMPOSITE_SCREEN || constants->tonemap != TONEMAP_NONE
+        || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
+        || pass->params.composite.limit < (float)SINGLE_LIMIT;
+}
+
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
@@ -22,6 +33,8 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.params.composite = pass->params.composite;
     if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
         return false;
+    if (!depends_on_bloom(pass))
+        row.reads[1] = row.reads[0];
     for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
         row.constants.by = by;
         if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
@@ -37,19 +50,10 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
 static bool bring_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                           uint32_t image, uint32_t target, struct vkb_error *error)
 {
-    const uint32_t kept = adjoint->brought[target];
     struct vkb_filter filter;
 
-    if (vkb_same_size(adjoint->graph, image, target))
-        return vkb_bring(adjoint, row, image, error);
     vkb_filter_begin(adjoint->graph, image, target, &filter);
-    // The cotangents of the target, complete, are replaced for a moment by those of what it
-    // samples.
-    adjoint->brought[target] = VKB_NO_IMAGE;
-    const bool done = vkb_bring(adjoint, row, target, error)
-                   && vkb_bring_filter(adjoint, &filter, adjoint->brought[target], image, error);
-    adjoint->brought[target] = kept;
-    return done;
+    return vkb_bring_through(adjoint, row, &filter, image, target, error);
 }
 
 bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

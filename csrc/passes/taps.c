@@ -60,7 +60,8 @@ struct sample {
 
 static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, double offset)
 {
-    double position = (pixel + 0.5) * axis->from / axis->to - 0.5 + offset;
+    const double place = axis->aligned ? pixel : (pixel + 0.5) * axis->from / axis->to - 0.5;
+    double position = place + offset;
     // A texel's centre is met with roundings.
     const double nearest = floor(position + 0.5);
 

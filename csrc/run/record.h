@@ -26,9 +26,9 @@ struct vkb_run {
     struct vkb_content **contents;                    // of the cache
     struct vkb_staged_input inputs[VKB_INPUT_COUNT];  // by kind
     // Images to be filled by this submission, and where their pixels start in the staging memory: a
-    // kernel, a picture of dirt and the weights of adjoint passes at most.
-    struct vkb_cached_image *constants[3];
-    size_t constant_starts[3];
+    // kernel, a picture of dirt, and the weights and the kernel of adjoint passes at most.
+    struct vkb_cached_image *constants[4];
+    size_t constant_starts[4];
     uint32_t constant_count;
     uint32_t counts_slot;   // of the request that is being recorded
     bool unknown_specials;  // whether the source has NaN or infinity is counted on the device

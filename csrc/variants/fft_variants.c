@@ -74,13 +74,14 @@ static bool is_stage(const struct vkb_pass_row *pass)
     return pass->block == VKB_BLOCK_fft;
 }
 
-// The length of the lines of the convolution along an axis.
-static uint32_t line_length(const struct vkb_variant_choice *choice, enum vkb_mode direction)
+// The length of the lines along an axis of the convolution that the pass is of.
+static uint32_t line_length(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, enum vkb_mode direction)
 {
-    const struct vkb_pass_row *pass = choice->plain.passes;
-
     // Each convolution has these passes. Those of the kernel come first, and do not tell whether
     // the glow is padded.
+    while (pass->block != VKB_BLOCK_fft_kernel)
+        --pass;
     while (!is_stage(pass) || pass->constants.stage != STAGE_FIRST)
         ++pass;
     while (!is_stage(pass) || (enum vkb_mode)pass->constants.direction != direction)
@@ -91,12 +92,12 @@ static uint32_t line_length(const struct vkb_variant_choice *choice, enum vkb_mo
 }
 
 // Whether the device can hold the lines along both axes.
-static bool holds_lines(const struct vkb_variant_choice *choice)
+static bool holds_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct group group;
 
-    return make_group(choice->device, line_length(choice, DIRECTION_HORIZONTAL), &group)
-        && make_group(choice->device, line_length(choice, DIRECTION_VERTICAL), &group);
+    return make_group(choice->device, line_length(choice, pass, DIRECTION_HORIZONTAL), &group)
+        && make_group(choice->device, line_length(choice, pass, DIRECTION_VERTICAL), &group);
 }
 
 static bool multiplies(const struct vkb_pass_row *pass)
@@ -112,7 +113,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     const struct vkb_graph *graph = choice->graph;
     const struct vkb_pass_row *last = end - 1;
     const bool horizontal = first->constants.direction == DIRECTION_HORIZONTAL;
-    const uint32_t length = line_length(choice, (enum vkb_mode)first->constants.direction);
+    const uint32_t length = line_length(choice, first, (enum vkb_mode)first->constants.direction);
     struct vkb_pass_row row;
     struct group group;
 
@@ -131,7 +132,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
         if (multiplies(pass)) {
             row.constants.stage = pass->constants.stage;
             row.reads[1] = pass->reads[1];
-            row.params.fft.row_length = (int)line_length(choice, DIRECTION_HORIZONTAL);
+            row.params.fft.row_length = (int)line_length(choice, first, DIRECTION_HORIZONTAL);
         }
     row.params.fft.limit = last->params.fft.limit;
     row.params.fft.padded = (int)length;
@@ -152,17 +153,18 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
 }
 
 // An image of spectra has those of the channels, which are symmetric: half the frequencies, twice.
-static void hold_spectra(const struct vkb_variant_choice *choice, uint32_t image)
+static void hold_spectra(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    choice->graph->images[image].width = 2 * (line_length(choice, DIRECTION_HORIZONTAL) / 2 + 1);
+    choice->graph->images[pass->targets[0]].width =
+        2 * (line_length(choice, pass, DIRECTION_HORIZONTAL) / 2 + 1);
 }
 
 // The row that puts the kernel to its places, in lines of the lengths that are transformed.
 static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
                                         const struct vkb_pass_row *pass)
 {
-    const uint32_t x = line_length(choice, DIRECTION_HORIZONTAL);
-    const uint32_t y = line_length(choice, DIRECTION_VERTICAL);
+    const uint32_t x = line_length(choice, pass, DIRECTION_HORIZONTAL);
+    const uint32_t y = line_length(choice, pass, DIRECTION_VERTICAL);
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
@@ -170,7 +172,7 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     row.params.fft_kernel.padded_x = (int)x;
     row.params.fft_kernel.padded_y = (int)y;
     row.params.fft_kernel.gain = (float)(1.0 / ((double)x * y));
-    hold_spectra(choice, row.targets[0]);
+    hold_spectra(choice, pass);
     choice->graph->images[row.targets[0]].height = y;
     return row;
 }
@@ -181,7 +183,7 @@ bool vkb_add_lines(const struct vkb_variant_choice *choice, const struct vkb_pas
     const struct vkb_pass_row *all = choice->plain.passes, *end = pass + 1;
     struct vkb_pass_row row;
 
-    *fits = (is_stage(pass) || pass->block == VKB_BLOCK_fft_kernel) && holds_lines(choice);
+    *fits = (is_stage(pass) || pass->block == VKB_BLOCK_fft_kernel) && holds_lines(choice, pass);
     if (!*fits)
         return true;
     if (!is_stage(pass)) {
@@ -196,7 +198,7 @@ bool vkb_add_lines(const struct vkb_variant_choice *choice, const struct vkb_pas
            && end->constants.direction == pass->constants.direction)
         ++end;
     if (pass->constants.stage == STAGE_FIRST)
-        hold_spectra(choice, pass->targets[0]);
+        hold_spectra(choice, pass);
     row = make_row(choice, pass, end);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

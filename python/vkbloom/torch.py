@@ -19,16 +19,16 @@ from __future__ import annotations
 import functools
 import threading
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.checks import import_extra
-from vkbloom.gradients import Pullback
+from vkbloom.checks import check_emission, check_image, check_mask, import_extra
+from vkbloom.gradients import Pullback, pullback_of
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import differentiable
+from vkbloom.reference.derivatives import check_cotangent, differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
 
@@ -323,13 +323,22 @@ def _split(names: str) -> list[str]:
     return names.split(",") if names else []
 
 
-def _vjp(arrays: dict[str, Any], settings: Settings, renderer: int) -> tuple[Any, Pullback]:
-    """Return framebuffers and pullback: of the reference for float64, else of the renderer."""
+def _pullback(arrays: dict[str, Any], settings: Settings, renderer: int) -> Pullback:
+    """Return the pullback: of the reference for float64, else of the renderer."""
     given = dict(arrays)
     image = given.pop("image")
     if image.dtype == np.float64:
-        return reference_vjp(image, settings, **given)
-    return _renderer(renderer).vjp(image, settings, **given)
+        return reference_vjp(image, settings, **given)[1]
+    pixels = check_image(image)
+    checks: dict[str, Callable[[Any], Any]] = {
+        "mask": lambda part: check_mask(part, (pixels.shape[0], pixels.shape[1])),
+        "emission": lambda part: check_emission(part, pixels),
+    }
+    checked = {name: checks[name](part) for name, part in given.items()}
+    pullback = pullback_of(_renderer(renderer), pixels, settings, checked)
+    return lambda cotangents: pullback(
+        {name: check_cotangent(name, part, {"final": pixels}) for name, part in cotangents.items()}
+    )
 
 
 def _operator(name: str, parameters: str, result: str) -> Any:
@@ -429,8 +438,7 @@ def _backward(  # noqa: PLR0917
     }
     wanted = cotangent.detach().cpu().numpy()
     for index, arrays, one in _each(image, mask, emission, values, names, settings):
-        _, pullback = _vjp(arrays, one, renderer)
-        gradients = pullback({"final": wanted[index]})
+        gradients = _pullback(arrays, one, renderer)({"final": wanted[index]})
         for name, total in found.items():
             if name in inputs:
                 total[index] = gradients[name]

@@ -5,6 +5,7 @@
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
+#include "lib/threshold_slope.glsl"
 
 #define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"
@@ -41,26 +42,20 @@ vec4 cotangent(ivec2 pixel)
     return ALPHA == ALPHA_BLUR ? value : vec4(value.rgb, 0.0);
 }
 
-// The soft threshold: the factor, and its derivatives by the brightness, the threshold and the knee.
-vec4 soft_factor(float brightness)
+// The derivatives of the soft threshold's factor by threshold and knee.
+vec2 soft_values(float brightness)
 {
-    float least = max(brightness, 1e-5), width = params.threshold * params.knee;
+    float width = params.threshold * params.knee, divisor = 4.0 * width + 1e-5;
     float above = brightness - params.threshold, moved = above + width;
-    float soft = clamp(moved, 0.0, 2.0 * width), divisor = 4.0 * width + 1e-5;
-    float square = soft * soft / divisor;
-    // By the brightness, the threshold and the knee.
-    vec3 inner = vec3(1.0, params.knee - 1.0, params.threshold);
-    vec3 outer = vec3(0.0, 2.0 * params.knee, 2.0 * params.threshold);
-    vec3 by_soft = moved < 0.0 ? vec3(0.0) : moved > 2.0 * width ? outer : inner;
-    vec3 by_divisor = vec3(0.0, 4.0 * params.knee, 4.0 * params.threshold);
-    vec3 by_square = (2.0 * soft * by_soft - square * by_divisor) / divisor;
-    vec3 by_line = vec3(1.0, -1.0, 0.0);
-    vec3 by_top = square > above   ? by_square
+    float soft = clamp(moved, 0.0, 2.0 * width), square = soft * soft / divisor;
+    vec2 by_width = vec2(params.knee, params.threshold), by_moved = by_width - vec2(1.0, 0.0);
+    vec2 by_soft = moved < 0.0 ? vec2(0.0) : moved > 2.0 * width ? 2.0 * by_width : by_moved;
+    vec2 by_square = (2.0 * soft * by_soft - square * 4.0 * by_width) / divisor;
+    vec2 by_line = vec2(-1.0, 0.0);
+    vec2 by_top = square > above   ? by_square
                 : square < above ? by_line
                                  : 0.5 * (by_square + by_line);
-    float factor = max(square, above) / least;
-    by_top.x -= brightness > 1e-5 ? factor : 0.0;
-    return vec4(factor, by_top / least);
+    return by_top / max(brightness, 1e-5);
 }
 
 vec4 by_image(vec4 colour, vec4 brought)
@@ -69,11 +64,8 @@ vec4 by_image(vec4 colour, vec4 brought)
         return brought;
     if (THRESHOLD_MODE == THRESHOLD_HARD)
         return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > params.threshold ? brought : vec4(0.0);
-    float brightness = max(colour.r, max(colour.g, colour.b));
-    vec4 factor = soft_factor(brightness);
-    vec3 share = vec3(equal(colour.rgb, vec3(brightness)));
-    share /= share.r + share.g + share.b;
-    return factor.x * brought + vec4(share, 0.0) * (factor.y * dot(brought, colour));
+    float width = params.threshold * params.knee;
+    return back_through_soft(colour, brought, params.threshold, width, 4.0 * width + 1e-5, 1e-5);
 }
 
 vec4 by_values(ivec2 pixel)
@@ -81,7 +73,7 @@ vec4 by_values(ivec2 pixel)
     vec4 colour = reduced(pixel);
     float brightness = max(colour.r, max(colour.g, colour.b));
     float whole = dot(cotangent(pixel), colour) * mask_at(pixel);
-    return vec4(soft_factor(brightness).zw * whole, 0.0, 0.0);
+    return vec4(soft_values(brightness) * whole, 0.0, 0.0);
 }
 
 SUM_OF_BLOCK(by_values)

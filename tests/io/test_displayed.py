@@ -111,6 +111,14 @@ class TestHdr:
             encode(again.astype(float), 203.0), encode(light.astype(float), 203.0), atol=HALF
         )
 
+    def test_saved_frames_name_the_encoding(self, tmp_path: Path) -> None:
+        settings = vkbloom.Separable(bloom=False, encoding="hlg")
+        with vkbloom.Renderer("software") as renderer:
+            frames = renderer.apply(np.full((4, 6, 3), 128, np.uint8), settings)
+        frames.save(tmp_path)
+        assert chunk(tmp_path / "final.png", b"cICP") == bytes([1, 18, 0, 1])
+        assert np.array_equal(vkbloom.Frames.load(tmp_path)["final"], frames["final"])
+
     def test_highlights_are_not_expanded(self, tmp_path: Path) -> None:
         file = vkbloom.write(tmp_path / "a.png", RAMP, encoding="pq", bits=16)
         assert np.array_equal(vkbloom.read(file, expand=8), vkbloom.read(file))

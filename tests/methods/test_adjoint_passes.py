@@ -9,12 +9,23 @@ import pytest
 
 import vkbloom
 from tests.methods.reference_cases import random_image
-from vkbloom import DualKawase, Pyramid, Renderer, Separable, reference
+from vkbloom import (
+    BevyBloom,
+    DualKawase,
+    KinoBloom,
+    Pyramid,
+    Renderer,
+    Separable,
+    UnrealBloom,
+    UrpBloom,
+    reference,
+)
 from vkbloom.gradients.passes import DeviceGradients
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, in all sizes.
 COMPLETE = ("knee", "pyramid")
+BEVY = BevyBloom(max_mip_dimension=16)
 CASES: dict[str, Any] = {
     "separable": Separable(),
     "hard": Separable(threshold=0.5, bloom_scale=1.6),
@@ -33,6 +44,12 @@ CASES: dict[str, Any] = {
     "pyramid": Pyramid(
         levels=4, threshold=0.3, knee=0.5, radius=1.3, level_weights=(0.5, 0.2, 0.2, 0.1)
     ),
+    "firefly": Pyramid(levels=2, firefly_filter=True, scale_x=1.5),
+    "bevy": BEVY,
+    "bevy threshold": BEVY.replace(threshold=0.4, knee=0.5),
+    "kino": KinoBloom(radius=7.0, threshold=0.3, knee=0.5),
+    "urp": UrpBloom(threshold=0.3, knee=0.5, clamp_max=1.5),
+    "unreal": UnrealBloom(threshold=0.3, smooth_width=0.4),
     "kawase": DualKawase(levels=3, offset=1.3),
 }
 
@@ -46,6 +63,20 @@ def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
         if name in frames
     }
     return pullback, cotangents, reference.vjp(image, settings, **given)[1](cotangents)
+
+
+@pytest.mark.parametrize("boundary", ["zero", "edge", "wrap", "wrap_x"])
+def test_a_convolution_is_transposed(renderer: Renderer, boundary: Any) -> None:
+    """By kernels of even sides, and larger than the image."""
+    random = np.random.default_rng(1)
+    for shape, size in (((4, 5, 3), (11, 14)), ((13, 6, 3), (7, 1))):
+        kernel = random.random(shape)
+        settings = vkbloom.Convolution(psf=kernel, boundary=boundary, threshold=0.3, knee=0.5)
+        image = random_image(*size, channels=3, seed=1).astype(np.float32)
+        pullback, cotangents, expected = pulled(renderer, image, settings)
+        found = pullback(cotangents)
+        assert isinstance(found, DeviceGradients)
+        check(found, expected, "image")
 
 
 def check(found: Any, expected: Any, name: str) -> None:
@@ -80,8 +111,9 @@ def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
         for seed in (1, 2)
     )
     mask = random.random((13, 9), np.float32)
-    settings = Separable(threshold=0.3, knee=0.5, composite="mix", intensity=0.3, bloom_scale=0.5)
-    for given in ({"mask": mask}, {"mask": mask, "emission": emission}):
+    separable = Separable(threshold=0.3, knee=0.5, composite="mix", intensity=0.3, bloom_scale=0.5)
+    both = {"mask": mask, "emission": emission}
+    for settings, given in ((separable, {"mask": mask}), (separable, both), (BEVY, both)):
         pullback, cotangents, expected = pulled(renderer, image, settings, **given)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)

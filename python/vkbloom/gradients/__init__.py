@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from vkbloom.gradients.pulling import Pullback, vjp
+from vkbloom.gradients.passes import on_device
+from vkbloom.gradients.pulling import Pullback, pullback_of, vjp
 
-__all__ = ["Pullback", "vjp"]
+__all__ = ["Pullback", "on_device", "pullback_of", "vjp"]

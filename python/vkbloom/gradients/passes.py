@@ -16,7 +16,7 @@ from vkbloom.reference.derivatives import Gradients, differentiable
 if TYPE_CHECKING:
     from vkbloom.settings import Settings
 
-__all__ = ["DeviceGradients", "Passes", "device_fields"]
+__all__ = ["DeviceGradients", "Passes", "device_fields", "on_device"]
 
 #: The most framebuffers with cotangents that a source can bring.
 _MOST: Final = 7
@@ -90,6 +90,13 @@ class Passes:
         arrays = requests.new_arrays(core, plan)
         core.run(source, (plan,), (arrays,)).wait()
         return requests.named(plan, arrays)
+
+
+def on_device(renderer: HasCore, settings: Settings) -> bool:
+    """Return whether the device has passes for the derivative of "final" by an image with alpha."""
+    pixels = np.zeros((32, 40, 4), np.float32)
+    floats = settings.replace(format="rgba32float")
+    return Passes(renderer, pixels, floats, {}, {"final": pixels}).images() is not None
 
 
 def device_fields(settings: Settings) -> frozenset[str]:

@@ -18,7 +18,7 @@ from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import Gradients, check_cotangent, differentiable
 from vkbloom.settings import Settings
 
-__all__ = ["Pullback", "vjp"]
+__all__ = ["Pullback", "pullback_of", "vjp"]
 
 #: From cotangents by framebuffer to derivatives by name.
 Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
@@ -52,8 +52,25 @@ def vjp(
         given["mask"] = np.array(check_mask(mask, (pixels.shape[0], pixels.shape[1])))
     if emission is not None:
         given["emission"] = np.array(check_emission(emission, pixels))
+    frames = renderer.apply(pixels, settings.replace(format="rgba32float"), **given)
+    pulled = pullback_of(renderer, pixels, settings, given)
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        return pulled(
+            {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
+        )
+
+    return frames, pullback
+
+
+def pullback_of(
+    renderer: HasCore,
+    pixels: NDArray[Any],
+    settings: Settings,
+    given: Mapping[str, NDArray[Any]],
+) -> Pullback:
+    """Return the pullback alone, of checked arrays that do not change, and checked cotangents."""
     floats = settings.replace(format="rgba32float")
-    frames = renderer.apply(pixels, floats, **given)
     recorded = functools.cache(lambda: reference_vjp(pixels, settings, **given)[1])
     names = ("image", *sorted(given), *differentiable(settings))
     if callable(getattr(settings, "kernel", None)):
@@ -64,11 +81,10 @@ def vjp(
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        checked = {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
-        passes = Passes(renderer, pixels, floats, given, checked)
+        passes = Passes(renderer, pixels, floats, given, cotangents)
         found = passes.images()
         if found is None:
-            return by_reference(checked)
-        return DeviceGradients(found, names, passes.fields, lambda: by_reference(checked))
+            return by_reference(cotangents)
+        return DeviceGradients(found, names, passes.fields, lambda: by_reference(cotangents))
 
-    return frames, pullback
+    return pullback

@@ -16,6 +16,7 @@ from vkbloom.io.images import SPACES
 from vkbloom.io.srgb import encode_srgb
 
 __all__ = [
+    "HDR_CURVES",
     "PRIMARIES",
     "Attributes",
     "Saved",
@@ -43,7 +44,8 @@ PRIMARIES: Final[Mapping[str, str]] = {
 # Code points of Rec. ITU-T H.273, for primaries and for curves; 2 is an unknown curve.
 _PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
 _CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
-_HDR: Final = ("pq", "hlg")
+#: Curves for displays of HDR.
+HDR_CURVES: Final = ("pq", "hlg")
 # Curves that readers know or assume without code points.
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
@@ -93,13 +95,13 @@ def check_saved(saved: Saved) -> None:
 
 def has_hdr_curve(points: Sequence[int] | None) -> bool:
     """Whether code points of a file have the curve PQ or HLG."""
-    return points is not None and points[1] in (_CURVE_POINTS[curve] for curve in _HDR)
+    return points is not None and points[1] in (_CURVE_POINTS[curve] for curve in HDR_CURVES)
 
 
 def is_hdr(saved: Saved) -> bool:
     """Whether a file is for HDR displays, and needs more than 8 bits."""
     if saved.view is None:
-        return saved.curve in _HDR
+        return saved.curve in HDR_CURVES
     oiio = import_extra("OpenImageIO", "images", "Views")
     return has_hdr_curve(_DISPLAYS.get(_display_of(oiio, saved.view)[0]))
 
@@ -185,7 +187,7 @@ def with_names(
         return False, {**kept, "CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
     if points == _DISPLAYS["sRGB - Display"]:
         return False, kept
-    cure = "write PNG" if curve in ("", *_HDR) else "write PNG or OpenEXR"
+    cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
     raise ValueError(f"{target}: {kind} cannot name the colours {name}; {cure}")
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import image_reading, safe_writing
+from vkbloom.io.displayed import HDR_CURVES, with_names
 from vkbloom.io.images import PIXEL_TYPES, check_name, complete, is_exr
 from vkbloom.settings import Settings
 
@@ -196,6 +197,11 @@ def _write_image(
     spec = _spec(oiio, frames, name, pixels, file)
     # Otherwise OpenImageIO assumes premultiplied colours and divides them by alpha.
     spec.attribute("oiio:UnassociatedAlpha", 1)
+    encoding = frames.settings.encoding
+    if name == "final" and encoding in HDR_CURVES and writer.supports("cicp"):
+        _, named = with_names(oiio, {}, file, ("rec709", encoding))
+        for attribute, (kind, value) in named.items():
+            spec.attribute(attribute, kind, value)
     if not (
         writer.open(str(temporary), spec)
         and writer.write_image(np.ascontiguousarray(pixels))

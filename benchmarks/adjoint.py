@@ -1,0 +1,230 @@
+"""Derivatives by the image on the device, beside the framebuffer that they are of.
+
+Times on the device: forward the passes of "final", backward those from its cotangents to the
+image's. Forward, backward and so on take turns with three images and cotangents, all RGB in single
+floats. Without a curve the backward passes need nothing of the forward ones. PyTorch's is the same
+`Pyramid` in convolutions, with autograd; its memory is the most that it had allocated, that of
+vkbloom all of its images.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from benchmarks.inputs import pictures
+from benchmarks.plan import Plan
+from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
+from benchmarks.timing import alternate_seconds
+from vkbloom import _core, requests
+from vkbloom.core_access import core_of
+
+__all__ = ["run"]
+
+SIZE: Final = (3840, 2160)
+ROUNDS: Final = 15
+LEVELS: Final = 4
+PYRAMID: Final = vkbloom.Pyramid(levels=LEVELS, format="rgba32float")
+SETTINGS: Final[dict[str, vkbloom.Settings]] = {
+    "Separable": vkbloom.Separable(threshold=0.5, knee=0.5, tonemap="reinhard"),
+    "Pyramid": PYRAMID,
+    "Pyramid, threshold, ACES": PYRAMID.replace(threshold=0.5, tonemap="aces"),
+    "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
+    "BevyBloom": vkbloom.presets["bevy_natural"],
+    "UrpBloom": vkbloom.presets["unity_urp"],
+    "UnrealBloom": vkbloom.presets["threejs_unreal"],
+}
+#: The most that a pullback may cost, times the framebuffer.
+MOST: Final = 2.5
+#: How much faster than PyTorch, and in which part of its memory.
+FASTER, PART_OF_MEMORY = 5.0, 0.25
+
+
+def run(plan: Plan, section: Section) -> None:
+    """Time methods alone, then the pyramid beside PyTorch's."""
+    section.title = "Derivatives by the image"
+    size = plan.size(*SIZE)
+    images = [np.ascontiguousarray(one[..., :3]) for one in pictures(size, np.float32)]
+    random = np.random.default_rng(0)
+    cotangents = [random.standard_normal(one.shape, np.float32) for one in images]
+    times: dict[str, Any] = {}
+    for name, chosen in SETTINGS.items():
+        plan.tell(f"adjoint: {name}")
+        # The levels of Bevy have a size of their own.
+        small = {"max_mip_dimension": 16} if plan.quick and name == "BevyBloom" else {}
+        settings = chosen.replace(format="rgba32float", **small)
+        with plan.renderer() as renderer:
+            ours = _calls(renderer, settings, images, cotangents)
+            if ours is None:
+                section.missing.append(f"{name}: the reference computes its derivatives")
+                continue
+            times[name] = alternate_seconds(ours, plan.times(ROUNDS))
+            memory = core_of(renderer).cached[2]
+        backward = times[name]["backward"].over(times[name]["forward"]).value
+        section.goals.append(Goal(f"{name}: backward / forward", backward, MOST, at_most=True))
+        section.times[name] = times[name]
+        section.tables.append(side_by_side(name, times[name], "forward"))
+        if name == "Pyramid":
+            _beside_torch(plan, section, (images, cotangents), times[name], memory)
+
+
+def _calls(
+    renderer: vkbloom.Renderer,
+    settings: vkbloom.Settings,
+    images: list[NDArray[Any]],
+    cotangents: list[NDArray[Any]],
+) -> dict[str, Callable[[int], float]] | None:
+    """Return both directions; None: not all passes have adjoints."""
+
+    def forward(turn: int) -> float:
+        image = images[turn % len(images)]
+        return sum(renderer.apply(image, settings, attachments="final").timings.values())
+
+    def backward(turn: int) -> float:
+        return _pulled(renderer, settings, images[turn % 3], cotangents[turn % 3])[1]
+
+    source = _core.image_source(images[0], None, None, (cotangents[0],))
+    if core_of(renderer).adjoint(source, settings, ("final",), False) is None:
+        return None
+    return {"forward": forward, "backward": backward}
+
+
+def _pulled(
+    renderer: vkbloom.Renderer,
+    settings: vkbloom.Settings,
+    image: NDArray[Any],
+    cotangent: NDArray[Any],
+) -> tuple[NDArray[Any], float]:
+    """Return the derivatives by the image, and the seconds of the passes."""
+    core = core_of(renderer)
+    source = _core.image_source(image, None, None, (cotangent,))
+    plan = core.adjoint(source, settings, ("final",), False)
+    assert plan is not None
+    arrays = requests.new_arrays(core, plan)
+    (timings,), _ = core.run(source, (plan,), (arrays,)).wait()
+    return requests.named(plan, arrays)["by_image"], sum(timings.values())
+
+
+def _beside_torch(
+    plan: Plan,
+    section: Section,
+    inputs: tuple[list[NDArray[Any]], list[NDArray[Any]]],
+    ours: dict[str, Any],
+    memory: int,
+) -> None:
+    try:
+        torch = importlib.import_module("torch")
+    except ImportError:
+        section.missing.append("PyTorch: it is not installed")
+        return
+    images, cotangents = inputs
+    if any(side % 2**LEVELS for side in images[0].shape[:2]):
+        section.missing.append(f"PyTorch: sides are no multiples of {2**LEVELS}")
+        return
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    given = [
+        [torch.from_numpy(one).movedim(-1, 0)[None].contiguous().to(device) for one in kind]
+        for kind in inputs
+    ]
+
+    def pulled(turn: int) -> Any:
+        image = given[0][turn % 3].detach().requires_grad_()
+        final = image + _pyramid(torch, image)
+        return torch.autograd.grad(final, image, given[1][turn % 3])[0]
+
+    with plan.renderer() as renderer:
+        expected, _ = _pulled(renderer, PYRAMID, images[0], cotangents[0])
+    found = pulled(0)[0].movedim(0, -1).cpu().numpy()
+    section.agreements.append(_agreement(expected, found))
+    both = alternate_seconds({"PyTorch": _timed(torch, device, pulled)}, plan.times(ROUNDS))
+    seconds = ours["forward"].median + ours["backward"].median
+    theirs = both["PyTorch"].median
+    rows = [
+        ("vkbloom", f"{1e3 * seconds:.3f}", f"{memory / 2**20:.0f}"),
+        (f"PyTorch on {device}", f"{1e3 * theirs:.3f}", ""),
+    ]
+    goals = [
+        Goal("Pyramid, both directions: vkbloom / PyTorch", seconds / theirs, 1 / FASTER, True)
+    ]
+    if device == "cuda":
+        torch.cuda.reset_peak_memory_stats()
+        pulled(1)
+        most = torch.cuda.max_memory_allocated()
+        rows[1] = (*rows[1][:2], f"{most / 2**20:.0f}")
+        goals.append(
+            Goal("Pyramid: memory of vkbloom / PyTorch", memory / most, PART_OF_MEMORY, True)
+        )
+        section.goals += goals
+    section.times["Pyramid, PyTorch"] = both
+    section.tables.append(
+        Table("Pyramid, forward and backward", ("", "median, ms", "MiB"), tuple(rows))
+    )
+
+
+def _agreement(expected: NDArray[Any], found: NDArray[Any]) -> Agreement:
+    most = 1e-5 * float(np.abs(expected).max())
+    reason = "a hundred-thousandth of the largest derivative"
+    return agreement("Pyramid: derivatives of PyTorch", expected, found, most, reason)
+
+
+def _timed(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int], float]:
+    """Return a call that returns its seconds on the device."""
+    if device == "cpu":
+
+        def on_host(turn: int) -> float:
+            start = time.perf_counter()
+            call(turn)
+            return time.perf_counter() - start
+
+        return on_host
+
+    def on_device(turn: int) -> float:
+        start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+        start.record()
+        call(turn)
+        end.record()
+        end.synchronize()
+        return 1e-3 * float(start.elapsed_time(end))
+
+    return on_device
+
+
+def _pyramid(torch: Any, image: Any) -> Any:
+    """Return the bloom of `PYRAMID`: sides are halved without a rest."""
+    functional = torch.nn.functional
+    outer, inner = (
+        torch.tensor(one, device=image.device) for one in (_line(2.0, 0.25, 0.5), _line(1.0, 0.5))
+    )
+    down = 0.5 * (torch.outer(outer, outer) + torch.outer(inner, inner))
+    tent = torch.tensor([0.25, 0.5, 0.25], device=image.device)
+    kernels = [one.expand(3, 1, *one.shape).contiguous() for one in (down, torch.outer(tent, tent))]
+    levels = [image]
+    for _ in range(LEVELS):
+        padded = functional.pad(levels[-1], (2, 2, 2, 2), mode="replicate")
+        levels.append(functional.conv2d(padded, kernels[0], stride=2, groups=3))
+
+    def enlarged(level: Any) -> Any:
+        padded = functional.pad(level, (2, 2, 2, 2), mode="replicate")
+        filtered = functional.conv2d(padded, kernels[1], groups=3)
+        double = functional.interpolate(filtered, scale_factor=2, mode="bilinear")
+        return double[..., 2:-2, 2:-2]
+
+    up = levels[-1]
+    for level in levels[-2:0:-1]:
+        up = level + enlarged(up)
+    return enlarged(up) / LEVELS
+
+
+def _line(distance: float, side: float, middle: float = 0.0) -> list[float]:
+    """Return the weights of six texels for taps between the middle two and beside them."""
+    weights = [0.0] * 6
+    for offset, share in ((-distance, side), (0.0, middle), (distance, side)):
+        for texel in (2, 3):
+            weights[texel + int(offset)] += share / 2
+    return weights

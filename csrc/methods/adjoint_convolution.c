@@ -1,0 +1,79 @@
+// The adjoint of a convolution: a convolution of the cotangents with the mirrored kernel. With a
+// period, or zeros beyond the edges, it is one of the same size. Pixels beyond an edge that is
+// repeated have cotangents of their own, so the image is extended by them, with zeros; then these
+// fold back to the edge.
+#include "methods/adjoint.h"
+#include "passes/adjoint.h"
+
+// The kernel with its centre at the same place: an even side becomes one longer.
+static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph *graph,
+                          struct vkb_kernel_data *mirrored, struct vkb_error *error)
+{
+    const uint32_t x = kernel->width / 2, y = kernel->height / 2;
+    const uint32_t width = 2 * x + 1, height = 2 * y + 1;
+    float *pixels = vkb_alloc(error, (size_t)width * height, 4 * sizeof *pixels);
+
+    if (!pixels)
+        return false;
+    for (uint32_t row = 0; row < height; ++row)
+        for (uint32_t column = 0; column < width; ++column) {
+            const uint32_t from_x = 2 * x - column, from_y = 2 * y - row;
+            if (from_x >= kernel->width || from_y >= kernel->height)
+                continue;
+            for (int channel = 0; channel < 4; ++channel)
+                pixels[4 * ((size_t)row * width + column) + channel] =
+                    kernel->pixels[4 * ((size_t)from_y * kernel->width + from_x) + channel];
+        }
+    *mirrored = *kernel;
+    mirrored->pixels = graph->owned[1] = pixels;
+    mirrored->width = width;
+    mirrored->height = height;
+    mirrored->serial = kernel->serial ^ UINT64_C(0x9e3779b97f4a7c15);
+    return true;
+}
+
+// An axis on which each pixel reads the texel at its own place, moved by `offset`.
+static void move_axis(struct vkb_axis *axis, uint32_t from, uint32_t to, double offset)
+{
+    const struct vkb_tap tap = {.offset = offset, .weights = {1.0}};
+
+    *axis = (struct vkb_axis){.from = from, .to = to, .aligned = true};
+    vkb_axis_set(axis, &tap, 1);
+}
+
+bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
+                               const struct vkb_pass_row *pass, struct vkb_error *error)
+{
+    struct vkb_graph *graph = adjoint->graph;
+    const int boundary = settings->choices[VKB_CHOICE_boundary];
+    const bool edge_x = boundary == BOUNDARY_EDGE;
+    const bool edge_y = edge_x || boundary == BOUNDARY_WRAP_X;
+    const uint32_t glow = vkb_graph_find(graph, "glow"), first = graph->pass_count;
+    const struct vkb_kernel_data *kernel = &settings->kernel;
+    const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
+    const struct vkb_size extended = {size.width + (edge_x ? kernel->width - 1 : 0),
+                                      size.height + (edge_y ? kernel->height - 1 : 0)};
+    const double left = edge_x ? kernel->width - 1 - kernel->width / 2 : 0;
+    const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
+    struct vkb_settings mirrored = *settings;
+    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_brought(adjoint, pass)};
+    const struct vkb_image_row result = {.name = "adjoint_convolved",
+                                         .format = VKB_FORMAT_RGBA32_FLOAT};
+    struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
+    uint32_t convolved;
+
+    mirrored.choices[VKB_CHOICE_boundary] =
+        boundary == BOUNDARY_ZERO ? BOUNDARY_ZERO : BOUNDARY_WRAP;
+    move_axis(&filter.x, extended.width, size.width, left);
+    move_axis(&filter.y, extended.height, size.height, above);
+    if (!mirror_kernel(kernel, graph, &mirrored.kernel, error)
+        || (edge_y
+            && !vkb_filter_apart(adjoint, &filter, source.glow, extended, &source.glow, error))
+        || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
+        return false;
+    for (uint32_t i = first; i < graph->pass_count; ++i)
+        graph->passes[i].constants.alpha = pass->constants.alpha;
+    move_axis(&filter.x, size.width, extended.width, -left);
+    move_axis(&filter.y, size.height, extended.height, -above);
+    return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
+}

@@ -1,0 +1,27 @@
+// Cotangents through the soft threshold (threshold.glsl).
+
+// The factor of a colour and its derivative by the brightness.
+vec2 soft_slope(float brightness, float threshold, float width, float divisor, float least)
+{
+    float above = brightness - threshold, moved = above + width, held = max(brightness, least);
+    float soft = clamp(moved, 0.0, 2.0 * width), square = soft * soft / divisor;
+    float by_square = moved < 0.0 || moved > 2.0 * width ? 0.0 : 2.0 * soft / divisor;
+    float by_top = square > above ? by_square : square < above ? 1.0 : 0.5 * (by_square + 1.0);
+    float factor = max(square, above) / held;
+    return vec2(factor, (by_top - (brightness > least ? factor : 0.0)) / held);
+}
+
+vec3 shares_of_brightest(vec3 colour)
+{
+    vec3 share = vec3(equal(colour, vec3(max(colour.r, max(colour.g, colour.b)))));
+    return share / (share.r + share.g + share.b);
+}
+
+vec4 back_through_soft(vec4 colour, vec4 brought, float threshold, float width, float divisor,
+                       float least)
+{
+    float brightness = max(colour.r, max(colour.g, colour.b));
+    vec2 slope = soft_slope(brightness, threshold, width, divisor, least);
+    return slope.x * brought
+         + vec4(shares_of_brightest(colour.rgb), 0.0) * (slope.y * dot(brought, colour));
+}
