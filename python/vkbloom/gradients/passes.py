@@ -26,9 +26,9 @@ _SUMS: Final = {
     "by_threshold": ("threshold", "knee"),
 }
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
-_LEAST: Final = 0.2
+_LEAST: Final = 0.3
 #: Curves that magnify the rounding of a float.
-_STEEP: Final = {"agx", "pq", "hlg"}
+_STEEP: Final = {"aces", "agx", "pq", "hlg"}
 
 
 @dataclass(frozen=True, eq=False)
