@@ -17,8 +17,8 @@ These are measured after a collection and a trim of the heap, as the median of s
   the driver; the package makes none;
 - ``descriptors`` and ``threads``.
 
-Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT]``, COUNT renderers
-(default 1000, at least 100)
+Linux with glibc 2.33 or newer. Usage: ``python tools/renderer_memory.py [COUNT [NAME ...]]``,
+COUNT renderers (default 1000, at least 100), and which of the four (default all)
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def renderer_growth(count: int, *, validation: bool = False) -> dict[str, float]
     return growth(action, count)
 
 
-def measure(count: int) -> dict[str, dict[str, float]]:
+def measure(count: int, names: list[str]) -> dict[str, dict[str, float]]:
     """Return the growth for one of each, `count` renderers and a number of frames to suit."""
     scene = vkbloom.Scene.ufo()
 
@@ -173,12 +173,13 @@ def measure(count: int) -> dict[str, dict[str, float]]:
         with vkbloom.Renderer("software") as renderer:
             renderer.render(scene, size=(32, 32))
 
-    return {
-        "renderer": renderer_growth(count),
-        "validated": renderer_growth(max(count // 5, 100), validation=True),
-        "frame": growth(frame, max(count // 4, 50)),
-        "open": frame_growth(scene, 2 * count),
+    measured = {
+        "renderer": lambda: renderer_growth(count),
+        "validated": lambda: renderer_growth(max(count // 5, 100), validation=True),
+        "frame": lambda: growth(frame, max(count // 4, 50)),
+        "open": lambda: frame_growth(scene, 2 * count),
     }
+    return {name: measured[name]() for name in names or measured}
 
 
 def main() -> None:
@@ -186,7 +187,7 @@ def main() -> None:
     if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ENVIRONMENT})
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    print(json.dumps(measure(count), indent=1))
+    print(json.dumps(measure(count, sys.argv[2:]), indent=1))
 
 
 if __name__ == "__main__":

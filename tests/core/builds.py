@@ -75,7 +75,7 @@ def succeed(tree: Path, *command: str | Path) -> None:
         command,
         cwd=tree,
         # Not optimized: the compiler takes most of the time.
-        env={**os.environ, "CFLAGS": "-O0", "VKBLOOM_CFLAGS": "-DVKBLOOM_FAULTS -Wall -Werror"},
+        env={**os.environ, "CFLAGS": "-O0 -g0", "VKBLOOM_CFLAGS": "-DVKBLOOM_FAULTS -Wall -Werror"},
         capture_output=True,
         text=True,
         check=False,

@@ -36,7 +36,7 @@ DEVICE_LOST = -4
 #: The calls that report a lost device.
 CAN_LOSE = "vkQueueSubmit vkWaitForFences vkGetQueryPoolResults"
 #: The number of methods, each with a set of variants, that the usual run walks.
-METHODS = 5
+METHODS = 4
 SIZE = (24, 16)
 
 Arrays = Mapping[str, NDArray[Any]]

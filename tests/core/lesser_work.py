@@ -79,9 +79,10 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         np.testing.assert_array_equal(alone, renderer.apply(image, settings)["final"])
 
     scene = Scene.ufo()
-    for name, settings in SETTINGS.items():
-        # Each with two types of pixels, the first with all.
-        for dtype in DTYPES if name == "whole" or EXHAUSTIVE else ("float32", "uint8"):
+    for number, (name, settings) in enumerate(SETTINGS.items()):
+        # The first with all types of pixels, the others by turns, of which layers need float32.
+        one = ("float32", "uint8", "float32", "float16")[number % 4 :][:1]
+        for dtype in DTYPES if name == "whole" or EXHAUSTIVE else one:
             image = picture(28, 20, 3, dtype)
             attempt(f"{name} {dtype}", lambda: apply(image, settings))  # noqa: B023  called here
         for shading in ("forward", "deferred") if name in ("whole", "gathered") else ():

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from tests.core.descriptors import open_descriptors
+from tests.exhaustive import EXHAUSTIVE
 from tests.framebuffers import assert_same
 from tests.processes import output
 from tests.screens import noise, screen
@@ -123,22 +124,24 @@ def test_a_message_of_the_validation_layer_is_an_error() -> None:
 # Many renderers
 
 
+# A renderer of each frame or under validation takes a quarter of a minute.
+THINGS = ("renderer", "open", *("validated", "frame") * EXHAUSTIVE)
 Measured = dict[str, dict[str, float]]  # what tools/renderer_memory.py prints
 
 
 @pytest.fixture(scope="module")
 def grown() -> Measured:
-    """What 100 renderers and 200 frames leave behind."""
+    """What 100 renderers and 200 frames of one leave behind."""
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
     tool = Path(__file__).resolve().parents[2] / "tools" / "renderer_memory.py"
-    measured: Measured = json.loads(output(tool, "100"))
+    measured: Measured = json.loads(output(tool, "100", *THINGS))
     return measured
 
 
 @LINUX
 @pytest.mark.slow
-@pytest.mark.parametrize("thing", ["renderer", "validated", "frame", "open"])
+@pytest.mark.parametrize("thing", THINGS)
 def test_renderers_and_frames_leave_nothing(grown: Measured, thing: str) -> None:
     # Bytes of one of them. The smallest block of the heap is 24, a page 4096; half of each is left
     # to what Python and the loader keep for themselves. Sizes, formats and kernels of the frames

@@ -22,7 +22,7 @@ from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings
 THREADS = 8
 ROUNDS = 2
 SECONDS = float(os.environ.get("VKBLOOM_THREAD_SECONDS", "0"))
-CALLS = 8  # of each thread in each round
+CALLS = 6  # of each thread in each round
 # The arrays of the last one are in the renderer's pages.
 SIZES = ((24, 16), (17, 31), (300, 290))
 Key = tuple[str, int, tuple[int, int]]

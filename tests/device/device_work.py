@@ -1,5 +1,7 @@
 """What a renderer does with arrays of CUDA, over the stand-in for libcuda; prints JSON.
 
+Arguments: "validated" or "plain", and the names of functions of WORK; all without.
+
 The device's memory is the host's, so that arrays of NumPy stand for arrays on the device.
 """
 
@@ -106,7 +108,7 @@ def same(frames: Any, expected: Any) -> None:
 def layouts(renderer: Any) -> None:
     rng = np.random.default_rng(1)
     methods = (Separable(threshold=0.3), Pyramid(levels=2), Separable(bloom_scale=0.5))
-    for step in range(60 if EXHAUSTIVE else 24):
+    for step in range(60 if EXHAUSTIVE else 15):
         dtype = ("uint8", "float16", "float32")[step % 3]
         image = strided(rng, dtype)
         if dtype != "uint8" and step % 4 == 0:
@@ -302,6 +304,8 @@ def main() -> None:
     wrong = {}
     with Renderer(ADAPTER, validation=VALIDATION) as renderer:
         for work in WORK:
+            if sys.argv[2:] and work.__name__ not in sys.argv[2:]:
+                continue
             try:
                 work(renderer)
             except Exception as error:

@@ -37,8 +37,8 @@ def test_dispatches_access_images(
     software: AdapterInfo,
     layer: Path,  # noqa: F811
 ) -> None:
-    """The same on an adapter that is not a CPU, as GPUs do it."""
-    program = ("-m", "tests.device.device_work", "validated")
+    """What reads and writes pixels on an adapter that is not a CPU, as GPUs do it."""
+    program = ("-m", "tests.device.device_work", "validated", "layouts", "sequences", "places")
     check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
 
 

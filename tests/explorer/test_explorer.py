@@ -256,7 +256,7 @@ class TestViewer:
         begun = presets["tutorial"].replace(tonemap="aces", encoding="srgb")
         assert settings_from(answer["sides"]["a"]) == begun
         pictures = {}
-        for name, preset in some(presets.items(), 10):
+        for name, preset in some(presets.items(), 8):
             frame(viewer, preset.replace(tonemap="aces", encoding="srgb"))
             pictures[name] = viewer.frames["a"]["final"][..., :3].astype(int)
         for one, other in itertools.combinations(pictures, 2):

@@ -115,14 +115,16 @@ LOW = presets_of_low_levels(64)
 # (Convolutions have tests of their own, as Blender's fog glow has among the engines' frames: a
 # transform's error is relative to the largest value.)
 @pytest.mark.parametrize(
-    "name",
-    [
-        name
-        for name in presets
-        if not isinstance(presets[name], Convolution) and name != "blender_fog_glow"
-    ],
+    ("name", "dtype"),
+    by_turns(
+        [
+            name
+            for name in presets
+            if not isinstance(presets[name], Convolution) and name != "blender_fog_glow"
+        ],
+        turns=DTYPES,
+    ),
 )
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
     image = hdr_picture(61, 43, 3, dtype)
     settings = presets[name] if dtype == "float32" or EXHAUSTIVE else LOW[name]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.exhaustive import by_turns
 from vkbloom import Renderer, Settings
 from vkbloom.banded import Band, BloomByBands
 
@@ -42,8 +43,13 @@ SETTINGS: dict[str, Settings] = {
 ALIGNED = {"small", "fixed", "godot_4_5", "godot_4_6"}
 
 
-@pytest.mark.parametrize(("height", "glows"), [(HEIGHTS[0], False), (HEIGHTS[1], True)])
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(
+    ("name", "height", "glows"),
+    [
+        (name, *other)
+        for name, other in by_turns(SETTINGS, turns=zip(HEIGHTS, (False, True), strict=True))
+    ],
+)
 def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: bool) -> None:
     image = band("float32" if name == "narrow" else "float16", glows=glows, height=height)
     settings = SETTINGS[name]

@@ -15,8 +15,8 @@ from vkbloom.sources import image_source
 IMAGE = np.zeros((90, 160, 3), np.float32)
 #: Kernels of (179, 319, 4) float32 each, some with arrays of their own.
 SPREADS: list[psf.PSF] = [
-    *(psf.gaussian(sigma) for sigma in range(1, 5)),
-    psf.aperture(psf.iris(size=64), f_number=22),
+    *(psf.gaussian(sigma) for sigma in range(1, 4)),
+    psf.aperture(psf.iris(size=32), f_number=22),
     psf.measured(Pyramid(levels=3), size=(127, 127)),
 ]
 KERNEL = 179 * 319 * 16

@@ -36,7 +36,7 @@ from vkbloom.reference import bevy, kino, unreal, urp
 Array = NDArray[Any]
 
 # (width, height): odd, even, tall, wide, smaller than the chains are long.
-SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (211, 157)]
+SIZES = [(1, 1), (1, 7), (5, 13), (64, 48), (101, 67), (157, 117)]
 FORMATS = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 CONVOLUTIONS = [name for name in presets if isinstance(presets[name], Convolution)]
 LOW = presets_of_low_levels(64)
@@ -195,7 +195,7 @@ OTHER_SETTINGS: dict[tuple[int, int], list[Settings]] = {
         KinoBloom(radius=1.0, threshold=None),
         KinoBloom(radius=4.2, anti_flicker=False, knee=0.0, threshold=1.5),
     ],
-    (211, 153): [
+    (150, 117): [
         FilamentBloom(threshold=None, levels=1),
         FilamentBloom(resolution=40, levels=12, highlight=10.0),  # halved first, odd levels
         FilamentBloom(resolution=112, levels=5, threshold=0.25),

@@ -140,12 +140,13 @@ OTHERS = pytest.mark.parametrize("variant", VARIANTS[1:], indirect=True, scope="
 
 @FIRST
 @pytest.mark.parametrize(
-    ("name", "dtype", "size"),
-    by_turns(WHOLE, DTYPES, turns=[(1, 1), (61, 97), (520, 48)]),
+    ("name", "other"),
+    by_turns(WHOLE, turns=itertools.product(DTYPES, [(1, 1), (61, 97), (520, 48)])),
 )
 def test_final_alone_is_the_final_of_all(
-    varied: Renderer, name: str, dtype: str, size: tuple[int, int]
+    varied: Renderer, name: str, other: tuple[str, tuple[int, int]]
 ) -> None:
+    dtype, size = other
     image = hdr_picture(*size, 4, dtype)
     settings = WHOLE[name]
     all_at_once = varied.apply(image, settings)
@@ -170,12 +171,16 @@ def unfused() -> Iterator[Renderer]:
 
 @OTHERS
 @pytest.mark.parametrize(
-    ("name", "dtype", "size"),
-    by_turns(BIT_EQUAL, DTYPES, turns=[(256, 160), (61, 97), (520, 48), (1, 1)]),
+    ("name", "other"),
+    by_turns(
+        BIT_EQUAL,
+        turns=itertools.product([(256, 160), (61, 97), (520, 48), (1, 1)], DTYPES),
+    ),
 )
 def test_every_variant_gives_the_same_bits(
-    varied: Renderer, unfused: Renderer, name: str, dtype: str, size: tuple[int, int]
+    varied: Renderer, unfused: Renderer, name: str, other: tuple[tuple[int, int], str]
 ) -> None:
+    size, dtype = other
     image = hdr_picture(*size, 4, dtype)
     expected = unfused.apply(image, BIT_EQUAL[name])
     alone = varied.apply(image, BIT_EQUAL[name], attachments=("final",))
@@ -207,16 +212,16 @@ def test_presets_have_the_same_bits_in_every_variant(
 
 @OTHERS
 @pytest.mark.parametrize(
-    ("name", "size", "dtype"),
+    ("name", "other"),
     by_turns(
         ["tutorial", "threshold", "outline", "pyramid", "long"],
-        [(256, 160), (61, 97), (33, 5), (1, 1)],
-        turns=DTYPES,
+        turns=itertools.product([(256, 160), (61, 97), (33, 5), (1, 1)], DTYPES),
     ),
 )
 def test_three_channels_have_the_bits_of_four(
-    varied: Renderer, unfused: Renderer, name: str, dtype: str, size: tuple[int, int]
+    varied: Renderer, unfused: Renderer, name: str, other: tuple[tuple[int, int], str]
 ) -> None:
+    size, dtype = other
     image = hdr_picture(*size, 4, dtype)
     image[..., 3] = 255 if dtype == "uint8" else 1
     expected = unfused.apply(image, BIT_EQUAL[name])

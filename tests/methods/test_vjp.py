@@ -38,7 +38,7 @@ def check_against_reference(renderer: Renderer, settings: Any, image: Any, **giv
 
 CHOSEN = (
     *("tutorial", "jimenez2014", "dual_kawase", "bevy_natural", "kino", "filament", "unity_urp"),
-    *("threejs_unreal", "godot_4_5", "blender_bloom", "iris_6", "knee", "glare", "alpha"),
+    *("threejs_unreal", "godot_4_5", "blender_bloom", "camera_lens", "knee", "glare", "alpha"),
     *("aces-srgb", "exponential-none", "agx-gamma22", "none-pq", "firefly"),
 )
 
