@@ -370,7 +370,7 @@ static PyObject *copy_to(PyObject *object, PyObject *arguments)
     return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
-static PyObject *clone(PyObject *object, PyObject *argument)
+static PyObject *clone_export(PyObject *object, PyObject *argument)
 {
     struct exported_object *self = exported_of(object);
     const Py_ssize_t size = PyLong_AsSsize_t(argument);
@@ -423,7 +423,7 @@ static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
      "capsule(shape, code, bits, versioned) -> a capsule of DLPack."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
-    {"clone", clone, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
+    {"clone", clone_export, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
     {"copy_to", copy_to, METH_VARARGS,
      "copy_to(address, size, stream). To other memory of the GPU, after the stream's work."},
     {0},

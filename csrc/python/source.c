@@ -129,13 +129,17 @@ bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_sour
         if (source->images[kind].held && source->images[kind].input.exported
             && exports == renderer->exports)
             vkb_export_of(source->images[kind].view.obj, &exports);
-    // A closed renderer says so itself. An image that another source has taken is nowhere.
-    if (!renderer->open
-        || ((source->resident ? source->residents == renderer->residents : !source->residents)
-            && exports == renderer->exports))
+    // A closed renderer says so itself.
+    if (!renderer->open)
         return true;
-    PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one that "
-                                      "is closed; upload it to this one");
+    if (source->residents && !source->resident)
+        PyErr_SetString(PyExc_ValueError, "image: another upload has taken its memory");
+    else if ((source->residents && source->residents != renderer->residents)
+             || exports != renderer->exports)
+        PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one "
+                                          "that is closed; upload it to this one");
+    else
+        return true;
     return false;
 }
 
