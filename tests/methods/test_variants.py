@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.framebuffers import assert_same

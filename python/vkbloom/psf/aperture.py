@@ -287,10 +287,10 @@ def _energies(sums: Array, rows: Array, columns: Array) -> Array:
 
 
 def _sums(mask: Array, below: int) -> Array:
-    """Return the integrals of the diffraction pattern over rectangles that start at its corner, as
-    far as some rows below its centre. The first and the last of them are repeated for the spline.
+    """Return the integrals of the diffraction pattern over rectangles that start at its corner.
 
-    The pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
+    They end some rows below its centre. The first and the last are repeated for the spline. The
+    pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
     a product with a sinc in the domain of the autocorrelation.
     """
     count = len(mask)
