@@ -157,7 +157,7 @@ class TestWhole:
     def test_fields_that_are_objects_are_axes(
         self, tmp_path: Path, settings: Any, axis: str, values: Any
     ) -> None:
-        validated = {"validation": True}
+        validated: dict[str, Any] = {"validation": True}
         store = tmp_path / "a.zarr"
         stored = grid_to_zarr(source(), settings, {axis: values}, store, **validated)
         # The same one, which is kept.

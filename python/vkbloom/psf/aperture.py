@@ -120,12 +120,12 @@ def _mask(made: iris) -> NDArray[np.float32]:
         squares = x * x + y[band] * y[band]
         np.less(squares, inside**2, out=open_[band])
         # Only between the circles inside and around the polygon the edge decides.
-        rows, columns = np.nonzero((squares > inside**2 - 1e-9) & (squares < 1 + 1e-9))
-        across, up = x[columns], y[band][rows, 0]
+        edges = np.nonzero((squares > inside**2 - 1e-9) & (squares < 1 + 1e-9))
+        across, up = x[edges[1]], y[band][edges[0], 0]
         angle = np.mod(np.arctan2(up, across) - math.radians(made.rotation), step) - step / 2
         edge = inside / np.cos(angle)
         within = np.hypot(across, up) <= edge + made.roundness * (1 - edge)
-        open_[band][rows, columns] = within
+        open_[band][edges] = within
     generator = np.random.default_rng(made.seed)
     for _ in range(made.dust):
         (centre_x, centre_y), radius = generator.uniform(-1, 1, 2), generator.uniform(0.002, 0.02)
