@@ -16,6 +16,7 @@ own methods on all cores.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import resource
 import signal
@@ -23,7 +24,10 @@ import subprocess
 import sys
 import time
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+
+Run = Callable[[str, bytes], None]
 
 
 #: Seconds after which an input counts as one that hangs.
@@ -47,7 +51,8 @@ def kept(target: str) -> list[bytes]:
 
 
 def overdue(*_: object) -> None:
-    """End an input that hangs. (Readers may raise TimeoutError, which is an OSError.)"""
+    """End an input that hangs."""
+    # (Readers may raise TimeoutError, which is an OSError.)
     raise AssertionError(f"the input takes more than {LONGEST} s")
 
 
@@ -63,11 +68,12 @@ def spread(options: argparse.Namespace) -> int:
         subprocess.Popen([sys.executable, __file__, *arguments, f"--seed={options.seed + number}"])
         for number in range(jobs)
     ]
-    return int(any([process.wait() for process in started]))
+    statuses = [process.wait() for process in started]
+    return int(any(statuses))
 
 
-def main() -> int:
-    """Run one target; return 1 if there is a finding."""
+def read_options() -> argparse.Namespace:
+    """Read the options of the command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("targets", nargs="+", metavar="TARGET")
     parser.add_argument("--seconds", type=float, default=10.0)
@@ -79,22 +85,56 @@ def main() -> int:
     parser.add_argument("--executions", type=int, help="--plain: how many, in place of --seconds")
     parser.add_argument("--jobs", type=int, default=1, help="--plain: processes; 0: all cores")
     options = parser.parse_args()
-    if options.plain and options.jobs != 1:
-        return spread(options)
     if not options.plain:
-        try:
-            import atheris
-        except ImportError:
-            options.plain = True
-    if not options.plain:
-        with atheris.instrument_imports(include=["vkbloom"]):
-            import targets
-    else:
-        import targets
-    import mutate
-
+        options.plain = importlib.util.find_spec("atheris") is None
     if not options.plain and len(options.targets) > 1:
         parser.error("TARGET: atheris takes one; use --plain for several")
+    return options
+
+
+def run_plain(options: argparse.Namespace, inputs: dict[str, list[bytes]], run: Run) -> None:
+    """Try mutations of the inputs of each target."""
+    import mutate
+
+    for name, seeds in inputs.items():
+        start = time.monotonic()
+        count = len(seeds)
+        for data in mutate.inputs(seeds, options.seed):
+            run(name, data)
+            count += 1
+            seconds = time.monotonic() - start
+            if count >= options.executions if options.executions else seconds > options.seconds:
+                break
+        print(f"{name}: {count} executions in {seconds:.0f} s, nothing found", flush=True)
+
+
+def run_guided(options: argparse.Namespace, name: str, seeds: list[bytes], run: Run) -> None:
+    """Try inputs that atheris chooses by coverage."""
+    import atheris
+    import targets
+
+    corpus = options.corpus or targets.FOLDER / "corpus"
+    corpus.mkdir(exist_ok=True)
+    for number, seed in enumerate(seeds):
+        (corpus / f"seed-{number}").write_bytes(seed)
+    arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
+    arguments += ["-rss_limit_mb=0", "-max_len=65536", "-len_control=0", "-keep_seed=1"]
+    atheris.Setup([sys.argv[0], *arguments, str(corpus)], lambda data: run(name, data))
+    atheris.Fuzz()
+
+
+def main() -> int:
+    """Run the targets; return 1 if there is a finding."""
+    options = read_options()
+    if options.plain and options.jobs != 1:
+        return spread(options)
+    if options.plain:
+        import targets
+    else:
+        import atheris
+
+        with atheris.instrument_imports(include=["vkbloom"]):
+            import targets
 
     def run(name: str, data: bytes) -> None:
         signal.alarm(LONGEST if options.plain else 0)
@@ -119,27 +159,11 @@ def main() -> int:
         for seed in seeds:
             run(name, seed)
     limit_memory(options.memory << 20)
-    for name, seeds in inputs.items() if options.plain else ():
-        start = time.monotonic()
-        count = len(seeds)
-        for data in mutate.inputs(seeds, options.seed):
-            run(name, data)
-            count += 1
-            seconds = time.monotonic() - start
-            if count >= options.executions if options.executions else seconds > options.seconds:
-                break
-        print(f"{name}: {count} executions in {seconds:.0f} s, nothing found", flush=True)
     if options.plain:
+        run_plain(options, inputs, run)
         return 0
     ((name, seeds),) = inputs.items()
-    corpus = options.corpus or targets.FOLDER / "corpus"
-    corpus.mkdir(exist_ok=True)
-    for number, seed in enumerate(seeds):
-        (corpus / f"seed-{number}").write_bytes(seed)
-    arguments = [f"-max_total_time={options.seconds:.0f}", f"-seed={options.seed}"]
-    arguments += ["-rss_limit_mb=0", "-max_len=65536", "-len_control=0", "-keep_seed=1"]
-    atheris.Setup([sys.argv[0], *arguments, str(corpus)], lambda data: run(name, data))
-    atheris.Fuzz()
+    run_guided(options, name, seeds, run)
     return 0
 
 
