@@ -3,22 +3,6 @@
 
 #include "python/module.h"
 
-bool vkb_choose_derivatives(struct vkb_plan *plan, uint32_t first)
-{
-    const struct vkb_graph *graph = &plan->graph;
-    struct vkb_error error;
-
-    plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
-    if (!plan->outputs) {
-        PyErr_NoMemory();
-        return false;
-    }
-    for (uint32_t i = first; i < graph->image_count; ++i)
-        if (graph->images[i].framebuffer)
-            plan->outputs[plan->output_count++] = i;
-    return true;
-}
-
 PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
 {
     const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;

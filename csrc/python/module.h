@@ -282,8 +282,6 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
                        enum vkb_variants variants, uint64_t renderer, PyObject *source,
                        PyObject *settings_object, struct vkb_settings *settings,
                        struct vkb_portion *portion, PyObject *names);
-// Makes the framebuffers from image `first` on the outputs of the plan.
-bool vkb_choose_derivatives(struct vkb_plan *plan, uint32_t first);
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);

@@ -108,6 +108,23 @@ static bool choose_outputs(struct vkb_plan *plan, PyObject *names)
     return true;
 }
 
+// The framebuffers from `first` on.
+static bool choose_derivatives(struct vkb_plan *plan, uint32_t first)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    struct vkb_error error;
+
+    plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
+    if (!plan->outputs) {
+        PyErr_NoMemory();
+        return false;
+    }
+    for (uint32_t i = first; i < graph->image_count; ++i)
+        if (graph->images[i].framebuffer)
+            plan->outputs[plan->output_count++] = i;
+    return true;
+}
+
 static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_image_row *row = &graph->images[image];
@@ -224,7 +241,7 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
         vkb_release_kernel(&self->kernel);
         vkb_release_kernel(&self->dirt);
     }
-    if (!(portion && portion->cotangents ? vkb_choose_derivatives(&self->plan, portion->first)
+    if (!(portion && portion->cotangents ? choose_derivatives(&self->plan, portion->first)
                                          : choose_outputs(&self->plan, names))
         || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
