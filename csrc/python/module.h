@@ -255,6 +255,9 @@ size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 // Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
 
+// Appends an item to a list and releases it; false if it is NULL.
+bool vkb_append_item(PyObject *list, PyObject *item);
+
 // A tuple of the names of images.
 PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);
 
@@ -267,6 +270,23 @@ bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyOb
                    struct vkb_part *part);
 bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
                     const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error);
+
+struct vkb_cotangents;
+
+// What a plan is of, if not of all passes.
+struct vkb_portion {
+    const struct vkb_part *part;
+    const struct vkb_cotangents *cotangents;
+    uint32_t first;    // of the images of derivatives
+    bool is_possible;  // whether all passes have adjoints
+};
+
+// Makes a plan; `renderer` is the serial of its renderer, or 0, and `portion` may be NULL. NULL
+// with an exception set.
+PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
+                       enum vkb_variants variants, uint64_t renderer, PyObject *source,
+                       PyObject *settings_object, struct vkb_settings *settings,
+                       struct vkb_portion *portion, PyObject *names);
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
