@@ -7,6 +7,7 @@
 
 #include "graph/bands.h"
 #include "methods/source.h"
+#include "python/guard.h"
 #include "run/frame.h"
 #include "variants/variants.h"
 #include "vulkan/process.h"
@@ -46,8 +47,9 @@ extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submis
 // abandoned: the renderer owns it.
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
-    PyObject *plans;   // a tuple: their graphs are read until the device has finished
-    PyObject *source;  // read by the device until then
+    PyObject *plans;                // a tuple: their graphs are read until the device has finished
+    PyObject *source;               // read by the device until then
+    struct vkb_resident *resident;  // of the source, in use; NULL: none
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -59,20 +61,23 @@ struct vkb_pending {
 
 struct vkb_renderer {
     PyObject_HEAD
-    PyThread_type_lock lock;        // held, without the GIL, around all device work
-    unsigned long holder;           // the thread with the lock, 0: none; accessed with the GIL
-    PyThreadState *thread;          // of that thread, while it has released the GIL
-    struct vkb_pending *abandoned;  // accessed with the GIL
-    long process;                   // that opened it; a forked process must not use the device
-    atomic_bool open;               // written with the lock, read without it
+    PyThread_type_lock lock;           // held, without the GIL, around all device work
+    VKB_ATOMIC(unsigned long) holder;  // the thread with the lock, 0: none
+    PyThreadState *thread;             // of that thread, while it has released the GIL
+    long process;                      // that opened it; a forked process must not use the device
+    atomic_bool open;                  // written with the lock, read without it
     const struct vkb_messages
-        *before;                      // receives the messages when the thread with the lock leaves
-    uint64_t serial;                  // identifies the renderer of a plan; never 0
-    struct vkb_pages *pages;          // of large arrays; NULL: closed
-    struct vkb_residents *residents;  // of handles; NULL: closed
-    struct vkb_exports *exports;      // of arrays that CUDA shares; NULL: none so far, or closed
-    size_t pipeline_count;            // created so far; accessed with the GIL
-    struct vkb_cached cached;         // accessed with the GIL
+        *before;      // receives the messages when the thread with the lock leaves
+    uint64_t serial;  // identifies the renderer of a plan; never 0
+    // Written with the lock and vkb_memory. Used with vkb_memory, if the renderer is open then.
+    VKB_ATOMIC(struct vkb_pages *) pages;          // of large arrays; NULL: closed
+    VKB_ATOMIC(struct vkb_residents *) residents;  // of handles; NULL: closed
+    // Of arrays that CUDA shares; NULL: none so far, or closed.
+    VKB_ATOMIC(struct vkb_exports *) exports;
+    VKB_GUARD(guard)  // of the next three
+    struct vkb_pending *abandoned;
+    size_t pipeline_count;  // created so far
+    struct vkb_cached cached;
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -222,7 +227,7 @@ struct vkb_source_object {
     struct vkb_source source;
     struct vkb_held_scene scene;
     struct vkb_held_image images[VKB_INPUT_COUNT];  // by kind
-    struct vkb_resident *resident;                  // NULL: none
+    VKB_ATOMIC(struct vkb_resident *) resident;     // NULL: none, or taken by another source
     struct vkb_residents *residents;
     long process;  // whose device the resident image is on
 };

@@ -1,5 +1,5 @@
 // The part of CUDA's driver API that arrays on the device need. libcuda is opened at run time.
-// Calls must not overlap, except those that say so; the core makes them with the GIL.
+// Calls must not overlap, except those that say so; the core makes them with the GIL or vkb_memory.
 #ifndef VKB_CUDA_H
 #define VKB_CUDA_H
 
