@@ -8,6 +8,7 @@ import runpy
 import shutil
 import struct
 import subprocess
+import sysconfig
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,6 +22,9 @@ SHADERS = Path("shaders")
 LIBRARY = Path("python/vkbloom/own/glsl")
 SPIRV = Path("build/spirv")
 STAGES = (".vert", ".frag", ".comp")
+# Python without the GIL has no stable ABI: a core for that version alone.
+LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
+LIMITED_API = [("Py_LIMITED_API", "0x030b0000")] if LIMITED else []
 # Of the package itself, which cannot be imported before its core is built.
 without_contraction = runpy.run_path("python/vkbloom/own/spirv.py")["without_contraction"]
 
@@ -242,11 +246,11 @@ setup(
                 *(str(path) for path in LIBRARY.rglob("*.glsl")),
             ],
             include_dirs=["csrc", ".", volk_folder()],
-            define_macros=[("VK_NO_PROTOTYPES", None), ("Py_LIMITED_API", "0x030b0000")],
+            define_macros=[("VK_NO_PROTOTYPES", None), *LIMITED_API],
             libraries=[] if os.name == "nt" else ["m", "dl"],
-            py_limited_api=True,
+            py_limited_api=LIMITED,
         )
     ],
     cmdclass={"build_ext": BuildCore},
-    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}} if LIMITED else {},
 )

@@ -7,6 +7,8 @@ GLSLANG=12.0.0
 GLSLANG_SHA256=7cb45842ec1d4b6ea775d624c3d2d8ba9450aa416b0482b0cc7e4fdd399c3d75
 # Debian 12's source package of Python, for the headers and to run the build.
 PYTHON=3.11.2
+# Debian 13's source package of Python, without the GIL.
+PYTHON_FREE_THREADED=3.13.5
 # The newest glibc that the core, and the driver and the compiler, may need; it names their wheels.
 CORE_GLIBC=2_28
 DRIVER_GLIBC=2_31

@@ -24,20 +24,21 @@ PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
         PyErr_Format(PyExc_ValueError, "pages: a size of %zd bytes is not above 0", size);
         return NULL;
     }
-    if (!vkb_require_open(renderer, &error))
-        return vkb_raise(state, &error);
     struct pages_object *self = vkb_new_object(state->pages_type);
     if (!self)
         return NULL;
     self->size = size;
     self->process = renderer->process;
-    self->run = vkb_pages_take(renderer->pages, (size_t)size, &error);
-    if (!self->run) {
-        Py_DECREF(self);
-        return vkb_raise(state, &error);
+    VKB_LOCK(vkb_memory);
+    if (vkb_require_open(renderer, &error)) {
+        self->pages = renderer->pages;
+        self->run = vkb_pages_take(self->pages, (size_t)size, &error);
     }
-    self->pages = renderer->pages;
-    return (PyObject *)self;
+    VKB_UNLOCK(vkb_memory);
+    if (self->run)
+        return (PyObject *)self;
+    Py_DECREF(self);
+    return vkb_raise(state, &error);
 }
 
 static void dealloc(PyObject *object)
@@ -45,8 +46,11 @@ static void dealloc(PyObject *object)
     struct pages_object *self = (struct pages_object *)object;
 
     // A forked process returns nothing: the device belongs to its parent.
-    if (self->run && self->process == vkb_current_process())
+    if (self->run && self->process == vkb_current_process()) {
+        VKB_LOCK(vkb_memory);
         vkb_pages_give_back(self->pages, self->run);
+        VKB_UNLOCK(vkb_memory);
+    }
     vkb_free_object(object);
 }
 

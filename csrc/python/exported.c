@@ -64,8 +64,11 @@ static void dealloc(PyObject *object)
     struct exported_object *self = exported_of(object);
 
     // A forked process returns nothing: the device belongs to its parent.
-    if (self->run && self->process == vkb_current_process())
+    if (self->run && self->process == vkb_current_process()) {
+        VKB_LOCK(vkb_memory);
         vkb_exports_give_back(self->exports, self->run);
+        VKB_UNLOCK(vkb_memory);
+    }
     vkb_free_object(object);
 }
 
@@ -80,12 +83,14 @@ struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **ex
     return exported_of(object)->run;
 }
 
-// Opens CUDA at the first call.
+// Opens CUDA at the first call. With vkb_memory, as all that uses the result.
 static struct vkb_exports *open_exports(struct vkb_renderer *renderer, struct vkb_error *error)
 {
-    if (vkb_require_open(renderer, error) && !renderer->exports)
+    if (!vkb_require_open(renderer, error))
+        return NULL;
+    if (!renderer->exports)
         renderer->exports = vkb_exports_create(&renderer->device, error);
-    return renderer->open ? renderer->exports : NULL;
+    return renderer->exports;
 }
 
 static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ssize_t size)
@@ -97,20 +102,19 @@ static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ss
         PyErr_Format(PyExc_ValueError, "export: a size of %zd bytes is not above 0", size);
         return NULL;
     }
-    struct vkb_exports *exports = open_exports(renderer, &error);
-    if (!exports || error.kind != VKB_OK)
-        return (void *)vkb_raise(state, &error);
     struct exported_object *self = vkb_new_object(state->exported_type);
     if (!self)
         return NULL;
     self->process = renderer->process;
-    self->run = vkb_exports_take(exports, (uint64_t)size, &error);
-    if (!self->run) {
-        Py_DECREF(self);
-        return (void *)vkb_raise(state, &error);
-    }
-    self->exports = exports;
-    return self;
+    VKB_LOCK(vkb_memory);
+    self->exports = open_exports(renderer, &error);
+    if (self->exports)
+        self->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
+    VKB_UNLOCK(vkb_memory);
+    if (self->run)
+        return self;
+    Py_DECREF(self);
+    return (void *)vkb_raise(state, &error);
 }
 
 PyObject *vkb_renderer_export(PyObject *renderer, PyObject *argument)
@@ -125,13 +129,19 @@ PyObject *vkb_renderer_cuda(PyObject *object, PyObject *unused)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     struct vkb_error error = {0};
-    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    int ordinal = 0;
+    void *stream = NULL;
 
     (void)unused;
-    if (!exports || error.kind != VKB_OK)
-        return vkb_raise(state, &error);
-    return Py_BuildValue("(iN)", vkb_cuda_ordinal(exports->cuda),
-                         PyLong_FromVoidPtr(vkb_cuda_stream(exports->cuda)));
+    VKB_LOCK(vkb_memory);
+    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    if (exports) {
+        ordinal = vkb_cuda_ordinal(exports->cuda);
+        stream = vkb_cuda_stream(exports->cuda);
+    }
+    VKB_UNLOCK(vkb_memory);
+    return exports ? Py_BuildValue("(iN)", ordinal, PyLong_FromVoidPtr(stream))
+                   : vkb_raise(state, &error);
 }
 
 PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
@@ -143,11 +153,12 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
 
     if (PyErr_Occurred())
         return NULL;
+    VKB_LOCK(vkb_memory);
     const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
-    if (!exports || error.kind != VKB_OK)
-        return vkb_raise(state, &error);
-    vkb_cuda_name(exports->cuda, (int)number, name);
-    return PyUnicode_FromString(name);
+    if (exports)
+        vkb_cuda_name(exports->cuda, (int)number, name);
+    VKB_UNLOCK(vkb_memory);
+    return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
@@ -359,7 +370,7 @@ static PyObject *copy_to(PyObject *object, PyObject *arguments)
     return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
-static PyObject *clone(PyObject *object, PyObject *argument)
+static PyObject *clone_export(PyObject *object, PyObject *argument)
 {
     struct exported_object *self = exported_of(object);
     const Py_ssize_t size = PyLong_AsSsize_t(argument);
@@ -368,15 +379,20 @@ static PyObject *clone(PyObject *object, PyObject *argument)
 
     if (PyErr_Occurred() || !reaches(self, 0, size))
         return NULL;
-    if (!self->exports->device) {
-        PyErr_SetString(PyExc_BufferError, "copy: the renderer is closed; copy the result");
-        return NULL;
-    }
     struct exported_object *other = vkb_new_object((PyObject *)Py_TYPE(object));
     if (!other)
         return NULL;
     other->process = self->process;
-    other->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
+    VKB_LOCK(vkb_memory);
+    const bool open = self->exports->device;
+    if (open)
+        other->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
+    VKB_UNLOCK(vkb_memory);
+    if (!open) {
+        PyErr_SetString(PyExc_BufferError, "copy: the renderer is closed; copy the result");
+        Py_DECREF(other);
+        return NULL;
+    }
     done = other->run != NULL;
     if (done) {
         other->exports = self->exports;
@@ -407,7 +423,7 @@ static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
      "capsule(shape, code, bits, versioned) -> a capsule of DLPack."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
-    {"clone", clone, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
+    {"clone", clone_export, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
     {"copy_to", copy_to, METH_VARARGS,
      "copy_to(address, size, stream). To other memory of the GPU, after the stream's work."},
     {0},

@@ -59,7 +59,7 @@ static struct vkb_input input_of(const Py_buffer *view, enum vkb_format format)
 // (Exported, offset, shape, strides, code)
 static bool read_exported(PyObject *tuple, struct vkb_held_image *image)
 {
-    static uint64_t last_serial;
+    static VKB_ATOMIC(uint64_t) last_serial;
     struct vkb_input *input = &image->input;
     const struct vkb_exports *exports;
     PyObject *exported;

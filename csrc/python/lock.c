@@ -1,12 +1,18 @@
 // The lock of a renderer, and the submissions that nobody waits for any more.
 #include "python/module.h"
 
+VKB_GUARD(vkb_memory)
+
 static void release_source(struct vkb_pending *pending)
 {
     struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
 
-    if (source && source->resident)
-        vkb_resident_end_use(source->residents, source->resident);
+    // In a forked process the device is the parent's.
+    if (pending->resident && source->process == vkb_current_process()) {
+        VKB_LOCK(vkb_memory);
+        vkb_resident_end_use(source->residents, pending->resident);
+        VKB_UNLOCK(vkb_memory);
+    }
     Py_XDECREF(pending->source);
 }
 
@@ -78,8 +84,8 @@ static bool acquire_lock(struct vkb_renderer *self, struct vkb_error *error)
     return true;
 }
 
-// Removes the finished submissions from the abandoned ones and returns them. With the lock and the
-// GIL, or without a device.
+// Removes the finished submissions from the abandoned ones and returns them. With the lock, the
+// guard and the GIL, or without a device.
 static struct vkb_pending *take_over(struct vkb_renderer *self)
 {
     struct vkb_pending **link = &self->abandoned, *over = NULL;
@@ -123,8 +129,10 @@ void vkb_renderer_release_finished(struct vkb_renderer *self)
 
 void vkb_renderer_abandon(struct vkb_renderer *self, struct vkb_pending *pending)
 {
+    VKB_LOCK(self->guard);
     pending->next = self->abandoned;
     self->abandoned = pending;
+    VKB_UNLOCK(self->guard);
 }
 
 bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
@@ -146,11 +154,13 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
 void vkb_renderer_leave(struct vkb_renderer *self)
 {
     PyEval_RestoreThread(self->thread);
+    VKB_LOCK(self->guard);
     if (self->open) {
         self->pipeline_count = self->frame.pipelines.created;
         self->cached = vkb_frame_cached(&self->frame);
     }
     struct vkb_pending *over = take_over(self);
+    VKB_UNLOCK(self->guard);
     vkb_messages_end(self->before);
     self->holder = 0;
     PyThread_release_lock(self->lock);

@@ -7,6 +7,7 @@
 
 #include "graph/bands.h"
 #include "methods/source.h"
+#include "python/guard.h"
 #include "run/frame.h"
 #include "variants/variants.h"
 #include "vulkan/process.h"
@@ -46,8 +47,9 @@ extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submis
 // abandoned: the renderer owns it.
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
-    PyObject *plans;   // a tuple: their graphs are read until the device has finished
-    PyObject *source;  // read by the device until then
+    PyObject *plans;                // a tuple: their graphs are read until the device has finished
+    PyObject *source;               // read by the device until then
+    struct vkb_resident *resident;  // of the source, in use; NULL: none
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -59,20 +61,23 @@ struct vkb_pending {
 
 struct vkb_renderer {
     PyObject_HEAD
-    PyThread_type_lock lock;        // held, without the GIL, around all device work
-    unsigned long holder;           // the thread with the lock, 0: none; accessed with the GIL
-    PyThreadState *thread;          // of that thread, while it has released the GIL
-    struct vkb_pending *abandoned;  // accessed with the GIL
-    long process;                   // that opened it; a forked process must not use the device
-    atomic_bool open;               // written with the lock, read without it
+    PyThread_type_lock lock;           // held, without the GIL, around all device work
+    VKB_ATOMIC(unsigned long) holder;  // the thread with the lock, 0: none
+    PyThreadState *thread;             // of that thread, while it has released the GIL
+    long process;                      // that opened it; a forked process must not use the device
+    atomic_bool open;                  // written with the lock, read without it
     const struct vkb_messages
-        *before;                      // receives the messages when the thread with the lock leaves
-    uint64_t serial;                  // identifies the renderer of a plan; never 0
-    struct vkb_pages *pages;          // of large arrays; NULL: closed
-    struct vkb_residents *residents;  // of handles; NULL: closed
-    struct vkb_exports *exports;      // of arrays that CUDA shares; NULL: none so far, or closed
-    size_t pipeline_count;            // created so far; accessed with the GIL
-    struct vkb_cached cached;         // accessed with the GIL
+        *before;      // receives the messages when the thread with the lock leaves
+    uint64_t serial;  // identifies the renderer of a plan; never 0
+    // Written with the lock and vkb_memory. Used with vkb_memory, if the renderer is open then.
+    VKB_ATOMIC(struct vkb_pages *) pages;          // of large arrays; NULL: closed
+    VKB_ATOMIC(struct vkb_residents *) residents;  // of handles; NULL: closed
+    // Of arrays that CUDA shares; NULL: none so far, or closed.
+    VKB_ATOMIC(struct vkb_exports *) exports;
+    VKB_GUARD(guard)  // of the next three
+    struct vkb_pending *abandoned;
+    size_t pipeline_count;  // created so far
+    struct vkb_cached cached;
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
@@ -222,7 +227,7 @@ struct vkb_source_object {
     struct vkb_source source;
     struct vkb_held_scene scene;
     struct vkb_held_image images[VKB_INPUT_COUNT];  // by kind
-    struct vkb_resident *resident;                  // NULL: none
+    VKB_ATOMIC(struct vkb_resident *) resident;     // NULL: none, or taken by another source
     struct vkb_residents *residents;
     long process;  // whose device the resident image is on
 };
@@ -250,6 +255,9 @@ size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 // Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
 
+// Appends an item to a list and releases it; false if it is NULL.
+bool vkb_append_item(PyObject *list, PyObject *item);
+
 // A tuple of the names of images.
 PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count);
 
@@ -262,6 +270,23 @@ bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyOb
                    struct vkb_part *part);
 bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
                     const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error);
+
+struct vkb_cotangents;
+
+// What a plan is of, if not of all passes.
+struct vkb_portion {
+    const struct vkb_part *part;
+    const struct vkb_cotangents *cotangents;
+    uint32_t first;    // of the images of derivatives
+    bool is_possible;  // whether all passes have adjoints
+};
+
+// Makes a plan; `renderer` is the serial of its renderer, or 0, and `portion` may be NULL. NULL
+// with an exception set.
+PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
+                       enum vkb_variants variants, uint64_t renderer, PyObject *source,
+                       PyObject *settings_object, struct vkb_settings *settings,
+                       struct vkb_portion *portion, PyObject *names);
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);

@@ -155,24 +155,19 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
     return tuple;
 }
 
-// What a plan is of, if not of all passes.
-struct portion {
-    const struct vkb_part *part;
-    const struct vkb_cotangents *cotangents;
-    uint32_t first;    // of the images of derivatives
-    bool is_possible;  // whether all passes have adjoints
-};
-
 // `portion` may be NULL.
 static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
-                        struct portion *portion, struct vkb_graph *graph, struct vkb_error *error)
+                        struct vkb_portion *portion, struct vkb_graph *graph,
+                        struct vkb_error *error)
 {
     return (portion && portion->part ? vkb_build_part(source, settings, portion->part, graph, error)
             : portion && portion->cotangents
                 ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
                                     &portion->first, &portion->is_possible, error)
                 : vkb_source_build(source, settings, device->max_side, graph, error))
+        // Variants divide by the sizes of images, and add images of their own.
+        && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error);
@@ -219,10 +214,10 @@ static bool hold_passes(const struct vkb_module_state *state, const struct vkb_d
                            &complete, &self->passes, settings);
 }
 
-static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                          enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                          PyObject *settings_object, struct vkb_settings *settings,
-                          struct portion *portion, PyObject *names)
+PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
+                       enum vkb_variants variants, uint64_t renderer, PyObject *source,
+                       PyObject *settings_object, struct vkb_settings *settings,
+                       struct vkb_portion *portion, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -263,7 +258,7 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     PyObject *source, *settings_object, *names, *given = NULL;
     struct vkb_part part;
-    struct portion portion = {.part = &part};
+    struct vkb_portion portion = {.part = &part};
     struct vkb_settings settings;
     struct vkb_error error = {0};
 
@@ -276,37 +271,8 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
-    return new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                    settings_object, &settings, given ? &portion : NULL, names);
-}
-
-PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
-{
-    const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
-    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names;
-    struct vkb_cotangents cotangents;
-    struct portion portion = {.cotangents = &cotangents};
-    struct vkb_settings settings;
-    struct vkb_error error = {0};
-    int sums;
-
-    if (!PyArg_ParseTuple(arguments, "O!OO!p:adjoint", state->source_type, &source,
-                          &settings_object, &PyTuple_Type, &names, &sums)
-        || !vkb_read_settings(state, settings_object, &settings)
-        || !vkb_read_names(names, cotangents.names, &cotangents.count))
-        return NULL;
-    cotangents.sums = sums;
-    if (!vkb_require_open(renderer, &error))
-        return vkb_raise(state, &error);
-    if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
-        return NULL;
-    PyObject *plan = new_plan(state, &renderer->device, renderer->variants, renderer->serial,
-                              source, settings_object, &settings, &portion, Py_None);
-    if (!plan || portion.is_possible)
-        return plan;
-    Py_DECREF(plan);
-    Py_RETURN_NONE;
+    return vkb_new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
+                        settings_object, &settings, given ? &portion : NULL, names);
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
@@ -329,7 +295,8 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     device.adapter.device_type = variants == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL, names);
+    return vkb_new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL,
+                        names);
 }
 
 // The images that the pass reads, each once; returns how many.
@@ -386,13 +353,6 @@ static PyObject *describe_dependencies(const struct vkb_graph *graph, uint32_t f
     return tuple;
 }
 
-static bool append_steal(PyObject *list, PyObject *item)
-{
-    bool done = item && PyList_Append(list, item) == 0;
-    Py_XDECREF(item);
-    return done;
-}
-
 // By pass, whether a group of passes that starts with it runs where nothing has run before; freed
 // by the caller. NULL with an exception set.
 static bool *mark_alone(PyObject *object)
@@ -418,7 +378,7 @@ static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t fi
     bool done = true;
 
     for (uint32_t i = first; done && i < end; ++i)
-        done = append_steal(list, describe_pass(graph, name, i, group));
+        done = vkb_append_item(list, describe_pass(graph, name, i, group));
     return done;
 }
 
@@ -434,7 +394,7 @@ static PyObject *describe_groups(PyObject *object, bool dependencies)
         end = vkb_graph_group_end(graph, first);
         if (!ran[first])
             continue;
-        if (dependencies ? !append_steal(list, describe_dependencies(graph, first, end))
+        if (dependencies ? !vkb_append_item(list, describe_dependencies(graph, first, end))
                          : !add_group(list, graph, first, end, group))
             Py_CLEAR(list);
         ++group;
@@ -494,64 +454,6 @@ static PyObject *is_of_image(PyObject *object, PyObject *other)
     const struct vkb_source *source = &((struct vkb_source_object *)other)->source;
     return PyBool_FromLong(source->kind == VKB_SOURCE_IMAGE
                            && vkb_source_fits(&self->source, source));
-}
-
-// The names that the passes are timed under, without those that come again.
-static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)
-{
-    PyObject *names = PyDict_New();
-
-    for (uint32_t first = 0; names && first < graph->pass_count; ++first)
-        if (ran[first]
-            && PyDict_SetItemString(names, vkb_graph_timed_as(graph, first), Py_None) < 0)
-            Py_CLEAR(names);
-    PyObject *list = names ? PyDict_Keys(names) : NULL;
-    Py_XDECREF(names);
-    return list;
-}
-
-// Scenes know each other by their serials, whatever the frame's time is; images are compared by
-// their pixels when they come to the device, and here taken for different ones.
-static uint64_t source_number(PyObject *object)
-{
-    const struct vkb_source_object *source = (const struct vkb_source_object *)object;
-
-    return source->source.kind == VKB_SOURCE_SCENE ? source->scene.data.serial
-                                                   : (uint64_t)(uintptr_t)source;
-}
-
-static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,
-                          PyObject *step)
-{
-    PyObject *source, *object;
-    struct vkb_error error = {0};
-
-    if (!vkb_require_tuple(step, "dry_run")
-        || !PyArg_ParseTuple(step, "O!O!:dry_run", state->source_type, &source, state->plan_type,
-                             &object))
-        return NULL;
-    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
-    bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
-    PyObject *names = ran && vkb_dry_run_step(dry_run, plan, source_number(source), ran, &error)
-                        ? names_of(&plan->graph, ran)
-                        : vkb_raise(state, &error);
-    vkb_free(ran);
-    return names;
-}
-
-PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps)
-{
-    struct vkb_dry_run dry_run = {0};
-
-    if (!vkb_require_tuple(steps, "dry_run"))
-        return NULL;
-    PyObject *list = PyList_New(0);
-    for (Py_ssize_t i = 0, count = PyTuple_Size(steps); list && i < count; ++i)
-        if (!append_steal(list,
-                          dry_step(vkb_module_state(module), &dry_run, PyTuple_GetItem(steps, i))))
-            Py_CLEAR(list);
-    vkb_dry_run_destroy(&dry_run);
-    return list;
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)

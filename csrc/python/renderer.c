@@ -69,7 +69,7 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     struct vkb_renderer *self = vkb_new_object((PyObject *)type);
     if (!self)
         return NULL;
-    static uint64_t last_serial;
+    static VKB_ATOMIC(uint64_t) last_serial;
     self->serial = ++last_serial;
     self->process = vkb_current_process();
     self->lock = PyThread_allocate_lock();
@@ -88,6 +88,19 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         vkb_raise(PyType_GetModuleState(type), &error);
     Py_DECREF(self);
     return NULL;
+}
+
+// Arrays and handles that are left keep what is theirs. Called with the lock, or at the end.
+static void close_memory(struct vkb_renderer *self)
+{
+    VKB_LOCK(vkb_memory);
+    vkb_pages_close(self->pages);
+    vkb_residents_close(self->residents);
+    vkb_exports_close(self->exports);
+    self->pages = NULL;
+    self->residents = NULL;
+    self->exports = NULL;
+    VKB_UNLOCK(vkb_memory);
 }
 
 // Called with the lock and without the GIL. The validation layer reports objects that were not
@@ -109,12 +122,7 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
-    vkb_pages_close(self->pages);
-    vkb_residents_close(self->residents);
-    vkb_exports_close(self->exports);
-    self->pages = NULL;
-    self->residents = NULL;
-    self->exports = NULL;
+    close_memory(self);
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -154,9 +162,8 @@ static void dealloc(PyObject *object)
     if (self->device.handle)
         return;
     vkb_renderer_release_finished(self);
-    vkb_pages_close(self->pages);
-    vkb_residents_close(self->residents);
-    vkb_exports_close(self->exports);
+    if (self->pages)
+        close_memory(self);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);
@@ -214,27 +221,40 @@ static PyObject *get_info(PyObject *object, void *unused)
 
 static PyObject *get_instance(PyObject *object, void *unused)
 {
-    const struct vkb_renderer *self = (struct vkb_renderer *)object;
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
     struct vkb_error error = {0};
+    void *handle = NULL;
 
     (void)unused;
-    return vkb_require_open(self, &error) ? PyLong_FromVoidPtr(self->device.instance->handle)
-                                          : vkb_raise(state_of(object), &error);
+    if (!vkb_renderer_enter(self, &error))
+        return vkb_raise(state_of(object), &error);
+    if (vkb_require_open(self, &error))
+        handle = self->device.instance->handle;
+    vkb_renderer_leave(self);
+    return handle ? PyLong_FromVoidPtr(handle) : vkb_raise(state_of(object), &error);
 }
 
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
 {
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
+
     (void)unused;
-    return PyLong_FromSize_t(((struct vkb_renderer *)object)->pipeline_count);
+    VKB_LOCK(self->guard);
+    const size_t count = self->pipeline_count;
+    VKB_UNLOCK(self->guard);
+    return PyLong_FromSize_t(count);
 }
 
 static PyObject *get_cached(PyObject *object, void *unused)
 {
-    const struct vkb_cached *cached = &((struct vkb_renderer *)object)->cached;
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
 
     (void)unused;
-    return Py_BuildValue("(nnK)", (Py_ssize_t)cached->pipelines, (Py_ssize_t)cached->framebuffers,
-                         (unsigned long long)cached->image_bytes);
+    VKB_LOCK(self->guard);
+    const struct vkb_cached cached = self->cached;
+    VKB_UNLOCK(self->guard);
+    return Py_BuildValue("(nnK)", (Py_ssize_t)cached.pipelines, (Py_ssize_t)cached.framebuffers,
+                         (unsigned long long)cached.image_bytes);
 }
 
 static PyMethodDef methods[] = {

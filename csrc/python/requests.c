@@ -6,7 +6,8 @@
 struct submission {
     PyObject_HEAD
     struct vkb_renderer *renderer;
-    struct vkb_pending *pending;  // NULL: finished or abandoned
+    VKB_ATOMIC(struct vkb_pending *) pending;  // NULL: finished or abandoned
+    bool taken;                                // a call of wait has it; accessed with the lock
 };
 
 static struct vkb_module_state *state_of(PyObject *object)
@@ -57,7 +58,7 @@ static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_so
 // Allocates the memory that the requests need in addition to their plans.
 static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct vkb_error *error)
 {
-    struct vkb_resident *resident = ((struct vkb_source_object *)source)->resident;
+    const struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
     const Py_ssize_t count = PyTuple_Size(plans);
     size_t output_count = 0, pass_count = 0;
@@ -70,8 +71,16 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     }
     pending->plans = Py_NewRef(plans);
     pending->source = Py_NewRef(source);
-    if (resident)
-        vkb_resident_use(resident);
+    VKB_LOCK(vkb_memory);
+    pending->resident = given->resident;
+    if (pending->resident)
+        vkb_resident_use(pending->resident);
+    VKB_UNLOCK(vkb_memory);
+    if (given->residents && !pending->resident) {
+        vkb_fail(error, VKB_ERROR_VALUE, "image: another upload has taken its memory");
+        vkb_pending_release(pending);
+        return NULL;
+    }
     pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
@@ -107,6 +116,14 @@ static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pendin
     return true;
 }
 
+static struct vkb_page_run *find_pages(const struct vkb_renderer *renderer, const void *memory)
+{
+    VKB_LOCK(vkb_memory);
+    struct vkb_page_run *run = renderer->pages ? vkb_pages_find(renderer->pages, memory) : NULL;
+    VKB_UNLOCK(vkb_memory);
+    return run;
+}
+
 // `rows` may be NULL: all of them.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
                        const struct vkb_plan *plan, uint32_t output, const struct rows *rows,
@@ -130,9 +147,7 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .memory = view->buf,
         // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
-        .pages = view->len >= VKB_IMPORTED_BYTES && renderer->pages
-                   ? vkb_pages_find(renderer->pages, view->buf)
-                   : NULL,
+        .pages = view->len >= VKB_IMPORTED_BYTES ? find_pages(renderer, view->buf) : NULL,
     };
     if (rows
         && (rows->count == 0 || rows->first >= row->height
@@ -202,7 +217,7 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
 {
     struct vkb_frame_source data = {
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
-        .resident = source->resident,
+        .resident = pending->resident,
         .in_place = in_place,
     };
 
@@ -334,18 +349,20 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
     if (!vkb_renderer_enter(renderer, &error))
         return vkb_raise(state_of(object), &error);
     // Another thread may have taken it before this one got the lock.
-    struct vkb_pending *pending = self->pending;
-    self->pending = NULL;
-    if (!pending) {
+    if (self->taken) {
         vkb_renderer_leave(renderer);
         return refuse_to_wait();
     }
+    self->taken = true;
+    struct vkb_pending *pending = self->pending;
     // A closed renderer has no submissions.
     bool done = renderer->open ? vkb_frame_collect(&renderer->device, &renderer->frame,
                                                    pending->submission, &over, &error)
                                : vkb_require_open(renderer, &error);
     done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
+    // Not before: a collection of garbage may visit it meanwhile, from another thread.
+    self->pending = NULL;
     if (!over) {
         vkb_renderer_abandon(renderer, pending);
         return vkb_raise(state_of(object), &error);
@@ -360,11 +377,12 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
 
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
-    struct submission *self = (struct submission *)object;
+    const struct submission *self = (struct submission *)object;
+    const struct vkb_pending *pending = self->pending;
 
     Py_VISIT(Py_TYPE(object));
     Py_VISIT((PyObject *)self->renderer);
-    return self->pending ? vkb_pending_traverse(self->pending, visit, arg) : 0;
+    return pending ? vkb_pending_traverse(pending, visit, arg) : 0;
 }
 
 // While the device may still write to the arrays, the renderer keeps them.

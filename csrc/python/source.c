@@ -130,12 +130,16 @@ bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_sour
             && exports == renderer->exports)
             vkb_export_of(source->images[kind].view.obj, &exports);
     // A closed renderer says so itself.
-    if (!renderer->open
-        || ((!source->resident || source->residents == renderer->residents)
-            && exports == renderer->exports))
+    if (!renderer->open)
         return true;
-    PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one that "
-                                      "is closed; upload it to this one");
+    if (source->residents && !source->resident)
+        PyErr_SetString(PyExc_ValueError, "image: another upload has taken its memory");
+    else if ((source->residents && source->residents != renderer->residents)
+             || exports != renderer->exports)
+        PyErr_SetString(PyExc_ValueError, "image: it was uploaded to another renderer, or to one "
+                                          "that is closed; upload it to this one");
+    else
+        return true;
     return false;
 }
 
@@ -148,8 +152,8 @@ static bool is_exported(const struct vkb_source_object *source)
 }
 
 // The resident image of a source that nobody needs any more, and that no submission uses; or a new
-// one.
-static struct vkb_resident *take_resident(struct vkb_renderer *renderer, PyObject *spare,
+// one. With vkb_memory.
+static struct vkb_resident *find_resident(struct vkb_renderer *renderer, PyObject *spare,
                                           struct vkb_error *error)
 {
     struct vkb_source_object *source = (struct vkb_source_object *)spare;
@@ -159,8 +163,19 @@ static struct vkb_resident *take_resident(struct vkb_renderer *renderer, PyObjec
         return vkb_resident_add(renderer->residents, error);
     struct vkb_resident *resident = source->resident;
     source->resident = NULL;
-    source->source = (struct vkb_source){0};
     return resident;
+}
+
+static bool take_resident(struct vkb_renderer *renderer, PyObject *spare,
+                          struct vkb_source_object *self, struct vkb_error *error)
+{
+    VKB_LOCK(vkb_memory);
+    if (vkb_require_open(renderer, error)) {
+        self->residents = renderer->residents;
+        self->resident = find_resident(renderer, spare, error);
+    }
+    VKB_UNLOCK(vkb_memory);
+    return self->resident;
 }
 
 // Begins images of `height` rows, unless that is 0, and fills them from row `first` on.
@@ -214,17 +229,13 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
         PyErr_SetString(PyExc_ValueError, "upload: an image in host memory is needed");
         return NULL;
     }
-    if (!vkb_require_open(renderer, &error))
-        return vkb_raise(state, &error);
     struct vkb_source_object *self = vkb_new_object(state->source_type);
     if (!self)
         return NULL;
     if (height < source->source.image.size.height)
         height = source->source.image.size.height;
-    self->residents = renderer->residents;
     self->process = renderer->process;
-    self->resident = take_resident(renderer, spare, &error);
-    if (self->resident) {
+    if (take_resident(renderer, spare, self, &error)) {
         self->resident->recycled = recycled;
         if (stage(renderer, self->resident, source, height, 0, &error)) {
             self->source = source->source;
@@ -242,8 +253,11 @@ static bool check_rows(const struct vkb_source_object *source, const struct vkb_
 {
     const struct vkb_image_source *image = &source->source.image, *part = &rows->source.image;
 
-    if (source->resident && source->resident->uses == 0 && rows->images[VKB_INPUT_IMAGE].held
-        && !is_exported(rows) && part->format == image->format && part->channels == image->channels
+    VKB_LOCK(vkb_memory);
+    const bool is_idle = source->resident && source->resident->uses == 0;
+    VKB_UNLOCK(vkb_memory);
+    if (is_idle && rows->images[VKB_INPUT_IMAGE].held && !is_exported(rows)
+        && part->format == image->format && part->channels == image->channels
         && part->has_emission == image->has_emission && part->has_mask == image->has_mask
         && part->size.width == image->size.width && first <= image->size.height
         && part->size.height <= image->size.height - first)
@@ -296,11 +310,14 @@ static int clear(PyObject *object)
         vkb_release_image(&self->images[kind]);
     // A submission that uses it has this object, and is released first. A forked process keeps its
     // copy: the device is its parent's.
-    if (self->resident && self->resident->uses > 0)
-        return 0;
-    if (self->resident && self->process == vkb_current_process())
-        vkb_resident_release(self->residents, self->resident);
-    self->resident = NULL;
+    if (self->resident && self->process == vkb_current_process()) {
+        VKB_LOCK(vkb_memory);
+        if (self->resident->uses == 0) {
+            vkb_resident_release(self->residents, self->resident);
+            self->resident = NULL;
+        }
+        VKB_UNLOCK(vkb_memory);
+    }
     return 0;
 }
 

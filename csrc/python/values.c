@@ -76,6 +76,13 @@ bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
     return item && PyTuple_SetItem(tuple, index, item) == 0;
 }
 
+bool vkb_append_item(PyObject *list, PyObject *item)
+{
+    bool done = item && PyList_Append(list, item) == 0;
+    Py_XDECREF(item);
+    return done;
+}
+
 PyObject *vkb_image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
 {
     PyObject *tuple = PyTuple_New(count);

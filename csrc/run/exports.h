@@ -1,6 +1,6 @@
 // Memory of the device that CUDA maps, too: what comes from arrays on the device, and results that
 // stay there. It is kept for new arrays when an array is freed. Calls must not overlap; the core
-// makes them with the GIL.
+// makes them with the GIL or vkb_memory.
 #ifndef VKB_EXPORTS_H
 #define VKB_EXPORTS_H
 

@@ -1,6 +1,6 @@
 // Host memory of large arrays, kept for new arrays when an array is freed. New memory is slow: the
 // system maps and zeroes it page by page, and the device pins it, which takes several times as long
-// as the transfer. Calls must not overlap; the core makes them with the GIL.
+// as the transfer. Calls must not overlap; the core makes them with the GIL or vkb_memory.
 #ifndef VKB_PAGES_H
 #define VKB_PAGES_H
 

@@ -1,5 +1,6 @@
 // Images that stay on the device as long as there is a handle of them. Calls must not overlap; the
-// core makes them with the GIL, and calls the last two functions with the renderer's lock.
+// core makes them with the GIL or vkb_memory, and calls the last two functions with the renderer's
+// lock.
 #ifndef VKB_RESIDENT_H
 #define VKB_RESIDENT_H
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import os
 import shutil
 import sys
@@ -369,9 +370,16 @@ class Walk:
         return failed
 
 
-def walk(point: Callable[[int], bool], first: int, stride: int, before: dict[str, int]) -> None:
+def walk(
+    point: Callable[[int], bool],
+    first: int,
+    stride: int,
+    before: dict[str, int],
+    most: float = math.inf,
+) -> None:
+    """Walk until a point is not reached; beyond `most` points none is tried."""
     n = first
-    while True:
+    while n <= most:
         try:
             there = point(n)
             assert state() == before, (state(), before)
@@ -399,14 +407,18 @@ def walk_one(name: str, stride: int) -> None:
         walk(lambda n: one.close_at(n, DEVICE_LOST, CAN_LOSE), 1, 1, before)
     else:
         assert one.work is not None
+        core.arm_fault(0, 0, "")
         with open_renderer() as renderer:
             right = {key: array.copy() for key, array in one.work(renderer).items()}
+        # With opening and closing, so a few more than can fail; all are tried where all are walked.
+        most = core.fault_state()[0] if stride > 1 else math.inf
         # With the libraries' event loops and the like, which the first grid of a process opens.
         opened = state()
         assert {**opened, "descriptors": 0} == {**before, "descriptors": 0}, (opened, before)
         before = opened
-        walk(lambda n: one.work_at(n, right, OUT_OF_DEVICE_MEMORY, ""), start, stride, before)
-        walk(lambda n: one.work_at(n, right, DEVICE_LOST, CAN_LOSE), 1 + start % 4, stride, before)
+        walk(lambda n: one.work_at(n, right, OUT_OF_DEVICE_MEMORY, ""), start, stride, before, most)
+        lost = 1 + start % 4
+        walk(lambda n: one.work_at(n, right, DEVICE_LOST, CAN_LOSE), lost, stride, before, most)
     columns = ("points", "walked", "raised", "survived", "calls")
     figures = {column: getattr(one, column) for column in columns}
     print(json.dumps({"workload": name, **figures}), flush=True)

@@ -246,7 +246,7 @@ def test_an_image_in_use_is_not_taken_over(renderer: Renderer) -> None:
         (arrays_,) = ((np.empty_like(image),),)
         core.run(source, (core.plan(source, settings, ("final",)),), (arrays_,)).wait()
         np.testing.assert_array_equal(arrays_[0], image)
-    with pytest.raises(_core.Error, match="nothing in it"):
+    with pytest.raises(ValueError, match="another upload has taken its memory"):
         core.plan(used, settings, None)
 
 

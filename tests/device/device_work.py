@@ -108,7 +108,7 @@ def same(frames: Any, expected: Any) -> None:
 def layouts(renderer: Any) -> None:
     rng = np.random.default_rng(1)
     methods = (Separable(threshold=0.3), Pyramid(levels=2), Separable(bloom_scale=0.5))
-    for step in range(60 if EXHAUSTIVE else 15):
+    for step in range(60 if EXHAUSTIVE else 10):
         dtype = ("uint8", "float16", "float32")[step % 3]
         image = strided(rng, dtype)
         if dtype != "uint8" and step % 4 == 0:

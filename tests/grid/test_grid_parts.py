@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import random
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from click.testing import CliRunner
 import vkbloom
 from tests.framebuffers import noise
 from tests.grid.grid_in_parts import render
+from tests.grid.prepared_at_once import prepare, prepare_all
 from tests.grid.stores import contents
 from vkbloom import check_grid, grid_to_zarr
 from vkbloom.cli.program import program
@@ -66,6 +69,35 @@ def test_sixteen_parts_of_four_processes_of_which_two_are_killed(tmp_path: Path)
     assert check_grid(store).complete
     render(tmp_path / "whole.zarr", None)
     assert contents(store) == contents(tmp_path / "whole.zarr")
+
+
+def test_processes_create_a_store_at_once(tmp_path: Path) -> None:
+    """Of four processes with two grids, those of one grid go on, and the others are refused."""
+    context = multiprocessing.get_context("forkserver")
+    # What all need is imported once.
+    context.set_forkserver_preload(["tests.grid.prepared_at_once", "zarr"])
+    start, said = context.Barrier(4), context.Queue()
+    stores = [tmp_path / str(turn) for turn in range(4)]
+    grids = (0.25, 0.5, 0.25, 0.5)
+    processes = [
+        context.Process(target=prepare_all, args=(stores, (number, 4), grid, start, said))
+        for number, grid in enumerate(grids, 1)
+    ]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join(60)
+    assert [process.exitcode for process in processes] == [0] * 4
+    lines = sorted(said.get(timeout=1) for _ in range(len(stores) * len(grids)))
+    for store, each in zip(stores, zip(*[iter(lines)] * 4, strict=True), strict=True):
+        refused = [line for line in each if "contains another grid; settings.intensity" in line]
+        assert len(refused) == 2, each
+        assert refused in (list(each[:2]), list(each[2:]))
+        assert all(line.endswith(": ") for line in each if line not in refused)
+        own, alone = 0.5 if refused[0] == each[0] else 0.25, tmp_path / f"{store.name} alone"
+        for number in (1, 3) if own == 0.25 else (2, 4):
+            prepare(alone, (number, 4), own, threading.Barrier(1))
+        assert contents(store) == contents(alone)
 
 
 def test_parts_are_disjoint_and_complete() -> None:

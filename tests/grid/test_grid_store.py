@@ -23,7 +23,6 @@ from tests.exhaustive import by_turns
 from tests.framebuffers import noise
 from tests.grid import grid_to_kill
 from tests.grid.stores import contents
-from tests.processes import python
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, psf, reductions
 from vkbloom.grid.filling import Filler
 from vkbloom.grid.identity import differences
@@ -42,6 +41,8 @@ AXES: dict[str, list[Any]] = {
 CHUNKS = {"exposure": 3, "blur_scale": 2}
 REDUCE = {"mean": reductions.Mean(), "energy": reductions.EncircledEnergy(radii=(2, 8))}
 POINTS = 3 * 2 * 4
+
+pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 
 def source() -> Any:
@@ -154,18 +155,22 @@ class TestWhole:
         ],
     )
     def test_fields_that_are_objects_are_axes(
-        self, tmp_path: Path, renderer: Renderer, settings: Any, axis: str, values: Any
+        self, tmp_path: Path, settings: Any, axis: str, values: Any
     ) -> None:
-        stored = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        validated: dict[str, Any] = {"validation": True}
+        store = tmp_path / "a.zarr"
+        stored = grid_to_zarr(source(), settings, {axis: values}, store, **validated)
+        # The same one, which is kept.
+        renderer = vkbloom.Renderer("auto", **validated)
         for place, value in enumerate(values):
             expected = renderer.apply(source(), settings.replace(**{axis: value}))["final"]
             np.testing.assert_array_equal(stored["final"][place], expected)
         in_memory = renderer.grid(source(), settings, {axis: values}, progress=False)
         assert list(in_memory[axis].values) == list(stored[axis].values)
-        again = grid_to_zarr(source(), settings, {axis: values}, tmp_path / "a.zarr")
+        again = grid_to_zarr(source(), settings, {axis: values}, store, **validated)
         assert again.attrs["passes_run"] == 0
         with pytest.raises(ValueError, match=rf"axes\.{axis}"):
-            grid_to_zarr(source(), settings, {axis: values[:1]}, tmp_path / "a.zarr")
+            grid_to_zarr(source(), settings, {axis: values[:1]}, store, **validated)
 
     def test_masks_and_emissions_belong_to_the_source(
         self, tmp_path: Path, renderer: Renderer
@@ -699,19 +704,19 @@ def test_a_full_disk_keeps_what_is_done(tmp_path: Path, undisturbed: Path, room:
 
 
 def test_file_size_limit_leaves_no_partial_file(tmp_path: Path) -> None:
-    # Files may not grow beyond a limit, which stops a write in its middle as a full disk does.
-    code = (
-        "import resource, signal, sys\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))\n"
-        "import numpy as np, vkbloom\n"
-        "image = np.random.default_rng(1).integers(0, 256, (256, 256, 3), dtype=np.uint8)\n"
-        "vkbloom.grid_to_zarr(image, vkbloom.Separable(), {'intensity': [0, 1]}, sys.argv[1],\n"
-        "                     chunks={'intensity': 2})\n"
-    )
+    resource = pytest.importorskip("resource")
+    image = noise(256, 256, 3, dtype="uint8")
     store = tmp_path / "a.zarr"
-    ended = python("-c", code, store)
-    assert f"OSError: [Errno 27] File too large: '{store}/" in ended.stderr
+    # Files may not grow beyond a limit, which stops a write in its middle as a full disk does.
+    # (Python ignores the signal.)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            grid_to_zarr(image, Separable(), {"intensity": [0, 1]}, store, chunks={"intensity": 2})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert str(caught.value).startswith(f"[Errno 27] File too large: '{store}/")
     assert not list(store.rglob("*.partial"))
     assert check_grid(store).done == 0
     assert not check_grid(store).problems

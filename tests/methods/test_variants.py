@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.framebuffers import assert_same
@@ -95,19 +94,32 @@ PRESETS = [
 ]
 
 
+def opened(variant: str) -> Renderer:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_VARIANT", variant)
+        return Renderer(validation=True)
+
+
 @pytest.fixture(scope="module", params=VARIANTS)
 def variant(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def varied(variant: str) -> Iterator[Renderer]:
+def unfused() -> Iterator[Renderer]:
+    """A renderer that runs every pass as its method defines it."""
+    with opened("fragment") as renderer:
+        yield renderer
+
+
+@pytest.fixture(scope="module")
+def varied(variant: str, unfused: Renderer) -> Iterator[Renderer]:
     """A renderer that uses one column of the table of variants."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", variant)
-        opened = Renderer(validation=True)
-    with opened:
-        yield opened
+    if variant == "fragment":
+        yield unfused
+        return
+    with opened(variant) as renderer:
+        yield renderer
 
 
 @pytest.mark.parametrize(
@@ -158,15 +170,6 @@ def test_final_alone_is_the_final_of_all(
     if not settings.dither:
         # (Dithering makes two levels of a value that differs in its last bit.)
         assert_matches_reference(all_at_once, image, settings)
-
-
-@pytest.fixture(scope="module")
-def unfused() -> Iterator[Renderer]:
-    """A renderer that runs every pass as its method defines it."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", "fragment")
-        with Renderer(validation=True) as renderer:
-            yield renderer
 
 
 @OTHERS
@@ -380,19 +383,11 @@ def test_a_pass_has_one_time_in_every_variant(varied: Renderer, scene: Scene) ->
 # Scenes
 
 
-@pytest.fixture(scope="module")
-def drawn() -> Iterator[dict[str, NDArray[np.uint8]]]:
-    """The forward system's framebuffers with all passes drawn."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", "fragment")
-        with Renderer(validation=True) as renderer:
-            yield dict(renderer.render(Scene.ufo(), None, (640, 360), time=0.2))
-
-
 @pytest.mark.parametrize("attachments", ["all", ("final",)], ids=["all", "final"])
 def test_the_forward_frame(
-    varied: Renderer, drawn: dict[str, NDArray[np.uint8]], attachments: str | tuple[str, ...]
+    varied: Renderer, unfused: Renderer, attachments: str | tuple[str, ...]
 ) -> None:
+    drawn = unfused.render(Scene.ufo(), None, (640, 360), time=0.2)
     frames = varied.render(Scene.ufo(), None, (640, 360), time=0.2, attachments=attachments)
     assert drawn["bloom"].max() > 100, "there is no bloom to compare"
     for name, array in frames.items():

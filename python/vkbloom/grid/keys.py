@@ -62,6 +62,11 @@ class Keys:
         with self.named(key):
             _run(self.store.set(key, _buffers().buffer.from_bytes(content)))
 
+    def create(self, key: str, content: bytes) -> None:
+        """Write a key unless it exists. On disk, of several processes one does."""
+        with self.named(key):
+            _run(self.store.set_if_not_exists(key, _buffers().buffer.from_bytes(content)))
+
     def remove(self, key: str) -> None:
         """Remove a key, which may be missing."""
         _run(self.store.delete(key))

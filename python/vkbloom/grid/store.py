@@ -2,7 +2,9 @@
 
 The process may be killed at any time, because it writes in this order:
 
-1. The group's metadata, with the identity of the grid and a copy of the arrays' metadata.
+1. The group's metadata, with the identity of the grid and a copy of the arrays' metadata. They
+   are created only where there are none: of processes with different grids, one writes, and the
+   others are refused.
 2. The arrays' metadata, and the coordinates.
 3. Blocks of points: a complete chunk of each variable, with a checksum. Zarr's LocalStore writes
    a key to a temporary file first and renames it.
@@ -175,13 +177,15 @@ class GridStore:
             raise FileExistsError(
                 f"{self.keys.name}: the store already has a grid; resume it, or name another store"
             )
-        if held:
-            self._check_identity(expected)
+        if not held:
+            # Of processes that start at once, one decides which grid this is.
+            self.keys.create(METADATA, expected[METADATA])
+        self._check_identity(expected)
         if self.part == WHOLE:
             self.keys.remove_leftovers()
         mended = []
         for key, content in expected.items():
-            found = self.keys.read(key) if held else None
+            found = self.keys.read(key) if held or key == METADATA else None
             if normal(key, found) != normal(key, content):
                 self.keys.write(key, content)
                 # Another part may have begun to write the metadata.

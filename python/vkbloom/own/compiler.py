@@ -134,14 +134,17 @@ def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
     """Run a process that reads a text; return its exit status and its output.
 
     The limits are set after the process started and before it gets the text, so that nothing of
-    this process runs between fork and exec.
+    this process runs between fork and exec. What is preloaded into this process stays out: a
+    sanitizer needs more address space than the limit.
     """
+    environment = {name: os.environ[name] for name in os.environ if name != "LD_PRELOAD"}
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         cwd=folder,
+        env=environment,
     ) as process:
         limit(process.pid)
         try:

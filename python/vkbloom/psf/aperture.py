@@ -20,8 +20,9 @@ __all__ = ["aperture", "iris"]
 
 # Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4
-# Rows that are computed at a time.
+# Rows that are computed at a time: of masks, and of sums.
 _BAND = 256
+_BLOCK = 32
 _SPECTRUM = tuple(range(390, 731, 10))
 # XYZ to linear sRGB (IEC 61966-2-1).
 _SRGB = np.array(
@@ -115,10 +116,17 @@ def _mask(made: iris) -> NDArray[np.float32]:
     open_ = np.empty((fine, fine), np.bool_)
     bands = [slice(first, first + _BAND) for first in range(0, fine, _BAND)]
     step = 2 * math.pi / made.blades
+    inside = math.cos(step / 2)
     for band in bands:
-        angle = np.mod(np.arctan2(y[band], x) - math.radians(made.rotation), step) - step / 2
-        edge = math.cos(step / 2) / np.cos(angle)
-        open_[band] = np.hypot(x, y[band]) <= edge + made.roundness * (1 - edge)
+        squares = x * x + y[band] * y[band]
+        np.less(squares, inside**2, out=open_[band])
+        # Only between the circles inside and around the polygon the edge decides.
+        edges = np.nonzero((squares > inside**2 - 1e-9) & (squares < 1 + 1e-9))
+        across, up = x[edges[1]], y[band][edges[0], 0]
+        angle = np.mod(np.arctan2(up, across) - math.radians(made.rotation), step) - step / 2
+        edge = inside / np.cos(angle)
+        within = np.hypot(across, up) <= edge + made.roundness * (1 - edge)
+        open_[band][edges] = within
     generator = np.random.default_rng(made.seed)
     for _ in range(made.dust):
         (centre_x, centre_y), radius = generator.uniform(-1, 1, 2), generator.uniform(0.002, 0.02)
@@ -131,8 +139,10 @@ def _mask(made: iris) -> NDArray[np.float32]:
             along = (x - centre_x) * math.cos(turn) + (y[band] - centre_y) * math.sin(turn)
             across = (y[band] - centre_y) * math.cos(turn) - (x - centre_x) * math.sin(turn)
             open_[band] &= (np.abs(along) > length / 2) | (np.abs(across) > width)
-    blocks = open_.reshape(made.size, 4, made.size, 4)
-    mask: NDArray[np.float32] = blocks.mean(axis=(1, 3), dtype=np.float32)
+    # Four samples of a row are one word, whose bytes are their sum after three additions of rows.
+    words = open_.view(np.uint32).reshape(made.size, 4, made.size).sum(axis=1, dtype=np.uint32)
+    counts = words.view(np.uint8).reshape(made.size, made.size, 4).sum(axis=2, dtype=np.uint8)
+    mask: NDArray[np.float32] = counts / np.float32(16)
     mask.flags.writeable = False
     return mask
 
@@ -243,36 +253,45 @@ def _reach(psf: aperture) -> int:
 def _pattern(psf: aperture, up: int, across: int) -> Array:
     """Return the sum over the wavelengths, as far as some rows and columns from the centre."""
     lengths = _lengths(psf)
-    sums = _sums(np.asarray(psf.mask, np.float64))
+    # The pattern of a real mask is point-symmetric: the upper half, with all cells of the pixels on
+    # the axis and of the spline there, is enough.
+    below = math.ceil(_PADDING / _scale(psf, min(lengths)) / 2) + 3
+    sums = _sums(np.asarray(psf.mask, np.float64), below)
     end = _reach(psf) + 0.5
-    # The pattern of a real mask is point-symmetric: the upper half is enough.
-    rows: Array = np.arange(-up, 2, dtype=np.float64) - 0.5
-    columns: Array = np.arange(-across, across + 2, dtype=np.float64) - 0.5
-    half, total = np.zeros((up + 1, 2 * across + 1, 3)), np.zeros(3)
+    half, total = np.zeros((3, up + 1, 2 * across + 1)), np.zeros(3)
     for length, colour in zip(lengths, _colours(lengths), strict=True):
         scale = _PADDING / _scale(psf, length)
-        half += _energies(sums, rows * scale, columns * scale)[..., np.newaxis] * colour
+        # Where this wavelength's pattern ends, two cells beyond its last one.
+        reach = math.ceil((sums.shape[1] / 2 + 1) / scale)
+        high, wide = min(up, reach), min(across, reach)
+        rows: Array = np.arange(-high, 2, dtype=np.float64) - 0.5
+        columns: Array = np.arange(-wide, wide + 2, dtype=np.float64) - 0.5
+        energies = _energies(sums, rows * scale, columns * scale)
+        for channel, weight in zip(half, colour, strict=True):
+            channel[up - high :, across - wide : across + wide + 1] += energies * weight
         above, middle = _energies(
             sums, np.array([-end, -0.5, 0.5]) * scale, np.array([-end, end]) * scale
         )
         total += (2 * above + middle) * colour
-    whole = np.concatenate([half, half[-2::-1, ::-1]])
-    whole /= total
+    whole = np.empty((2 * up + 1, 2 * across + 1, 3))
+    whole[: up + 1] = np.moveaxis(half, 0, -1) / total
+    whole[up + 1 :] = whole[up - 1 :: -1, ::-1] if up else 0
     whole.flags.writeable = False
     return whole
 
 
 def _energies(sums: Array, rows: Array, columns: Array) -> Array:
     """Return the energies between rows and columns, in cells from the centre."""
-    middle = (len(sums) - 1) / 2 + 0.5
+    middle = (sums.shape[1] - 3) / 2 + 0.5
     bands = np.ascontiguousarray(_between(sums, middle + rows).T)
     return _between(bands, middle + columns).T
 
 
-def _sums(mask: Array) -> Array:
+def _sums(mask: Array, below: int) -> Array:
     """Return the integrals of the diffraction pattern over rectangles that start at its corner.
 
-    The pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
+    They end some rows below its centre. The first and the last are repeated for the spline. The
+    pattern is band-limited. So the integrals over the cells of the Fourier transform are exact:
     a product with a sinc in the domain of the autocorrelation.
     """
     count = len(mask)
@@ -281,15 +300,20 @@ def _sums(mask: Array) -> Array:
     correlation = np.fft.irfft2(np.abs(np.fft.rfft2(mask, (both, both))) ** 2, (both, both))
     side = _PADDING * count
     lags = np.sinc(np.fft.fftfreq(both) * both / side)
-    padded = np.zeros((side, side))
-    places = np.r_[:count, side - count : side]
-    padded[np.ix_(places, places)] = correlation * lags * lags[:, np.newaxis]
+    correlation *= lags
+    correlation *= lags[:, np.newaxis]
+    rows = np.zeros((both, side))
+    rows[:, :count], rows[:, -count:] = correlation[:, :count], correlation[:, count:]
     # The other half of the real, point-symmetric transform has the same values.
-    half = np.fft.rfft2(padded).real
+    waves = np.fft.rfft(rows)
+    columns = np.zeros((side, waves.shape[1]), np.complex128)
+    columns[:count], columns[-count:] = waves[:count], waves[count:]
+    half = np.fft.fft(columns, axis=0).real
     middle = side // 2
-    sums = np.zeros((side + 1, side + 1))
-    sums[1:, middle + 1 :] = np.fft.fftshift(half[:, :middle], axes=0)
-    sums[1:, 1 : middle + 1] = half[(middle - np.arange(side)) % side, middle:0:-1]
+    places = np.arange(-middle, min(middle, below))
+    sums = np.zeros((len(places) + 3, side + 3))
+    sums[2:-1, middle + 2 : -1] = half[places, :middle]
+    sums[2:-1, 2 : middle + 2] = half[-places, middle:0:-1]
     return sums.cumsum(axis=0, out=sums).cumsum(axis=1, out=sums)
 
 
@@ -298,8 +322,8 @@ def _between(sums: Array, places: Array) -> Array:
 
     The sums are interpolated by cubics between the cells, and constant outside of them.
     """
-    at = np.clip(places, 0, len(sums) - 1)
-    lower = np.minimum(at.astype(np.intp), len(sums) - 2)
+    at = np.clip(places, 0, len(sums) - 3)
+    lower = np.minimum(at.astype(np.intp), len(sums) - 4)
     t = at - lower
     # Catmull and Rom's spline.
     weights = (
@@ -308,10 +332,19 @@ def _between(sums: Array, places: Array) -> Array:
         ((4 - 3 * t) * t + 1) * t / 2,
         (t - 1) * t * t / 2,
     )
-    found = np.zeros((len(places), sums.shape[1]))
-    for offset, weight in zip(range(-1, 3), weights, strict=True):
-        rows = np.clip(lower + offset, 0, len(sums) - 1)
-        found += weight[:, np.newaxis] * sums[rows]
+    found = np.empty((len(places), sums.shape[1]))
+    products = np.empty((_BLOCK, sums.shape[1]))
+    # Blocks that stay in the processor's cache.
+    for first in range(0, len(places), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        rows = found[block]
+        np.take(sums, lower[block], axis=0, out=rows, mode="clip")
+        rows *= weights[0][block, np.newaxis]
+        for offset, weight in enumerate(weights[1:], 1):
+            product = products[: len(rows)]
+            np.take(sums, lower[block] + offset, axis=0, out=product, mode="clip")
+            product *= weight[block, np.newaxis]
+            rows += product
     return np.diff(found, axis=0)
 
 

@@ -1,0 +1,254 @@
+"""Threads that make all calls of the core at once: ``python -m tests.core.all_calls [CALLS]``.
+
+Half of them use one renderer, the others many. Each result must equal what one thread gave before,
+bit by bit. Prints how many calls were made, and whether the GIL is off.
+"""
+
+from __future__ import annotations
+
+import gc
+import random
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.images import picture
+from tests.planned import CAMERA, INDICES, MESH, SKY, VERTICES
+from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core, requests
+
+THREADS: Final = 16
+#: Renderers of the threads that share none with all others.
+MANY: Final = 4
+# The arrays of the last one are in the renderer's pages.
+SIZES = ((24, 16), (17, 31), (300, 290))
+SETTINGS: tuple[Settings, ...] = (
+    Separable(),
+    Pyramid(levels=3, exposure=0.5, format="rgba32float"),
+    DualKawase(levels=2),
+)
+IMAGES = [picture(*size) for size in SIZES]
+UFO = Scene.ufo()
+HEADER = np.array([0x07230203, 0x10000, 0, 1, 0], np.uint32).tobytes()
+
+
+def host(frames: Any) -> list[NDArray[Any]]:
+    return [np.asarray(array) for array in frames.values()]
+
+
+def run(core: _core.Renderer, source: _core.Source, plan: _core.Plan) -> list[Any]:
+    arrays = requests.new_arrays(core, plan)
+    core.run(source, (plan,), (arrays,)).wait()
+    return list(arrays)
+
+
+def apply(renderer: Renderer, which: int, size: int) -> Any:
+    return host(renderer.apply(IMAGES[size], SETTINGS[which]))
+
+
+def render(renderer: Renderer, which: int, size: int) -> Any:
+    return host(renderer.render(UFO, SETTINGS[which], SIZES[size]))
+
+
+def leave(renderer: Renderer, which: int, size: int) -> Any:
+    """Leave a sequence half way: some of its submissions are still pending."""
+    frames = next(iter(renderer.apply_many(IMAGES[size], [SETTINGS[which]] * 5)))
+    return [frames["final"]]
+
+
+def upload(renderer: Renderer, which: int, size: int) -> Any:
+    image = renderer.upload(IMAGES[size])
+    return host(renderer.apply(image, SETTINGS[which], attachments="final"))
+
+
+def recycle(renderer: Renderer, which: int, size: int) -> Any:
+    """Take the memory of another source, filled in two parts."""
+    core = renderer._core
+    image = IMAGES[size]
+    half = len(image) // 2
+    spare = core.upload(_core.image_source(image), None, True)
+    source = core.upload(_core.image_source(image[:half]), spare, True, len(image))
+    core.fill(source, _core.image_source(image[half:]), half)
+    assert spare.kind == source.kind
+    assert source.resident
+    assert not spare.resident
+    return run(core, source, core.plan(source, SETTINGS[which], ("final",)))
+
+
+def wait_twice(renderer: Renderer, which: int, size: int) -> Any:
+    """Two threads wait for the same submission: one of them gets it."""
+    core = renderer._core
+    source = _core.image_source(IMAGES[size])
+    plan = core.plan(source, SETTINGS[which], None)
+    arrays = requests.new_arrays(core, plan)
+    submission = core.run(source, (plan,), (arrays,))
+    got: list[Any] = []
+
+    def wait() -> None:
+        try:
+            got.append(submission.wait())
+        except RuntimeError:
+            got.append(None)
+
+    other = threading.Thread(target=wait)
+    other.start()
+    wait()
+    other.join()
+    assert sum(one is not None for one in got) == 1
+    return list(arrays)
+
+
+def adjoint(renderer: Renderer, which: int, size: int) -> Any:
+    del which
+    core = renderer._core
+    image = IMAGES[size].astype(np.float32)
+    source = _core.image_source(image, None, None, (image,))
+    plan = core.adjoint(source, SETTINGS[1], ("final",), False)
+    return [] if plan is None else run(core, source, plan)
+
+
+def look(renderer: Renderer, which: int, size: int) -> Any:
+    """Return all that is known of plans, without a device."""
+    core = renderer._core
+    source = _core.image_source(IMAGES[size])
+    settings = SETTINGS[which]
+    plan, any_plan = core.plan(source, settings, None), _core.plan(source, settings, None)
+    assert plan.shares_images(plan)
+    assert plan.is_of_image(source)
+    scene = _core.scene_source((1, MESH, MESH, SKY, ()), CAMERA, (64, 36), "forward", 0.0, 1.0)
+    found = [plan.outputs, plan.passes, any_plan.dependencies, plan.size, source.kind]
+    found += [core.bands(source, settings, 64 * IMAGES[size].shape[0])]
+    found += [_core.dry_run(((source, plan), (source, plan))), core.info, source.exported]
+    found += [_core.plan(scene, Separable(), None).passes, len(core.pages(1 << 20))]
+    shader = _core.shader("tried", HEADER)
+    _core.resource(7, 2, 0, (0, 0, 0, 0), False, 0, 16, bytes(16))
+    _core.read_dlpack(VERTICES.__dlpack__())
+    return [str((*found, shader.name, shader.hash, INDICES.sum()))]
+
+
+def ask(renderer: Renderer, which: int, size: int) -> Any:
+    """Read what other threads change meanwhile."""
+    del which, size
+    core = renderer._core
+    assert core.pipeline_count > 0
+    assert core.cached[0] > 0
+    assert core.instance
+    assert core.pipeline_cache()
+    return [core.closed, [one[0] for one in _core.adapters("")]]
+
+
+def show(renderer: Renderer, which: int, size: int) -> Any:
+    core = renderer._core
+    source = _core.image_source(IMAGES[size])
+    plan = core.plan(source, SETTINGS[which], ("final",))
+    try:
+        screen = core.open_screen(0, False)
+    except _core.Error as error:
+        assert "VK_EXT_headless_surface" in str(error)  # noqa: PT017  Mesa 22.3 has none
+        return []
+    submission = core.show(source, plan, screen, 32, 16, False)
+    if submission:
+        submission.wait()
+    core.close_screen(screen)
+    return []
+
+
+def open_and_close(renderer: Renderer, which: int, size: int) -> Any:
+    """Close a renderer that another thread uses; its arrays and handles outlive it."""
+    del renderer
+    own = Renderer()
+    image = own.upload(IMAGES[size])
+    kept = own.apply(IMAGES[size], SETTINGS[which])
+
+    def work() -> None:
+        try:
+            while True:
+                own.apply(image, SETTINGS[which], attachments="final")
+                assert own._core.instance
+        except ValueError:
+            assert own.closed
+
+    other = threading.Thread(target=work)
+    other.start()
+    own.close()
+    other.join()
+    return host(kept)
+
+
+def collect(renderer: Renderer, which: int, size: int) -> Any:
+    """Collect garbage while others submit."""
+    core = renderer._core
+    source = _core.image_source(IMAGES[size])
+    plan = core.plan(source, SETTINGS[which], None)
+    core.run(source, (plan,), (requests.new_arrays(core, plan),))
+    gc.collect()
+    return []
+
+
+Call = Callable[[Renderer, int, int], Any]
+#: With how often they come.
+CALLS: Final[dict[Call, int]] = {
+    apply: 12,
+    render: 6,
+    leave: 6,
+    upload: 12,
+    recycle: 12,
+    wait_twice: 12,
+    adjoint: 6,
+    look: 24,
+    ask: 24,
+    show: 3,
+    collect: 1,
+    open_and_close: 1,
+}
+
+
+def same(got: Any, right: Any) -> bool:
+    return len(got) == len(right) and all(
+        np.array_equal(one, other, equal_nan=True) if isinstance(one, np.ndarray) else one == other
+        for one, other in zip(got, right, strict=True)
+    )
+
+
+def play(calls: int) -> Counter[str]:
+    """Make so many calls; return how often each was made."""
+    names = {call.__name__: call for call in CALLS}
+    keys = [(name, which, size) for name in names for which in range(3) for size in range(3)]
+    with Renderer() as single:
+        right = {key: names[key[0]](single, *key[1:]) for key in keys}
+    renderers = [Renderer() for _ in range(1 + MANY)]
+    start = threading.Barrier(THREADS)
+    share = -(-calls // THREADS)
+
+    def work(thread: int) -> Counter[str]:
+        dice = random.Random(thread)
+        made: Counter[str] = Counter()
+        start.wait()
+        for _ in range(share):
+            (name,) = dice.choices(list(names), list(CALLS.values()))
+            key = (name, dice.randrange(3), dice.choices(range(3), (8, 8, 1))[0])
+            renderer = renderers[0 if thread % 2 else dice.randrange(1, 1 + MANY)]
+            apply(renderer, 0, 0)  # what `ask` asks for is there then
+            assert same(names[name](renderer, *key[1:]), right[key]), key
+            made[name] += 1
+        return made
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        made = sum(pool.map(work, range(THREADS)), Counter[str]())
+    for renderer in renderers:
+        renderer.close()
+    return made
+
+
+if __name__ == "__main__":
+    made = play(int(sys.argv[1]) if sys.argv[1:] else 1000)
+    print(f"{made.total()} calls in {THREADS} threads, all exact:")
+    print(", ".join(f"{name} {count}" for name, count in sorted(made.items())))
+    enabled = getattr(sys, "_is_gil_enabled", lambda: True)()
+    print("the GIL is on" if enabled else "the GIL is off")
+    sys.exit(0 if set(made) == {call.__name__ for call in CALLS} else 1)

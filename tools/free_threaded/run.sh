@@ -1,0 +1,51 @@
+#!/bin/sh
+# Makes all calls of the core in 16 threads under Python 3.13 without the GIL: run.sh [CALLS [TSAN_CALLS]]
+# (10000 and 400), the second number under ThreadSanitizer, 0: not at all. Builds both Pythons first, in
+# build/free_threaded, and there the wheel cp313t. PYTHON: an interpreter with pip 24 or later.
+set -eu
+cd "$(dirname "$0")/../.."
+PYTHON=$(realpath -s "${PYTHON:-python3}")
+folder=$PWD/build/free_threaded
+calls=${1:-10000}
+tsan_calls=${2:-400}
+export PYTHONDONTWRITEBYTECODE=1
+
+# An environment NAME of a Python, with what the tests need and the wheel of the package.
+environment() {
+    test -d "$folder/$1-venv" || "$folder/$1/bin/python3.13t" -m venv --without-pip "$folder/$1-venv"
+    "$PYTHON" -m pip --python "$folder/$1-venv/bin/python" install --quiet --only-binary=:all: \
+        "numpy >= 2.2, < 2.5" pytest pytest-run-parallel hypothesis "setuptools >= 77" wheel
+}
+install() {
+    "$PYTHON" -m pip --python "$folder/$1-venv/bin/python" install --quiet --no-deps \
+        --force-reinstall "$folder"/dist/vkbloom-*.whl
+}
+test -x "$folder/plain/bin/python3.13t" || tools/free_threaded/python.sh "$folder/plain"
+environment plain
+rm -rf "$folder/dist"
+"$PYTHON" -m pip --python "$folder/plain-venv/bin/python" wheel --quiet --no-deps \
+    --no-build-isolation --wheel-dir "$folder/dist" .
+ls "$folder/dist"
+install plain
+"$folder/plain-venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_free_threaded.py
+"$folder/plain-venv/bin/python" -m tests.core.all_calls "$calls"
+test "$tsan_calls" != 0 || exit 0
+
+if test ! -x "$folder/tsan/bin/python3.13t"; then
+    mkdir -p "$folder/tsan"
+    cp -r "$folder/plain/source" "$folder/tsan/"
+    CFLAGS="-O1 -g" tools/free_threaded/python.sh "$folder/tsan" --with-thread-sanitizer
+fi
+environment tsan
+install tsan
+# The core of the wheel is replaced by one that is built for the sanitizer.
+VKBLOOM_CFLAGS="-fsanitize=thread -fno-omit-frame-pointer -g -O1" VKBLOOM_LDFLAGS=-fsanitize=thread \
+    "$folder/plain-venv/bin/python" setup.py --quiet build_ext \
+    --build-temp "$folder/tsan/temp" --build-lib "$folder/tsan/lib"
+cp "$folder"/tsan/lib/vkbloom/_core.*.so \
+    "$folder"/tsan-venv/lib/python3.13t/site-packages/vkbloom/
+cat tools/threads/threads.supp tools/free_threaded/tsan.supp \
+    "$folder/tsan/source/Tools/tsan/suppressions_free_threading.txt" >"$folder/tsan.supp"
+env TSAN_OPTIONS="suppressions=$folder/tsan.supp:exitcode=66:history_size=4" \
+    "$folder/tsan-venv/bin/python" -m tests.core.all_calls "$tsan_calls"
+echo "ThreadSanitizer found nothing"
