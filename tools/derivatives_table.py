@@ -71,7 +71,11 @@ def table() -> str:
         "| method | by the image | linear | curved or piecewise | none |",
         "| --- | --- | --- | --- | --- |",
     ]
-    renderer = vkbloom.Renderer("software")
+    with vkbloom.Renderer("software") as renderer:
+        by_image = {
+            method: "device" if on_device(renderer, of_method(method)) else "reference"
+            for method in METHODS
+        }
     for method in METHODS:
         settings = of_method(method)
         known = differentiable(settings)
@@ -82,9 +86,7 @@ def table() -> str:
             [name for name in fields_of(type(settings)) if name not in known],
         )
         cells = (", ".join(f"`{name}`" for name in names) for names in columns)
-        place = "device" if on_device(renderer, settings) else "reference"
-        lines.append(f"| `{type(settings).__name__}` | {place} | {' | '.join(cells)} |")
-    renderer.close()
+        lines.append(f"| `{type(settings).__name__}` | {by_image[method]} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

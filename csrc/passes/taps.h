@@ -23,8 +23,7 @@ struct vkb_tap {
 struct vkb_axis {
     uint32_t from, to;
     bool cubic;
-    bool
-        aligned;  // the position of a pixel is the texel of the same number, whatever the sizes are
+    bool aligned;  // the position of a pixel is the texel of its number, whatever the sizes are
     uint32_t count;
     struct vkb_tap taps[VKB_MOST_TAPS];
 };

@@ -166,6 +166,8 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                 ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
                                     &portion->first, &portion->is_possible, error)
                 : vkb_source_build(source, settings, device->max_side, graph, error))
+        // Variants divide by the sizes of images, and add images of their own.
+        && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error);

@@ -112,7 +112,6 @@ struct vkb_cuda {
     FUNCTIONS(MEMBER)
     LATER_FUNCTIONS(MEMBER)
 #undef MEMBER
-    size_t users;
     int device, ordinal;
     void *context, *stream;
 };
@@ -237,26 +236,20 @@ struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct 
 
     if (!cuda)
         return NULL;
-    cuda->users = 1;
     if (load(cuda, error) && find_device(cuda, uuid, name, error)
         && CU(error, cuda->cuDevicePrimaryCtxRetain(&cuda->context, cuda->device))
         && enter(cuda, error)
         && leave(cuda, CU(error, cuda->cuStreamCreate(&cuda->stream, STREAM_NON_BLOCKING))))
         return cuda;
-    vkb_cuda_release(cuda);
+    vkb_cuda_close(cuda);
     return NULL;
 }
 
-void vkb_cuda_hold(struct vkb_cuda *cuda)
-{
-    ++cuda->users;
-}
-
-void vkb_cuda_release(struct vkb_cuda *cuda)
+void vkb_cuda_close(struct vkb_cuda *cuda)
 {
     struct vkb_error ignored;
 
-    if (!cuda || --cuda->users > 0)
+    if (!cuda)
         return;
     if (cuda->stream && enter(cuda, &ignored))
         leave(cuda, cuda->cuStreamDestroy(cuda->stream) == 0);

@@ -22,9 +22,7 @@ struct vkb_cuda_memory {
 // Opens the context of the GPU with that UUID; `name` is the adapter's. A value error names the
 // GPUs that CUDA has if that one is not among them.
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error);
-// Each user holds it; the last one that releases it closes the context.
-void vkb_cuda_hold(struct vkb_cuda *cuda);
-void vkb_cuda_release(struct vkb_cuda *cuda);
+void vkb_cuda_close(struct vkb_cuda *cuda);
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
 // As other libraries get it.

@@ -117,7 +117,7 @@ static void free_closed(struct vkb_exports *exports)
 {
     if (exports->device || exports->taken)
         return;
-    vkb_cuda_release(exports->cuda);
+    vkb_cuda_close(exports->cuda);
     vkb_free(exports);
 }
 

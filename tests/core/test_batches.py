@@ -16,6 +16,7 @@ import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
 from vkbloom import (
+    BevyBloom,
     DualKawase,
     Pyramid,
     Renderer,
@@ -29,6 +30,8 @@ from vkbloom.requests import new_arrays
 from vkbloom.sources import scene_arguments
 
 SIZE = (64, 36)
+# As the default, of levels that do not take most of the time.
+LOW = BevyBloom(max_mip_dimension=16)
 
 
 #: Changes of one pass, of all, of the images' number, sizes and formats; more than one batch.
@@ -209,13 +212,13 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
     image, other = picture(40, 30, 3, seed=7), picture(25, 50, 4, seed=8)
     settings = [Separable(blur_strength=strength / 8) for strength in range(24)]
     expected = [renderer.apply(image, s) for s in settings]
-    of_other, of_scene = renderer.apply(other), renderer.render(scene, None, SIZE)
-    last = renderer.apply(1.0 - image)
+    of_other, of_scene = renderer.apply(other, LOW), renderer.render(scene, None, SIZE)
+    last = renderer.apply(1.0 - image, LOW)
     calls: list[Callable[[], None]] = [
-        lambda: assert_same(renderer.apply(other), of_other),
+        lambda: assert_same(renderer.apply(other, LOW), of_other),
         lambda: assert_same(renderer.render(scene, None, SIZE), of_scene),
         # The same size, so that images on the device and in staging memory are overwritten.
-        lambda: assert_same(renderer.apply(1.0 - image), last),
+        lambda: assert_same(renderer.apply(1.0 - image, LOW), last),
         lambda: None,
     ]
     for index, frames in enumerate(renderer.apply_many(image, settings)):
@@ -288,7 +291,7 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
 )
 def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int, end: str) -> None:
     image = picture(40, 30, 3, seed=14)
-    right = renderer.apply(image)
+    right = renderer.apply(image, LOW)
     for _ in range(2):
         frames = renderer.apply_many(image, SEQUENCE)
         for _ in range(taken):
@@ -297,7 +300,7 @@ def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int,
             frames.close()  # type: ignore[attr-defined]
         del frames
         gc.collect()
-        assert_same(renderer.apply(image), right)
+        assert_same(renderer.apply(image, LOW), right)
 
 
 def test_a_sequence_forgotten_with_its_renderer() -> None:

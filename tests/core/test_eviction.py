@@ -73,13 +73,10 @@ def test_unused_images_are_freed(new_renderer: Callable[[], Renderer]) -> None:
 
 
 @pytest.mark.slow
-def test_unused_pipelines_are_freed(
-    new_renderer: Callable[[], Renderer], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unused_pipelines_are_freed(monkeypatch: pytest.MonkeyPatch) -> None:
     # In this variant each setting of the final pass has one pipeline, which drivers compile
-    # quickly.
+    # quickly. (Validation would see each shader 300 times; the next test has it.)
     monkeypatch.setenv("VKBLOOM_VARIANT", "fragment")
-    renderer = new_renderer()
     composites = fields_of(Separable)["composite"].choices
     names = (composites, *(_core.CHOICES[name] for name in ("tonemap", "encoding")))
     chosen = [
@@ -93,15 +90,16 @@ def test_unused_pipelines_are_freed(
         *itertools.product((single, half), chosen),
         *itertools.product((byte,), dithered[:40]),
     ]
-    expected = finals(renderer, single, chosen[:4])
-    counts = []
-    for image, settings in requests:
-        renderer.apply(image, settings, attachments="final")
-        counts.append(renderer._core.cached[0])
-    assert renderer._core.pipeline_count > PIPELINES + 8
-    assert max(counts) <= PIPELINES + 8
-    for got, right in zip(finals(renderer, single, chosen[:4]), expected, strict=True):
-        np.testing.assert_array_equal(got, right)
+    with Renderer() as renderer:
+        expected = finals(renderer, single, chosen[:4])
+        counts = []
+        for image, settings in requests:
+            renderer.apply(image, settings, attachments="final")
+            counts.append(renderer._core.cached[0])
+        assert renderer._core.pipeline_count > PIPELINES + 8
+        assert max(counts) <= PIPELINES + 8
+        for got, right in zip(finals(renderer, single, chosen[:4]), expected, strict=True):
+            np.testing.assert_array_equal(got, right)
 
 
 def test_pipelines_do_not_go_under_submissions_that_wait(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import assert_same
 from tests.images import picture
-from vkbloom import AdapterInfo, Pyramid, Renderer, Separable, _core, requests
+from vkbloom import AdapterInfo, BevyBloom, Pyramid, Renderer, Separable, _core, requests
 
 #: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
@@ -276,6 +276,10 @@ def test_the_memory_of_a_handle_goes_with_it(
 # One image after the other
 
 
+# As the default, of levels that do not take most of the time.
+LOW = BevyBloom(max_mip_dimension=16)
+
+
 def test_images_one_by_one_and_in_a_row(new_renderer: Callable[[], Renderer]) -> None:
     alone, together = new_renderer(), new_renderer()
     settings = [Separable(threshold=0.5), Pyramid(levels=2)] * (len(IMAGES) // 2)
@@ -286,8 +290,8 @@ def test_images_one_by_one_and_in_a_row(new_renderer: Callable[[], Renderer]) ->
         assert_same(got, right)
         assert got.settings == one
         assert got.info == right.info
-    for got, image in zip(together.apply_each(iter(images()[:4])), images(), strict=False):
-        assert_same(got, alone.apply(image))
+    for got, image in zip(together.apply_each(iter(images()[:4]), LOW), images(), strict=False):
+        assert_same(got, alone.apply(image, LOW))
 
 
 def test_one_array_filled_again_and_again(renderer: Renderer) -> None:
@@ -322,7 +326,7 @@ def test_a_generator_gets_its_array_back(renderer: Renderer) -> None:
             buffer.extend(b"\0")
             del buffer[-1]
 
-    assert len(list(renderer.apply_each(resized()))) == 4
+    assert len(list(renderer.apply_each(resized(), LOW))) == 4
 
 
 def wrong(kind: str) -> Iterator[Any]:

@@ -300,7 +300,20 @@ def errors(renderer: Any) -> None:
 WORK = (layouts, streams, sequences, places, capsules, recycling, lifetime, errors)
 
 
+# As the default, of levels that do not take most of the time.
+LOW = vkbloom.BevyBloom(max_mip_dimension=16)
+
+
+def use_low_levels() -> None:
+    """Calls without settings use LOW."""
+    apply, each = Renderer.apply, Renderer.apply_each
+    changed: Any = Renderer
+    changed.apply = lambda self, image, settings=LOW, **more: apply(self, image, settings, **more)
+    changed.apply_each = lambda self, images, settings=LOW: each(self, images, settings)
+
+
 def main() -> None:
+    use_low_levels()
     wrong = {}
     with Renderer(ADAPTER, validation=VALIDATION) as renderer:
         for work in WORK:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import (
+    BevyBloom,
     DualKawase,
     FitResult,
     HdrpBloom,
@@ -85,6 +86,23 @@ class TestFound:
         assert found.calls <= 30
         for name, value in changes.items():
             assert getattr(found.settings, name) == pytest.approx(value, rel=0.01)
+
+    def test_ten_numbers_take_a_tenth_of_the_renders(self, renderer: Renderer) -> None:
+        """With ten times the renders the search without derivatives is not as near."""
+        start = BevyBloom(max_mip_dimension=16, encoding="pq", threshold=0.9, knee=0.2)
+        changes = {
+            **{"threshold": 0.6, "knee": 0.4, "intensity": 0.3, "exposure": 0.5},
+            **{"reference_white": 300.0, "high_pass_frequency": 0.7, "scale_x": 1.3},
+            **{"scale_y": 0.8, "low_frequency_boost": 0.5, "low_frequency_boost_curvature": 0.8},
+        }
+        image = lamps(20, 16)
+        assert len(changes) == 10
+        target = renderer.apply(image, start.replace(**changes))["final"]
+        given: Any = (image, target, start, list(changes))
+        found = vkbloom.fit(*given, renderer=renderer, gradient=True, max_calls=5)
+        searched = vkbloom.fit(*given, renderer=renderer, max_calls=10 * found.calls)
+        assert found.loss < searched.loss
+        assert found.loss < found.start_loss / 100
 
     def test_what_has_no_derivative_is_named(self, renderer: Renderer) -> None:
         def fitted(vary: str, image: Any = IMAGE, **given: Any) -> Any:
@@ -384,10 +402,10 @@ class TestParts:
         a, b, direction = generator.random((3, 6, 5, 3))
         for loss in ("relative", "l2", "log"):
             measure = Measure(b, cast("Any", loss))
-            ends = [measure.slope(a + step * direction)[0] for step in (-1e-6, 1e-6)]
-            square, slopes = measure.slope(a)
-            assert square == pytest.approx(measure(a) ** 2)
-            assert (slopes * direction).sum() == pytest.approx((ends[1] - ends[0]) / 2e-6)
+            ends = [measure.differences(a + step * direction) for step in (-1e-6, 1e-6)]
+            assert np.linalg.norm(measure.differences(a)) == pytest.approx(measure(a))
+            found = measure.scales(a) * direction
+            np.testing.assert_allclose(found, (ends[1] - ends[0]) / 2e-6, atol=1e-8)
 
     def test_slopes_of_axes_are_those_of_differences(self) -> None:
         for scale in (None, 0.5):

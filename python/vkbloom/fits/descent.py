@@ -1,7 +1,8 @@
-"""The search by derivatives: least squares from the start and from the best of a few samples."""
+"""The search by derivatives: least squares from the start, and if needed what Search does."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -9,23 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.fits.losses import Measure
-from vkbloom.fits.search import ENOUGH, Search, SpentError
+from vkbloom.fits.search import CLOSE, ENOUGH, STEPS, Search, SpentError
 from vkbloom.fits.space import Point, Space
 from vkbloom.reference.derivatives import differentiable
 
 __all__ = ["Descent", "check_derivatives"]
 
-#: From settings to the framebuffer, and from a cotangent to the derivatives by each field.
-Pull = Callable[[Any], tuple[NDArray[np.float64], Callable[[NDArray[np.float64]], Any]]]
+#: From settings to the function that takes a cotangent to the derivatives by each field.
+Back = Callable[[Any], Callable[[NDArray[np.float64]], Any]]
 
-# Starts that a few samples are taken for, and steps of a first descent from each.
-_STARTS: Final = 3
-_FIRST_STEPS: Final = 8
-_STEPS: Final = 60
-# Fields this near to an end of their range start once more from other places.
-_END: Final = 1e-3
-_MIDDLES: Final = (0.5, 0.25)
+_MOST_STEPS: Final = 60
+# Signs of sums of differences, and the derivatives of these sums.
+_Sums = tuple[NDArray[np.int8], NDArray[np.float64]]
+# How many points' sums are taken together, and how near these are.
+_MOST_ESTIMATES: Final = 4
+_NEAR: Final = 0.01
+# How far from the ends the last steps begin.
+_INSIDE: Final = 0.02
 
 
 def check_derivatives(spaces: list[Space], loss: object, pixels: object) -> None:
@@ -46,111 +47,122 @@ def check_derivatives(spaces: list[Space], loss: object, pixels: object) -> None
                 )
 
 
+class _StalledError(Exception):
+    """The last steps have not made the loss smaller."""
+
+
+def _is_stalled(losses: list[float], axes: int) -> bool:
+    """Return whether the last losses are not below nine tenths of what was reached before."""
+    patience = {1: ENOUGH / 100, 2: ENOUGH, 6: CLOSE, 4 + axes // 2: np.inf}
+    for steps, limit in patience.items():
+        before = min(losses[:-steps], default=np.inf)
+        if before <= limit and min(losses[-steps:]) > 0.9 * before:
+            return True
+    return False
+
+
 class Descent(Search):
     """A search like `Search` whose steps follow from one pullback each.
 
-    `pull`: Takes settings, returns the framebuffer and its pullback.
+    `back`: From settings to the function that takes a cotangent of the framebuffer to the
+    derivatives by each field.
     """
 
-    def __init__(self, space: Space, measure: Measure, pull: Pull, **given: Any) -> None:
-        super().__init__(space, measure, self._pulled, **given)
-        self._pull = pull
-        self._back: Any = None
+    def __init__(self, back: Back, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self._derivatives = back
         self._random = np.random.default_rng(0)
 
     def run(self, points: list[Point]) -> None:
-        """Search from some points, and from samples if these are not enough."""
+        """Search from the start, and as without derivatives where that ends far from the target."""
         try:
-            self._follow(self._best_of(points), _STEPS)
-            if self.loss <= ENOUGH:
-                return
-            for middle in _MIDDLES:
-                # A field at the end of its range keeps the others from their values.
-                ends = (self.best < _END) | (self.best > 1 - _END)
-                self._follow(np.where(ends, middle, self.best), _STEPS)
-            samples = self._samples()[:: max(1, len(self._space.axes) // 2)]
-            losses = [self._loss(point) for point in samples]
-            for number in np.argsort(losses, kind="stable")[:_STARTS]:
-                self._follow(samples[number], _FIRST_STEPS)
-            self._follow(self.best, _STEPS)
+            self._follow(points[0])
+            if self.loss > CLOSE:
+                # Differences see over the kinks at which taps move from texel to texel.
+                self._descend(self.best, STEPS[0], most=3)
+                self._follow(self.best, "dogbox")
+            if ENOUGH < self.loss <= CLOSE:
+                # At an end, as that of a knee of 0, a derivative may be 0.
+                self._follow(np.clip(self.best, _INSIDE, 1 - _INSIDE))
         except SpentError:
             return
+        if self.loss > CLOSE:
+            super().run(points)
 
     def refine(self, points: list[Point]) -> None:
         """Search near the best of some points."""
         try:
-            self._follow(self._best_of(points), _STEPS)
+            self._follow(self._best_of(points))
         except SpentError:
             return
 
     def _best_of(self, points: list[Point]) -> Point:
         return points[int(np.argmin([self._loss(point) for point in points]))]
 
-    def _pulled(self, settings: Any) -> NDArray[np.float64]:
-        array, self._back = self._pull(settings)
-        return array
+    def _follow(self, point: Point, way: str = "trf") -> None:
+        """Find the minimum near a point.
 
-    def _follow(self, point: Point, most: int) -> None:
-        """Find the minimum near a point in `most` steps.
-
-        Gauss and Newton's method needs the products of all columns of the Jacobian J. Rows of J are
-        pullbacks of random signs, which estimate these products. The gradient is exact, so the
-        estimate decides the speed alone. `least_squares` gets residuals and a Jacobian of few rows
-        with this gradient, these products and this loss.
+        Gauss and Newton's method needs the Jacobian J of all residuals, and a pullback gives one
+        sum of its rows. So `least_squares` gets the residuals in other axes: the first is the loss,
+        whose row is the exact gradient. The others are 0: sums with random signs, less their share
+        of the residuals. Where a loss of 0 is near, the step is the same as with all rows. Where
+        steps are slow, sums of several points together are a better estimate.
         """
         optimize = import_extra("scipy.optimize", "fit", "Fitting")
-        known: dict[bytes, NDArray[np.float64]] = {}
+        begun = len(self.history)
+        arrays: list[NDArray[np.float64]] = []  # the last one, where a step was accepted
+        estimates: list[_Sums] = []
+        places: list[Point] = []
 
         def residual(part: Point) -> NDArray[np.float64]:
-            square, gradient, factor = self._model(part)
-            known.clear()
-            known[part.tobytes()] = factor
-            first = linear.solve_triangular(factor, gradient, trans="T")
-            rest = square - float(first @ first)
-            return np.append(first, np.sqrt(max(rest, 0.0)))
+            arrays[:] = [self._values(part)]
+            if _is_stalled(self.history[begun:], len(part)):
+                raise _StalledError
+            return np.append(self.history[-1], np.zeros(len(part)))
 
         def jacobian(part: Point) -> NDArray[np.float64]:
-            factor = known[part.tobytes()]
-            return np.vstack([factor, np.zeros(len(part))])
-
-        linear = import_extra("scipy.linalg", "fit", "Fitting")
-        optimize.least_squares(
-            residual,
-            np.clip(point, 1e-9, 1 - 1e-9),
-            jacobian,
-            bounds=(0.0, 1.0),
-            x_scale="jac",
-            ftol=1e-4,
-            xtol=1e-7,
-            gtol=1e-14,
-            max_nfev=most,
-        )
-
-    def _model(self, part: Point) -> tuple[float, Point, NDArray[np.float64]]:
-        """Return the square of the loss, half its gradient g, and U of the products U'U = J'J."""
-        array = self._values(part)
-        if self.loss <= ENOUGH:
-            raise SpentError
-        square, cotangent = self._measure.slope(array)
-        gradient = self._rows(part, cotangent / 2)
-        scale = self._measure.scales(array)
-        count = 2 * len(part) + 4
-        signs = self._random.choice((-1.0, 1.0), (count, *array.shape))
-        rows = np.stack([self._rows(part, scale * one) for one in signs]) / np.sqrt(count)
-        products = rows.T @ rows
-        # A field without an effect here has no row; it stays where it is.
-        products += np.diag(np.maximum(1e-9 * products.diagonal(), 1e-30))
-        # The loss bounds the part of the residuals that J explains.
-        explained = float(gradient @ np.linalg.solve(products, gradient))
-        products *= max(1.0, explained / max(square, 1e-30))
-        return square, gradient, np.linalg.cholesky(products).T
-
-    def _rows(self, part: Point, cotangent: NDArray[np.float64]) -> Point:
-        """Return the derivatives of a sum over the framebuffer by each coordinate."""
-        found = self._back(cotangent)
-        return np.array(
-            [
-                float(found[axis.name]) * axis.slope(float(place))
-                for axis, place in zip(self._space.axes, part, strict=True)
+            (array,) = arrays
+            unit = self._measure.differences(array)
+            unit /= max(float(np.linalg.norm(unit)), 1e-30)
+            gradient, sums = self._sums(part, array, unit)
+            moved = np.abs(part - places[-1]).max() if places else 1.0
+            places.append(part.copy())
+            if moved > _NEAR:
+                estimates.clear()
+            estimates.append(sums)
+            del estimates[:-_MOST_ESTIMATES]
+            rows = [
+                row - np.vdot(one, unit) * gradient
+                for signs, found in estimates
+                for one, row in zip(signs, found, strict=True)
             ]
-        )
+            # Of the rows only the products of columns count.
+            return np.vstack([gradient, np.linalg.qr(np.array(rows) / np.sqrt(len(rows)), "r")])
+
+        # What stalls keeps its best point.
+        with contextlib.suppress(_StalledError):
+            optimize.least_squares(
+                residual,
+                np.clip(point, 1e-9, 1 - 1e-9),
+                jacobian,
+                bounds=(0.0, 1.0),
+                x_scale="jac",
+                ftol=1e-4,
+                xtol=1e-7,
+                gtol=1e-14,
+                method=way,
+                max_nfev=_MOST_STEPS,
+            )
+
+    def _sums(
+        self, part: Point, array: NDArray[np.float64], unit: NDArray[np.float64]
+    ) -> tuple[Point, _Sums]:
+        """Return the derivatives of the sum of differences times `unit`, and of random sums."""
+        shape = (2 * len(part) + 4, *unit.shape)
+        signs = 1 - 2 * self._random.integers(0, 2, shape, np.int8)
+        scales = self._measure.scales(array)
+        back = self._derivatives(self._space.settings(part))
+        found = [back(one * scales) for one in (unit, *signs)]
+        rows = np.array([[float(one[axis.name]) for axis in self._space.axes] for one in found])
+        rows *= [axis.slope(place) for axis, place in zip(self._space.axes, part, strict=True)]
+        return rows[0], (signs, rows[1:])

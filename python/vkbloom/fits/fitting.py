@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, Final, cast, overload
+from typing import Any, Final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
 from vkbloom.fits.search import Search
 from vkbloom.fits.space import Bounds, Space, space_of
+from vkbloom.gradients import pullback_of
 from vkbloom.image import Image
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
@@ -148,9 +149,10 @@ def fit(
     are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
     callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Integers
     and choices are changed one at a time, while the numbers follow. The result is refined at the
-    image's own size. With `gradient`, the least squares follow from pullbacks, which are no calls,
-    from the start and if needed from a few samples. Fields that put few passes out of date are
-    changed first. The same arguments give the same result.
+    image's own size. With `gradient`, the derivatives of the least squares come from pullbacks,
+    which are no calls. If that ends far from the target, the search without derivatives follows.
+    Fields that put few passes out of date are changed first. The same arguments give the same
+    result.
 
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
@@ -330,11 +332,13 @@ def _fitted(
             )
             return light(frames[framebuffer])
 
-        kind: Any = Descent if gradient else Search
+        kind: Any = Search
+        if gradient:
+            kind = partial(Descent, partial(_derivatives, renderer, stage, framebuffer))
         search = kind(
             space,
             stage.measure,
-            partial(_pulled, renderer, stage, framebuffer) if gradient else render,
+            render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
             told=told,
@@ -368,19 +372,24 @@ def _fitted(
     )
 
 
-def _pulled(renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings) -> Any:
-    """Return a framebuffer, and from a cotangent to the derivatives by each field."""
-    frames, pullback = renderer.vjp(cast("Any", stage.pixels), _smaller(settings, stage.factor))
+def _derivatives(
+    renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings
+) -> Callable[[NDArray[np.float64]], Any]:
+    """Return the function from a cotangent to the derivatives by each field."""
+    assert stage.pixels is not None
+    pullback = pullback_of(renderer, stage.pixels, _smaller(settings, stage.factor), {})
+    # The shape of a framebuffer of four channels, such as "bloom", differs from the image's.
+    channels = stage.pixels.shape[2] if framebuffer == "final" else 4
 
     def back(cotangent: NDArray[np.float64]) -> Any:
-        whole = np.zeros(frames[framebuffer].shape)
+        whole = np.zeros((*cotangent.shape[:2], channels))
         whole[..., :3] = cotangent
         found = pullback({framebuffer: whole})
         if "blur_scale" in found:  # of `_smaller`
             found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
         return found
 
-    return light(frames[framebuffer]), back
+    return back
 
 
 def _smaller(settings: Settings, factor: int) -> Settings:

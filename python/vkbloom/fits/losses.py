@@ -54,10 +54,9 @@ class Measure:
         factor = math.ceil(math.sqrt(array.shape[0] * array.shape[1] / _MOST_PIXELS))
         return self._differences(reduced(array, factor), reduced(self.target, factor))
 
-    def slope(self, array: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Return the square of the loss of a sum, and its derivative by each value."""
-        differences = self._differences(array, self.target).reshape(array.shape)
-        return float(np.vdot(differences, differences)), 2 * differences * self.scales(array)
+    def differences(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the differences of all values, of the array's shape, whose norm is the loss."""
+        return self._differences(array, self.target).reshape(array.shape)
 
     def scales(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivative of each difference by its value."""

@@ -16,20 +16,20 @@ from vkbloom.checks import import_extra
 from vkbloom.fits.losses import Measure
 from vkbloom.fits.space import Point, Space
 
-__all__ = ["ENOUGH", "Search", "SpentError"]
+__all__ = ["CLOSE", "ENOUGH", "STEPS", "Search", "SpentError"]
 
 # Coordinates are from 0 to 1.
 # Steps of finite differences: first large compared with the rounding of half floats, then small.
-_STEPS: Final = (1e-2, 1e-3)
+STEPS: Final = (1e-2, 1e-3)
 # A logarithmic axis wider than _ENDLESS times its scale is sampled within _REACH of the start.
 _REACH: Final = 0.25
 _ENDLESS: Final = 100.0
 # Samples for each varied field. Least squares start from _STARTS points, one of them given.
 _SAMPLES: Final = 6
 _STARTS: Final = 5
-#: The search ends at ENOUGH, the loss of rounding to half floats. Below _CLOSE it only polishes.
+#: The search ends at ENOUGH, the loss of rounding to half floats. Below CLOSE it only polishes.
 ENOUGH: Final = 2e-5
-_CLOSE: Final = 5e-4
+CLOSE: Final = 5e-4
 # After a change of integers, choices or one number, numbers are optimized for the best _FOLLOWED.
 _FOLLOWED: Final = 3
 # Distant values to try of each number.
@@ -90,11 +90,11 @@ class Search:
         chosen = [number for number in order if number in discrete.values()]
         reached = []
         for number in list(dict.fromkeys([0, *chosen, *order]))[:_STARTS]:
-            reached.append(self._descend(starts[number], _STEPS[0], most=5))
+            reached.append(self._descend(starts[number], STEPS[0], most=5))
             if self.loss <= ENOUGH:
                 return
         for _, point in sorted(reached, key=lambda one: one[0])[:2]:
-            self._descend(point, _STEPS[0])
+            self._descend(point, STEPS[0])
             if self.loss <= ENOUGH:
                 return
 
@@ -102,7 +102,7 @@ class Search:
         """Search near the best of some points."""
         try:
             losses = [self._loss(point) for point in points]
-            self._descend(points[int(np.argmin(losses))], _STEPS[0])
+            self._descend(points[int(np.argmin(losses))], STEPS[0])
             self._polish()
         except SpentError:
             return
@@ -113,12 +113,12 @@ class Search:
         while ENOUGH < self.loss < 0.99 * before:
             before = self.loss
             self._walk()
-            self._descend(self.best, _STEPS[1])
-            if self.loss > _CLOSE:
+            self._descend(self.best, STEPS[1])
+            if self.loss > CLOSE:
                 # Where pixels cross a hard threshold one by one, the derivative is 0.
                 self._along_lines()
-                self._descend(self.best, _STEPS[0])
-            if self.loss > _CLOSE:
+                self._descend(self.best, STEPS[0])
+            if self.loss > CLOSE:
                 self._leap()
 
     def _values(self, point: Point) -> NDArray[np.float64]:
@@ -270,8 +270,8 @@ class Search:
                 point[index] = place
                 tried.append((self._loss(point), point))
             for _, point in sorted(tried, key=lambda one: one[0])[:_FOLLOWED]:
-                self._descend(point, _STEPS[0], most=6)
-                if self.loss <= _CLOSE:
+                self._descend(point, STEPS[0], most=6)
+                if self.loss <= CLOSE:
                     return
 
     def _walk(self) -> None:
@@ -287,5 +287,5 @@ class Search:
                     tried.append((self._loss(point), point))
                 if self.loss >= held:
                     for _, point in sorted(tried, key=lambda one: one[0])[:_FOLLOWED]:
-                        self._descend(point, _STEPS[0], most=6)
+                        self._descend(point, STEPS[0], most=6)
                 is_moving = self.loss < held

@@ -20,7 +20,7 @@ from vkbloom.grid.parts import WHOLE, Part
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
 from vkbloom.io import image_writing, safe_writing
-from vkbloom.io.images import Encoding, Picture, check_name
+from vkbloom.io.images import Picture, SavedColour, check_name
 
 __all__ = ["FileForm", "GridFiles"]
 
@@ -31,7 +31,7 @@ _INDEX: Final = "grid.json"
 class FileForm:
     """Encoding and number type of an image's `final` files, as in `vkbloom.io.images.Picture`."""
 
-    encoding: Encoding | None
+    encoding: SavedColour | None
     numbers: str
     grey: bool
 

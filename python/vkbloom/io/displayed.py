@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -41,6 +42,8 @@ PRIMARIES: Final[Mapping[str, str]] = {
     "rec2020": "lin_rec2020_scene",
     "p3": "lin_p3d65_scene",
 }
+# Of a view: the space of what it gets, no look, and colours that alpha does not divide.
+_FROM_LINEAR: Final = (PRIMARIES["rec709"], "", False)
 # Code points of Rec. ITU-T H.273, for primaries and for curves; 2 is an unknown curve.
 _PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
 _CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
@@ -126,10 +129,6 @@ def converted(
     return encoded(values, curve), (saved.primaries, curve)
 
 
-# The space of what a view gets, no look, and colours that alpha does not divide.
-_FROM_LINEAR: Final = (PRIMARIES["rec709"], "", False)
-
-
 def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:
     """Return linear colours (H, W, 3 or 4) of these primaries in those of Rec. 709."""
     if primaries == "rec709":
@@ -198,16 +197,21 @@ def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
     return (primaries[0], curves[0]) if primaries and curves else None
 
 
-def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
-    """Return display and view of "VIEW", of the first display that has it, or "DISPLAY/VIEW"."""
+@functools.cache
+def _views(oiio: ModuleType) -> list[tuple[str, str]]:
+    """Return all displays with their views; listing them takes 70 ms."""
     config = oiio.ColorConfig(_CONFIGURATION)
-    named = [
+    return [
         (shown, one) for shown in config.getDisplayNames() for one in config.getViewNames(shown)
     ]
-    for pair in named:
+
+
+def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
+    """Return display and view of "VIEW", of the first display that has it, or "DISPLAY/VIEW"."""
+    for pair in _views(oiio):
         if view in (pair[1], "/".join(pair)):
             return pair
-    listed = ", ".join("/".join(pair) for pair in named)
+    listed = ", ".join("/".join(pair) for pair in _views(oiio))
     raise ValueError(f"view: {view!r} is not a view of OpenColorIO's configuration: {listed}")
 
 

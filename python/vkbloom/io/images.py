@@ -29,7 +29,6 @@ __all__ = [
     "PIXEL_TYPES",
     "SPACES",
     "Colour",
-    "Encoding",
     "Picture",
     "SavedColour",
     "StoredImage",
@@ -45,7 +44,6 @@ __all__ = [
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
 SavedColour = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
-Encoding = SavedColour
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
 
@@ -150,7 +148,7 @@ class Picture:
     """
 
     pixels: NDArray[Any]
-    encoding: Encoding | None
+    encoding: SavedColour | None
     numbers: str
     grey: bool
     stored: StoredImage
@@ -162,7 +160,7 @@ class Picture:
         cls,
         pixels: NDArray[Any],
         numbers: str = "uint8",
-        encoding: Encoding | None = None,
+        encoding: SavedColour | None = None,
         attributes: Mapping[str, tuple[Any, Any]] | None = None,
     ) -> Self:
         """Make a picture from an array. Without an encoding, `save` writes its values unchanged.

@@ -20,8 +20,9 @@ __all__ = ["aperture", "iris"]
 
 # Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4
-# Rows that are computed at a time.
+# Rows that are computed at a time: of masks, and of sums.
 _BAND = 256
+_BLOCK = 32
 _SPECTRUM = tuple(range(390, 731, 10))
 # XYZ to linear sRGB (IEC 61966-2-1).
 _SRGB = np.array(
@@ -332,8 +333,18 @@ def _between(sums: Array, places: Array) -> Array:
         (t - 1) * t * t / 2,
     )
     found = np.empty((len(places), sums.shape[1]))
-    for row, first, four in zip(found, lower.tolist(), np.stack(weights, axis=-1), strict=True):
-        np.dot(four, sums[first : first + 4], out=row)
+    products = np.empty((_BLOCK, sums.shape[1]))
+    # Blocks that stay in the processor's cache.
+    for first in range(0, len(places), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        rows = found[block]
+        np.take(sums, lower[block], axis=0, out=rows, mode="clip")
+        rows *= weights[0][block, np.newaxis]
+        for offset, weight in enumerate(weights[1:], 1):
+            product = products[: len(rows)]
+            np.take(sums, lower[block] + offset, axis=0, out=product, mode="clip")
+            product *= weight[block, np.newaxis]
+            rows += product
     return np.diff(found, axis=0)
 
 
