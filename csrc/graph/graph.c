@@ -86,10 +86,10 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     PACK(turn);
     PACK(block);
 #undef PACK
-    // FNV-1a of the serials: there is no space for all of them.
-    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    // A hash of the serials: there is no space for all of them.
+    uint64_t hash = VKB_HASH_START;
     for (uint32_t i = 0; i < pass->resource_count; ++i)
-        hash = (hash ^ pass->resources[i]->serial) * UINT64_C(0x100000001b3);
+        hash = vkb_hash_word(hash, pass->resources[i]->serial);
     memcpy(bytes + size, &hash, sizeof hash);
     size += sizeof hash;
     return size + vkb_params_pack(pass->block, &pass->params, bytes + size);

@@ -35,6 +35,13 @@ enum vkb_input_kind {
     VKB_INPUT_COUNT = VKB_INPUT_LEVEL + GATHERED_LEVELS,
 };
 
+// FNV-1a by words of 64 bits.
+#define VKB_HASH_START UINT64_C(0xcbf29ce484222325)
+static inline uint64_t vkb_hash_word(uint64_t hash, uint64_t word)
+{
+    return (hash ^ word) * UINT64_C(0x100000001b3);
+}
+
 // An image is either given by the host, or written by one sequence of consecutive passes. So its
 // content stays valid until this sequence is out of date.
 struct vkb_image_row {

@@ -17,16 +17,16 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_composite_frag, vkb_transpose_composite, NULL},
         {&vkb_shader_threshold_frag, vkb_transpose_threshold, NULL},
         {&vkb_shader_blur_frag, vkb_transpose_blur, NULL},
-        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_weighted_down},
+        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_groups},
         {&vkb_shader_pyramid_up_frag, vkb_transpose_up, NULL},
         {&vkb_shader_gather_frag, vkb_transpose_gather, NULL},
         {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down, NULL},
         {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up, NULL},
-        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_weighted_box},
-        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_bevy, NULL},
-        {&vkb_shader_urp_prefilter_frag, vkb_transpose_urp, NULL},
-        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_unreal, NULL},
-        {&vkb_shader_kino_prefilter_frag, vkb_transpose_kino, NULL},
+        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_groups},
+        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_urp_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_kino_prefilter_frag, vkb_transpose_groups, NULL},
     };
     const struct vkb_constants *constants = &pass->constants;
 
@@ -81,17 +81,17 @@ static bool add_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
     return vkb_graph_add_image(adjoint->graph, &row, &adjoint->table_image, error);
 }
 
-// FNV-1a of the words.
-static uint64_t hash_of(const void *bytes, size_t size)
+// Texels are four words of 32 bits, taken by two.
+static uint64_t hash_of(const struct vkb_table *table, size_t count)
 {
-    const unsigned char *given = bytes;
-    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    uint64_t hash = VKB_HASH_START;
 
-    for (size_t i = 0; i < size; i += sizeof(uint32_t)) {
-        uint32_t word;
-        memcpy(&word, given + i, sizeof word);
-        hash = (hash ^ word) * UINT64_C(0x100000001b3);
-    }
+    for (size_t i = 0; i < count; ++i)
+        for (size_t half = 0; half < 2; ++half) {
+            uint64_t word;
+            memcpy(&word, &table->texels[i][2 * half], sizeof word);
+            hash = vkb_hash_word(hash, word);
+        }
     return hash ? hash : 1;
 }
 
@@ -107,7 +107,7 @@ static bool end_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
     memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
     row->height = (uint32_t)rows;
     row->pixels = adjoint->graph->owned[0] = table->texels;
-    row->serial = hash_of(table->texels, texels * sizeof *table->texels);
+    row->serial = hash_of(table, texels);
     *table = (struct vkb_table){0};
     return true;
 }

@@ -56,7 +56,7 @@ bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
 vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_transpose_gather,
     vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box;
-vkb_transpose vkb_transpose_weighted_down, vkb_transpose_weighted_box, vkb_transpose_bevy,
-    vkb_transpose_urp, vkb_transpose_unreal, vkb_transpose_kino;
+// Downsamplings that are not linear in groups of their taps.
+vkb_transpose vkb_transpose_groups;
 
 #endif

@@ -56,9 +56,46 @@ static void take_params(const struct vkb_pass_row *pass, struct vkb_prefilter_pa
     params->step_y = pass->params.pyramid.step_y;
 }
 
-static bool bring_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                         enum vkb_mode groups, int count, struct vkb_error *error)
+// The groups by the shader of the forward pass.
+static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
 {
+    static const struct {
+        const struct vkb_shader *shader;
+        enum vkb_mode groups;
+    } known[] = {
+        {&vkb_shader_box_down_frag, GROUPS_BOX},
+        {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
+        {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
+        {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
+        {&vkb_shader_kino_prefilter_frag, GROUPS_KINO},
+    };
+
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i)
+        if (known[i].shader == pass->shader)
+            return known[i].groups;
+    return GROUPS_PYRAMID;
+}
+
+static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
+{
+    switch (groups) {
+    case GROUPS_BOX:
+        return 4;
+    case GROUPS_URP:
+    case GROUPS_UNREAL:
+        return 1;
+    case GROUPS_KINO:
+        return pass->constants.anti_flicker ? 5 : 1;
+    default:
+        return 5;
+    }
+}
+
+bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                          struct vkb_error *error)
+{
+    const enum vkb_mode groups = groups_of(pass);
+    const int count = count_of(groups, pass);
     const uint32_t target = pass->targets[0];
     const uint32_t reads[] = {pass->reads[0], pass->reads[pass->constants.masked ? 1 : 0],
                               vkb_brought(adjoint, pass)};
@@ -81,40 +118,4 @@ static bool bring_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
     row.constants.by = BY_MASK;
     vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
     return vkb_bring_through(adjoint, &row, &filter, pass->reads[1], target, error);
-}
-
-bool vkb_transpose_bevy(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                        struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_BEVY, 5, error);
-}
-
-bool vkb_transpose_urp(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                       struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_URP, 1, error);
-}
-
-bool vkb_transpose_unreal(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                          struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_UNREAL, 1, error);
-}
-
-bool vkb_transpose_kino(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                        struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_KINO, pass->constants.anti_flicker ? 5 : 1, error);
-}
-
-bool vkb_transpose_weighted_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                 struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_PYRAMID, 5, error);
-}
-
-bool vkb_transpose_weighted_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                struct vkb_error *error)
-{
-    return bring_groups(adjoint, pass, GROUPS_BOX, 4, error);
 }

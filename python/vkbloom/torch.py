@@ -19,16 +19,16 @@ from __future__ import annotations
 import functools
 import threading
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.checks import check_emission, check_image, check_mask, import_extra
-from vkbloom.gradients import Pullback, pullback_of
+from vkbloom.checks import import_extra
+from vkbloom.gradients import Pullback, checked_inputs, pullback_of
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import check_cotangent, differentiable
+from vkbloom.reference.derivatives import check_cotangents, differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
 
@@ -329,16 +329,9 @@ def _pullback(arrays: dict[str, Any], settings: Settings, renderer: int) -> Pull
     image = given.pop("image")
     if image.dtype == np.float64:
         return reference_vjp(image, settings, **given)[1]
-    pixels = check_image(image)
-    checks: dict[str, Callable[[Any], Any]] = {
-        "mask": lambda part: check_mask(part, (pixels.shape[0], pixels.shape[1])),
-        "emission": lambda part: check_emission(part, pixels),
-    }
-    checked = {name: checks[name](part) for name, part in given.items()}
+    pixels, checked = checked_inputs(image, given.get("mask"), given.get("emission"))
     pullback = pullback_of(_renderer(renderer), pixels, settings, checked)
-    return lambda cotangents: pullback(
-        {name: check_cotangent(name, part, {"final": pixels}) for name, part in cotangents.items()}
-    )
+    return lambda cotangents: pullback(check_cotangents(cotangents, {"final": pixels}))
 
 
 def _operator(name: str, parameters: str, result: str) -> Any:

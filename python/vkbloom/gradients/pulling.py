@@ -15,10 +15,10 @@ from vkbloom.frames import Frames
 from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.image import Image
 from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import Gradients, check_cotangent, differentiable
+from vkbloom.reference.derivatives import Gradients, check_cotangents, differentiable
 from vkbloom.settings import Settings
 
-__all__ = ["Pullback", "pullback_of", "vjp"]
+__all__ = ["Pullback", "checked_inputs", "pullback_of", "vjp"]
 
 #: From cotangents by framebuffer to derivatives by name.
 Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
@@ -46,21 +46,28 @@ def vjp(
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )
-    pixels = np.array(check_image(image))
-    given: dict[str, NDArray[Any]] = {}
-    if mask is not None:
-        given["mask"] = np.array(check_mask(mask, (pixels.shape[0], pixels.shape[1])))
-    if emission is not None:
-        given["emission"] = np.array(check_emission(emission, pixels))
+    pixels, given = checked_inputs(image, mask, emission)
+    pixels, given = pixels.copy(), {name: part.copy() for name, part in given.items()}
     frames = renderer.apply(pixels, settings.replace(format="rgba32float"), **given)
     pulled = pullback_of(renderer, pixels, settings, given)
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        return pulled(
-            {name: check_cotangent(name, part, frames) for name, part in cotangents.items()}
-        )
+        return pulled(check_cotangents(cotangents, frames))
 
     return frames, pullback
+
+
+def checked_inputs(
+    image: object, mask: object | None, emission: object | None
+) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    """Return the image, and mask and emission by name where they are given."""
+    pixels = check_image(image)
+    given: dict[str, NDArray[Any]] = {}
+    if mask is not None:
+        given["mask"] = check_mask(mask, (pixels.shape[0], pixels.shape[1]))
+    if emission is not None:
+        given["emission"] = check_emission(emission, pixels)
+    return pixels, given
 
 
 def pullback_of(

@@ -15,7 +15,7 @@ from .framebuffers import checked_image, framebuffers
 from .sampling import Array
 from .tape import Traced, gradients, value_of
 
-__all__ = ["DISCRETE", "Gradients", "check_cotangent", "differentiable", "vjp"]
+__all__ = ["DISCRETE", "Gradients", "check_cotangents", "differentiable", "vjp"]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
@@ -73,8 +73,8 @@ def vjp(
     ------
     TypeError, ValueError
         As for `apply`. The method was loaded from a file of passes, which has no derivative. From
-        `pullback`: there is no such framebuffer, or a cotangent has another shape, or is not
-        finite.
+        `pullback`: there is no such framebuffer, or a cotangent has another shape, is not of real
+        numbers, or is not finite.
 
     See Also
     --------
@@ -120,7 +120,7 @@ def vjp(
     values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
-        given = {name: check_cotangent(name, part, values) for name, part in cotangents.items()}
+        given = check_cotangents(cotangents, values)
         given = {name: part for name, part in given.items() if isinstance(found[name], Traced)}
         derivatives = gradients(
             [(found[name], part) for name, part in given.items()], [*inputs.values()]
@@ -182,17 +182,31 @@ class _TracedSettings:
         return getattr(self._settings, name)
 
 
-def check_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
-    """Check and return a cotangent in float64."""
+def check_cotangents(
+    cotangents: Mapping[str, NDArray[Any]], values: Mapping[str, Any]
+) -> dict[str, Array]:
+    """Check and return cotangents in float64; `values` are the framebuffers."""
+    if not isinstance(cotangents, Mapping):
+        raise TypeError(
+            f"cotangents: {type(cotangents).__name__} is not a mapping of framebuffer to array; "
+            'give {"final": array}'
+        )
+    return {name: _checked_cotangent(name, part, values) for name, part in cotangents.items()}
+
+
+def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
     if name not in values:
         known = ", ".join(values)
         raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {known}")
 
-    array = np.asarray(cotangent, np.float64)
-    if array.shape != values[name].shape:
+    given = np.asarray(cotangent)
+    if given.dtype.kind not in "fiub":
+        raise TypeError(f"cotangents: {name!r} is of dtype {given.dtype}, not of real numbers")
+    if given.shape != values[name].shape:
         raise ValueError(
-            f"cotangents: the shape of {name!r} is {array.shape}, not {values[name].shape}"
+            f"cotangents: the shape of {name!r} is {given.shape}, not {values[name].shape}"
         )
+    array = given.astype(np.float64)
     if not np.isfinite(array).all():
         raise ValueError(f"cotangents: {name!r} has NaN or infinity")
     return array
