@@ -7,6 +7,8 @@
 # make wheels: builds the wheels of vkbloom, its driver and its compiler into dist/ (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
+# make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
+#   image in each (ROOTS="bookworm arm64"); as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
@@ -36,7 +38,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
 .PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
-	freethreaded format sanitize clean
+	freethreaded try-wheels format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -69,6 +71,9 @@ wheels:
 # sanitizer.
 freethreaded: build/stamp/core
 	PYTHON=$(abspath $(PYTHON)) LP_NUM_THREADS=1 tools/free_threaded/run.sh $(CALLS)
+
+try-wheels:
+	packaging/try_bare.sh $(ROOTS)
 
 # BENCH: options for python -m benchmarks.
 bench: build/stamp/core build/stamp/peers

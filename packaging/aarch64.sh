@@ -23,7 +23,7 @@ test -z "$missing" || { echo "packaging/aarch64.sh needs: apt install$missing" >
 mkdir -p "$work" dist
 if test ! -d "$root"; then
     mmdebstrap --mode=root --arch=arm64 --variant=extract --quiet --skip=check/qemu \
-        --include=python3,libpython3.11-dev,libvulkan-volk-dev,mesa-vulkan-drivers,libvulkan1,vulkan-validationlayers \
+        --include=python3,libpython3.11-dev,libvulkan-volk-dev,libvulkan-dev,mesa-vulkan-drivers,libvulkan1,vulkan-validationlayers \
         bookworm "$root.part" "deb $mirror bookworm main"
     mv "$root.part" "$root"
 fi

@@ -29,7 +29,7 @@ download() {
     rm -rf "$folder"
     python3 -m pip download --quiet --only-binary=:all: --python-version "$version" \
         --implementation cp --platform "manylinux2014_$machine" --platform "manylinux_2_28_$machine" \
-        --platform "manylinux_2_31_$machine" --platform "manylinux_2_36_$machine" \
+        --platform "manylinux_2_31_$machine" --platform "manylinux_2_35_$machine" \
         --dest "$folder" --find-links dist "$@" pip
 }
 
@@ -60,7 +60,7 @@ try_arm64() {
     export VK_DRIVER_FILES="$root/usr/share/vulkan/icd.d/lvp_icd.aarch64.json"
     export VKBLOOM_CACHE_DIR="$work/cache"
     arm() { PYTHONPATH="$root/srv/site" qemu-aarch64-static -L "$root" "$root/usr/bin/python3.11" "$@"; }
-    arm "$1/pip" install --quiet --no-index --find-links wheels --target site "vkbloom[images]" \
+    arm "$1/pip" install --quiet --root-user-action=ignore --no-index --find-links wheels --target site "vkbloom[images]" \
         ${driver:+vkbloom-lavapipe}
     arm "$work/lines.py" && arm "$work/check.py"
     cd - >/dev/null

@@ -10,25 +10,18 @@ calls=${1:-10000}
 tsan_calls=${2:-400}
 export PYTHONDONTWRITEBYTECODE=1
 
-# An environment NAME of a Python, with what the tests need and the wheel of the package.
-environment() {
-    test -d "$folder/$1-venv" || "$folder/$1/bin/python3.13t" -m venv --without-pip "$folder/$1-venv"
-    "$PYTHON" -m pip --python "$folder/$1-venv/bin/python" install --quiet --only-binary=:all: \
-        "numpy >= 2.2, < 2.5" pytest pytest-run-parallel hypothesis "setuptools >= 77" wheel
-}
-install() {
-    "$PYTHON" -m pip --python "$folder/$1-venv/bin/python" install --quiet --no-deps \
-        --force-reinstall "$folder"/dist/vkbloom-*.whl
-}
 test -x "$folder/plain/bin/python3.13t" || tools/free_threaded/python.sh "$folder/plain"
-environment plain
+test -d "$folder/venv" || "$folder/plain/bin/python3.13t" -m venv --without-pip "$folder/venv"
+"$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --only-binary=:all: \
+    "numpy >= 2.2, < 2.5" pytest hypothesis "setuptools >= 77" wheel
 rm -rf "$folder/dist"
-"$PYTHON" -m pip --python "$folder/plain-venv/bin/python" wheel --quiet --no-deps \
+"$PYTHON" -m pip --python "$folder/venv/bin/python" wheel --quiet --no-deps \
     --no-build-isolation --wheel-dir "$folder/dist" .
 ls "$folder/dist"
-install plain
-"$folder/plain-venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_free_threaded.py
-"$folder/plain-venv/bin/python" -m tests.core.all_calls "$calls"
+"$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --no-deps --force-reinstall \
+    "$folder"/dist/vkbloom-*.whl
+"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_free_threaded.py
+"$folder/venv/bin/python" -m tests.core.all_calls "$calls"
 test "$tsan_calls" != 0 || exit 0
 
 if test ! -x "$folder/tsan/bin/python3.13t"; then
@@ -36,16 +29,18 @@ if test ! -x "$folder/tsan/bin/python3.13t"; then
     cp -r "$folder/plain/source" "$folder/tsan/"
     CFLAGS="-O1 -g" tools/free_threaded/python.sh "$folder/tsan" --with-thread-sanitizer
 fi
-environment tsan
-install tsan
-# The core of the wheel is replaced by one that is built for the sanitizer.
+# The same packages, but for the core.
+site=$folder/venv/lib/python3.13t/site-packages
+rm -rf "$folder/tsan/package"
+mkdir -p "$folder/tsan/package"
+cp -r "$site/vkbloom" "$folder/tsan/package/"
+rm "$folder"/tsan/package/vkbloom/_core.*.so
 VKBLOOM_CFLAGS="-fsanitize=thread -fno-omit-frame-pointer -g -O1" VKBLOOM_LDFLAGS=-fsanitize=thread \
-    "$folder/plain-venv/bin/python" setup.py --quiet build_ext \
-    --build-temp "$folder/tsan/temp" --build-lib "$folder/tsan/lib"
-cp "$folder"/tsan/lib/vkbloom/_core.*.so \
-    "$folder"/tsan-venv/lib/python3.13t/site-packages/vkbloom/
+    "$folder/venv/bin/python" setup.py --quiet build_ext \
+    --build-temp "$folder/tsan/temp" --build-lib "$folder/tsan/package"
 cat tools/threads/threads.supp tools/free_threaded/tsan.supp \
     "$folder/tsan/source/Tools/tsan/suppressions_free_threading.txt" >"$folder/tsan.supp"
 env TSAN_OPTIONS="suppressions=$folder/tsan.supp:exitcode=66:history_size=4" \
-    "$folder/tsan-venv/bin/python" -m tests.core.all_calls "$tsan_calls"
+    PYTHONPATH="$folder/tsan/package:$site" \
+    "$folder/tsan/bin/python3.13t" -m tests.core.all_calls "$tsan_calls"
 echo "ThreadSanitizer found nothing"
