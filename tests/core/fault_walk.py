@@ -126,6 +126,16 @@ def handles(renderer: Renderer) -> Arrays:
     return arrays
 
 
+def gradients(renderer: Renderer) -> Arrays:
+    """Adjoint passes for an image, and sums for fields."""
+    image = picture(24, 16, seed=4)
+    settings = vkbloom.Pyramid(levels=2, threshold=0.3, knee=0.5)
+    frames, pullback = renderer.vjp(image, settings)
+    found = pullback({"final": np.ones(image.shape)})
+    names = ("image", "threshold", "intensity")
+    return {"final": frames["final"], **{name: found[name] for name in names}}
+
+
 def presented(renderer: Renderer) -> Arrays:
     """Frames on two surfaces; one changes its size, and is left to the renderer."""
     shown = []
@@ -226,6 +236,7 @@ WORK: dict[str, Work] = {
     "grid to Zarr": grid_to_zarr,
     "readback": readback,
     "handles": handles,
+    "gradients": gradients,
     "present": presented,
     "own passes": own_passes,
     **({"arrays on the device": on_device} if "STAND_IN_UUID" in os.environ else {}),

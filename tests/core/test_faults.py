@@ -68,7 +68,7 @@ def show(rows: dict[str, dict[str, Any]], capsys: pytest.CaptureFixture[str]) ->
 OTHERS = (
     *("create", "close", "render forward", "render deferred", "mask and emission", "glare"),
     *("batch", "grid", "grid in memory", "grid to Zarr", "readback", "handles"),
-    *("own passes", "arrays on the device"),
+    *("own passes", "arrays on the device", "gradients"),
 )
 
 
