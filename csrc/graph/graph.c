@@ -8,6 +8,9 @@ void vkb_graph_destroy(struct vkb_graph *graph)
     vkb_free(graph->passes);
     vkb_free(graph->owned[0]);
     vkb_free(graph->owned[1]);
+    for (uint32_t i = 0; i < graph->layered_count; ++i)
+        vkb_free((void *)graph->layered[i].shader.code);
+    vkb_free(graph->layered);
     *graph = (struct vkb_graph){0};
 }
 
@@ -95,6 +98,28 @@ size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
     return size + vkb_params_pack(pass->block, &pass->params, bytes + size);
 }
 
+// Whether passes use the image: a variant may leave out images of the method.
+static bool is_used(const struct vkb_graph *graph, uint32_t image)
+{
+    bool used = vkb_is_given(&graph->images[image]);
+
+    for (uint32_t i = 0; !used && i < graph->pass_count; ++i)
+        used = vkb_pass_writes(&graph->passes[i], image);
+    return used;
+}
+
+uint64_t vkb_graph_size(const struct vkb_graph *graph)
+{
+    uint64_t size = 0;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct vkb_image_row *row = &graph->images[i];
+        if (is_used(graph, i))
+            size += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
+    }
+    return size;
+}
+
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
 {
     if (a->image_count != b->image_count)
@@ -102,7 +127,7 @@ bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b)
     for (uint32_t i = 0; i < a->image_count; ++i) {
         const struct vkb_image_row *x = &a->images[i], *y = &b->images[i];
         if (x->format != y->format || x->width != y->width || x->height != y->height
-            || x->serial != y->serial || strcmp(x->name, y->name) != 0)
+            || x->layers != y->layers || x->serial != y->serial || strcmp(x->name, y->name) != 0)
             return false;
     }
     return true;

@@ -48,6 +48,7 @@ struct vkb_image_row {
     char name[VKB_NAME_SIZE];
     enum vkb_format format;
     uint32_t width, height;
+    uint32_t layers;    // of a batch (layers.h); 0: it is no array
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
@@ -135,12 +136,21 @@ struct vkb_pass_row {
     union vkb_params params;
 };
 
+// A shader for images with layers, and the one from which it was made.
+struct vkb_layered {
+    const struct vkb_shader *from;
+    struct vkb_shader shader;
+};
+
 struct vkb_graph {
     struct vkb_image_row *images;
     struct vkb_pass_row *passes;
     uint32_t image_count, pass_count;
     size_t image_capacity, pass_capacity;
     void *owned[2];  // pixels of images, freed with the graph
+    // Of a batch; 0 and NULL: of one image.
+    uint32_t layers, layered_count;
+    struct vkb_layered *layered;
 };
 
 void vkb_graph_destroy(struct vkb_graph *graph);
@@ -161,6 +171,9 @@ bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vk
 // Checks that both sides are 1 to max_side; `name` is used in the message.
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
                     struct vkb_error *error);
+
+// Bytes of all images that passes use, without layers.
+uint64_t vkb_graph_size(const struct vkb_graph *graph);
 
 // Whether both graphs have the same images in the same order; their passes may differ.
 bool vkb_graph_same_images(const struct vkb_graph *a, const struct vkb_graph *b);

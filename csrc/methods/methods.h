@@ -11,6 +11,7 @@ struct vkb_image_source {
     enum vkb_format format;
     struct vkb_size size;
     uint32_t channels;  // 3 or 4
+    uint32_t layers;    // of a batch; 0: it is one image
     bool has_emission, has_mask;
     // Images that another part of the graph has made.
     struct vkb_level {

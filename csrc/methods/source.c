@@ -66,6 +66,7 @@ static bool levels_fit(const struct vkb_image_source *planned, const struct vkb_
 static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
 {
     return planned->format == given->format && planned->channels == given->channels
+        && planned->layers == given->layers
         && planned->size.width == given->size.width && planned->size.height == given->size.height
         && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask
         && levels_fit(planned, given);

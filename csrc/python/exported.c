@@ -284,10 +284,11 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
     struct exported_object *self = exported_of(object);
     PyObject *shape;
     int code, bits, versioned;
+    Py_ssize_t offset = 0;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!iip:capsule", &PyTuple_Type, &shape, &code, &bits,
-                          &versioned))
+    if (!PyArg_ParseTuple(arguments, "O!iip|n:capsule", &PyTuple_Type, &shape, &code, &bits,
+                          &versioned, &offset))
         return NULL;
     struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
     if (!shared)
@@ -298,7 +299,7 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
     }
     shared->owner = Py_NewRef(object);
     const struct tensor tensor = {
-        .data = (void *)(uintptr_t)self->run->memory.address,
+        .data = (void *)(uintptr_t)(self->run->memory.address + (vkb_cuda_address)offset),
         .device = {DEVICE_CUDA, vkb_cuda_ordinal(self->exports->cuda)},
         .ndim = (int32_t)PyTuple_Size(shape),
         .dtype = {(uint8_t)code, (uint8_t)bits, 1},
@@ -353,31 +354,32 @@ static PyObject *copy_to(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
     unsigned long long address, after;
-    Py_ssize_t size;
+    Py_ssize_t size, offset = 0;
     struct vkb_error error = {0};
     bool done;
 
-    if (!PyArg_ParseTuple(arguments, "KnK:copy_to", &address, &size, &after)
-        || !reaches(self, 0, size))
+    if (!PyArg_ParseTuple(arguments, "KnK|n:copy_to", &address, &size, &after, &offset)
+        || !reaches(self, offset, size))
         return NULL;
     done = vkb_cuda_check(self->exports->cuda, "out", address, &error);
     if (done) {
         Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_copy(self->exports->cuda, address, self->run->memory.address, (size_t)size,
+        done = vkb_cuda_copy(self->exports->cuda, address,
+                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)size,
                              (void *)(uintptr_t)after, &error);
         Py_END_ALLOW_THREADS
     }
     return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
-static PyObject *clone_export(PyObject *object, PyObject *argument)
+static PyObject *clone_export(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
-    const Py_ssize_t size = PyLong_AsSsize_t(argument);
+    Py_ssize_t size, offset = 0;
     struct vkb_error error = {0};
     bool done;
 
-    if (PyErr_Occurred() || !reaches(self, 0, size))
+    if (!PyArg_ParseTuple(arguments, "n|n:clone", &size, &offset) || !reaches(self, offset, size))
         return NULL;
     struct exported_object *other = vkb_new_object((PyObject *)Py_TYPE(object));
     if (!other)
@@ -398,7 +400,8 @@ static PyObject *clone_export(PyObject *object, PyObject *argument)
         other->exports = self->exports;
         Py_BEGIN_ALLOW_THREADS
         done = vkb_cuda_copy(self->exports->cuda, other->run->memory.address,
-                             self->run->memory.address, (size_t)size, NULL, &error);
+                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)size,
+                             NULL, &error);
         Py_END_ALLOW_THREADS
     }
     if (done)
@@ -421,11 +424,13 @@ static PyObject *get_ordinal(PyObject *object, void *unused)
 
 static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
-     "capsule(shape, code, bits, versioned) -> a capsule of DLPack."},
+     "capsule(shape, code, bits, versioned, offset=0) -> a capsule of DLPack."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
-    {"clone", clone_export, METH_O, "clone(size) -> Exported. A copy of so many bytes."},
+    {"clone", clone_export, METH_VARARGS,
+     "clone(size, offset=0) -> Exported. A copy of so many bytes."},
     {"copy_to", copy_to, METH_VARARGS,
-     "copy_to(address, size, stream). To other memory of the GPU, after the stream's work."},
+     "copy_to(address, size, stream, offset=0). To other memory of the GPU, after the stream's "
+     "work."},
     {0},
 };
 

@@ -56,19 +56,20 @@ static struct vkb_input input_of(const Py_buffer *view, enum vkb_format format)
     };
 }
 
-// (Exported, offset, shape, strides, code)
+// (Exported, offset, shape, strides, code[, images of a batch, their stride])
 static bool read_exported(PyObject *tuple, struct vkb_held_image *image)
 {
     static VKB_ATOMIC(uint64_t) last_serial;
     struct vkb_input *input = &image->input;
     const struct vkb_exports *exports;
     PyObject *exported;
-    Py_ssize_t offset, row, pixel, channel;
+    Py_ssize_t offset, row, pixel, channel, layer = 0;
     int code;
 
-    if (!PyArg_ParseTuple(tuple, "On(O&O&O&)(nnn)C:image", &exported, &offset, vkb_read_uint32,
+    if (!PyArg_ParseTuple(tuple, "On(O&O&O&)(nnn)C|O&n:image", &exported, &offset, vkb_read_uint32,
                           &input->height, vkb_read_uint32, &input->width, vkb_read_uint32,
-                          &input->channels, &row, &pixel, &channel, &code))
+                          &input->channels, &row, &pixel, &channel, &code, vkb_read_uint32,
+                          &input->layers, &layer))
         return false;
     if (!vkb_is_exported(exported)) {
         PyErr_SetString(PyExc_TypeError, "image: an Exported is needed");
@@ -81,6 +82,7 @@ static bool read_exported(PyObject *tuple, struct vkb_held_image *image)
     input->row_stride = row;
     input->pixel_stride = pixel;
     input->channel_stride = channel;
+    input->layer_stride = layer;
     // Released as a view of host memory is.
     image->view = (Py_buffer){.obj = Py_NewRef(exported)};
     image->held = true;

@@ -54,7 +54,8 @@ struct vkb_pending {
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
     struct vkb_timing *timings;
-    uint32_t count;  // of the requests
+    struct vkb_specials *layer_specials;  // of a batch
+    uint32_t count;                       // of the requests
     size_t view_count;
     struct vkb_pending *next;
 };
@@ -251,6 +252,8 @@ struct vkb_plan_object {
 
 // Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
+// Of a batch: bytes from the output of an image to that of the next.
+size_t vkb_layer_stride(const struct vkb_plan *plan, uint32_t output);
 
 // Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);

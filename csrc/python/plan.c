@@ -2,6 +2,7 @@
 #include "python/module.h"
 
 #include "graph/dry_run.h"
+#include "graph/layers.h"
 #include "methods/adjoint.h"
 
 #include <string.h>
@@ -145,6 +146,14 @@ size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output)
          * vkb_formats[row->format].channel_size;
 }
 
+size_t vkb_layer_stride(const struct vkb_plan *plan, uint32_t output)
+{
+    // Consumers want aligned arrays.
+    enum { ALIGNMENT = 256 };
+
+    return (vkb_output_size(plan, output) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+}
+
 static PyObject *describe_outputs(const struct vkb_plan *plan)
 {
     PyObject *tuple = PyTuple_New(plan->output_count);
@@ -153,6 +162,15 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
         if (!vkb_set_item(tuple, i, describe_output(&plan->graph, plan->outputs[i])))
             Py_CLEAR(tuple);
     return tuple;
+}
+
+static bool layer_graph(const struct vkb_device *device, uint32_t layers, struct vkb_graph *graph,
+                        struct vkb_error *error)
+{
+    if (layers > device->limits.maxImageArrayLayers || device->words)
+        return vkb_fail(error, VKB_ERROR_VALUE, "batch: the device has no images of %u layers",
+                        layers);
+    return vkb_graph_layer(graph, layers, error);
 }
 
 // `portion` may be NULL.
@@ -170,7 +188,9 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
-        && vkb_image_cache_check(device, graph, error);
+        && vkb_image_cache_check(device, graph, error)
+        && (source->kind != VKB_SOURCE_IMAGE || !source->image.layers
+            || layer_graph(device, source->image.layers, graph, error));
 }
 
 // The kernel of a convolution for the source's sizes. The graph is built once before it is
@@ -432,6 +452,13 @@ static PyObject *get_size(PyObject *object, void *unused)
     return PyLong_FromSize_t(size);
 }
 
+static PyObject *get_image_size(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyLong_FromUnsignedLongLong(
+        vkb_graph_size(&((struct vkb_plan_object *)object)->plan.graph));
+}
+
 static PyObject *shares_images(PyObject *object, PyObject *other)
 {
     if (Py_TYPE(other) != Py_TYPE(object)) {
@@ -504,6 +531,7 @@ static PyGetSetDef attributes[] = {
      "access, target access, flags), ...)",
      NULL},
     {"size", get_size, NULL, "Bytes of all outputs.", NULL},
+    {"image_size", get_image_size, NULL, "Bytes of all images on the device.", NULL},
     {0},
 };
 

@@ -61,6 +61,8 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     const struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
     const Py_ssize_t count = PyTuple_Size(plans);
+    // All plans of a batch have the same layers.
+    const uint32_t layers = plan_at(plans, 0)->plan.graph.layers;
     size_t output_count = 0, pass_count = 0;
 
     if (!pending)
@@ -85,7 +87,9 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
     pending->timings = vkb_alloc(error, pass_count, sizeof *pending->timings);
-    if (pending->requests && pending->outputs && pending->views && pending->timings)
+    pending->layer_specials = vkb_alloc(error, layers, sizeof *pending->layer_specials);
+    if (pending->requests && pending->outputs && pending->views && pending->timings
+        && pending->layer_specials)
         return pending;
     vkb_pending_release(pending);
     return NULL;
@@ -102,8 +106,11 @@ static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pendin
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     const struct vkb_exports *exports;
     struct vkb_export *exported = vkb_export_of(array, &exports);
+    const uint32_t layers = plan->graph.layers;
+    const size_t stride = layers ? vkb_layer_stride(plan, output) : 0;
 
-    if (exports != renderer->exports || exported->size < vkb_output_size(plan, output)) {
+    if (exports != renderer->exports
+        || exported->size < (layers ? layers * stride : vkb_output_size(plan, output))) {
         PyErr_Format(PyExc_ValueError, "%s: the memory does not fit", row->name);
         return false;
     }
@@ -112,6 +119,7 @@ static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pendin
         .row_count = row->height,
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .exported = exported,
+        .layer_stride = stride,
     };
     return true;
 }
@@ -132,6 +140,10 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     Py_buffer *view = &pending->views[pending->view_count];
 
+    if (plan->graph.layers && !vkb_is_exported(array)) {
+        PyErr_Format(PyExc_TypeError, "%s: a batch stays on the device", row->name);
+        return false;
+    }
     if (array == Py_None) {
         // The view stays without an object.
         pending->outputs[pending->view_count++].row_count = row->height;
@@ -174,6 +186,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             .plan = plan,
             .outputs = pending->outputs + pending->view_count,
             .timings = pending->timings + passes,
+            .layer_specials = pending->layer_specials,
         };
         passes += plan->graph.pass_count;
         if (!vkb_require_tuple(tuple, "arrays"))
@@ -314,7 +327,22 @@ static PyObject *timing_dict(const struct vkb_request *request)
     return dict;
 }
 
-// ([timings, ...], (NaNs, infinities of the input))
+// The numbers of NaN and infinity in the input, of a batch image by image.
+static PyObject *describe_specials(const struct vkb_request *request)
+{
+    const uint32_t layers = request->plan->graph.layers, count = layers ? layers : 1;
+    PyObject *tuple = PyTuple_New(2 * (Py_ssize_t)count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i) {
+        const struct vkb_specials *own = layers ? &request->layer_specials[i] : &request->specials;
+        if (!vkb_set_item(tuple, 2 * (Py_ssize_t)i, PyLong_FromUnsignedLongLong(own->nan))
+            || !vkb_set_item(tuple, 2 * (Py_ssize_t)i + 1, PyLong_FromUnsignedLongLong(own->inf)))
+            Py_CLEAR(tuple);
+    }
+    return tuple;
+}
+
+// ([timings, ...], (NaNs, infinities of the input, ...))
 static PyObject *results(const struct vkb_pending *pending)
 {
     PyObject *list = PyList_New((Py_ssize_t)pending->count);
@@ -324,10 +352,7 @@ static PyObject *results(const struct vkb_pending *pending)
         if (!timings || PyList_SetItem(list, (Py_ssize_t)i, timings) < 0)
             Py_CLEAR(list);
     }
-    const struct vkb_specials *specials = &pending->requests[0].specials;
-    return list ? Py_BuildValue("(N(KK))", list, (unsigned long long)specials->nan,
-                                (unsigned long long)specials->inf)
-                : NULL;
+    return list ? Py_BuildValue("(NN)", list, describe_specials(&pending->requests[0])) : NULL;
 }
 
 static PyObject *refuse_to_wait(void)
@@ -403,7 +428,7 @@ static int clear(PyObject *object)
 
 static PyMethodDef methods[] = {
     {"wait", wait_for, METH_NOARGS,
-     "wait() -> ([timings, ...], (NaNs, infinities of the input)). Waits until the device has "
+     "wait() -> ([timings, ...], (NaNs, infinities of the input, ...)). Waits until the device has "
      "finished; then the arrays are filled."},
     {0},
 };

@@ -70,6 +70,7 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
                 .format = input->format,
                 .size = {input->width, input->height},
                 .channels = input->channels,
+                .layers = input->layers,
                 .has_emission = emission != Py_None,
                 .has_mask = mask != Py_None,
             },

@@ -36,16 +36,17 @@ struct span {
 
 static struct span span_of(const struct vkb_device *device, const struct vkb_input *input)
 {
-    const ptrdiff_t reaches[3] = {
+    const ptrdiff_t reaches[] = {
         input->row_stride * (ptrdiff_t)(input->height - 1),
         input->pixel_stride * (ptrdiff_t)(input->width - 1),
         input->channel_stride * (ptrdiff_t)(input->channels - 1),
+        input->layers ? input->layer_stride * (ptrdiff_t)(input->layers - 1) : 0,
     };
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
     ptrdiff_t first = (ptrdiff_t)input->offset,
               last = first + (ptrdiff_t)element_size(input->format);
 
-    for (int i = 0; i < 3; ++i) {
+    for (size_t i = 0; i < sizeof reaches / sizeof reaches[0]; ++i) {
         first += reaches[i] < 0 ? reaches[i] : 0;
         last += reaches[i] > 0 ? reaches[i] : 0;
     }
@@ -104,7 +105,7 @@ static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
     work.counts = (VkDescriptorBufferInfo){
         readback->counts.handle,
         (VkDeviceSize)run->counts_slot * VKB_COUNTS_SIZE,
-        VKB_COUNTS_SIZE,
+        VKB_COUNTS_SIZE * (work.layers ? work.layers : 1),
     };
     if (!work.to.buffer)
         work.to = work.counts;
@@ -126,7 +127,10 @@ static bool gather_input(struct vkb_run *run, const struct vkb_staged_input *sta
     const struct span span = span_of(run->device, input);
     const uint32_t size = (uint32_t)element_size(input->format);
     const struct vkb_gather_work work = {
-        .kind = dispatches(run->device) ? VKB_GATHER_TO_IMAGE : VKB_GATHER_BUFFER,
+        .kind = input->layers           ? VKB_GATHER_TO_LAYERS
+              : dispatches(run->device) ? VKB_GATHER_TO_IMAGE
+                                        : VKB_GATHER_BUFFER,
+        .layers = input->layers,
         .image = {.imageView = image->view,
                   .imageLayout = vkb_image_layout(image, VKB_ACCESS_DISPATCH_STORED)},
         .layout =
@@ -143,6 +147,7 @@ static bool gather_input(struct vkb_run *run, const struct vkb_staged_input *sta
                 .one = ones[size],
                 .stores = stores,
                 .is_float = is_float(input->format),
+                .layer_stride = (int32_t)input->layer_stride,
             },
         .from = {input->exported->buffer.handle, span.start, span.end - span.start},
         .to = {stores ? run->submission->readback.scratch.handle : VK_NULL_HANDLE, 0,
@@ -201,7 +206,7 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
 static bool gather_image(struct vkb_run *run, struct vkb_image *image, struct vkb_gather_work *work,
                          struct vkb_error *error)
 {
-    work->kind = VKB_GATHER_FROM_IMAGE;
+    work->kind = work->layers ? VKB_GATHER_FROM_LAYERS : VKB_GATHER_FROM_IMAGE;
     vkb_image_transition(run->device, run->submission->commands.buffer, image,
                          VKB_ACCESS_DISPATCH_SAMPLED);
     work->image.imageView = image->view;
@@ -231,7 +236,9 @@ bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
                 .from_channels = output->channels,
                 .size = size,
                 .stores = true,
+                .layer_stride = (int32_t)output->layer_stride,
             },
+        .layers = run->graph->layers,
         .from = {run->submission->readback.scratch.handle, 0, VK_WHOLE_SIZE},
         .to = {output->exported->buffer.handle, 0, VK_WHOLE_SIZE},
     };

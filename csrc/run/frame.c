@@ -74,7 +74,9 @@ static bool reserve_exported(struct vkb_run *run, const struct vkb_request *requ
                              uint32_t request_count, struct vkb_error *error)
 {
     struct vkb_readback *readback = &run->submission->readback;
-    const VkDeviceSize counts_size = (VkDeviceSize)request_count * VKB_COUNTS_SIZE;
+    const uint32_t layers = run->graph->layers;
+    const VkDeviceSize counts_size =
+        (VkDeviceSize)(layers ? layers : request_count) * VKB_COUNTS_SIZE;
     VkDeviceSize scratch = 0;
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
@@ -430,6 +432,10 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
         if (submission->readback.counted) {
             const uint32_t *counts = submission->readback.counts.mapped;
             vkb_add_specials(&request->specials, (struct vkb_specials){counts[0], counts[1]});
+            for (uint32_t layer = 0; layer < request->plan->graph.layers; ++layer) {
+                const uint32_t *own = counts + layer * (VKB_COUNTS_SIZE / sizeof *counts);
+                request->layer_specials[layer] = (struct vkb_specials){own[0], own[1]};
+            }
         }
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)
             request->timings[timing].seconds =

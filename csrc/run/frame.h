@@ -62,8 +62,9 @@ struct vkb_request {
     struct vkb_output *outputs;
     struct vkb_timing *timings;
     uint32_t timing_count;
-    uint32_t first_span;           // of its timings, in the submission's timer
-    struct vkb_specials specials;  // of the inputs; complete after the submission
+    uint32_t first_span;                  // of its timings, in the submission's timer
+    struct vkb_specials specials;         // of the inputs; complete after the submission
+    struct vkb_specials *layer_specials;  // of each image of a batch; NULL: it is none
 };
 
 // Records the passes that the requests' outputs need and that are out of date, request after

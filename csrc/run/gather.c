@@ -19,6 +19,10 @@ static const struct kind {
                              {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
     [VKB_GATHER_FROM_IMAGE] = {&vkb_shader_gather_from_image_comp,
                                {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
+    [VKB_GATHER_TO_LAYERS] = {&vkb_shader_gather_to_layers_comp,
+                              {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
+    [VKB_GATHER_FROM_LAYERS] = {&vkb_shader_gather_from_layers_comp,
+                                {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
 };
 
 static bool create_layouts(const struct vkb_device *device, const struct kind *kind,
@@ -144,7 +148,7 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
     const struct vkb_gather_layout *layout = &work->layout;
     const struct VolkDeviceTable *vk = &device->vk;
     const struct vkb_gather_pipeline *pipeline = &gather->pipelines[work->kind];
-    const bool by_pixel = work->kind == VKB_GATHER_TO_IMAGE;
+    const bool by_pixel = work->kind == VKB_GATHER_TO_IMAGE || work->kind == VKB_GATHER_TO_LAYERS;
     const uint32_t per_group = GROUP_SIZE * (by_pixel ? 1 : 4 / layout->size);
     const uint64_t count =
         (uint64_t)layout->width * layout->height * (by_pixel ? 1 : layout->channels);
@@ -168,6 +172,6 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
                                 &set, 0, NULL);
     vk->vkCmdPushConstants(commands, pipeline->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                            sizeof *layout, layout);
-    vk->vkCmdDispatch(commands, (groups + rows - 1) / rows, rows, 1);
+    vk->vkCmdDispatch(commands, (groups + rows - 1) / rows, rows, work->layers ? work->layers : 1);
     return true;
 }

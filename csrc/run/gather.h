@@ -9,6 +9,8 @@ enum vkb_gather_kind {
     VKB_GATHER_BUFFER,
     VKB_GATHER_TO_IMAGE,
     VKB_GATHER_FROM_IMAGE,
+    VKB_GATHER_TO_LAYERS,
+    VKB_GATHER_FROM_LAYERS,
     VKB_GATHER_COUNT,
 };
 
@@ -31,6 +33,7 @@ struct vkb_gather_layout {
     int32_t offset, row_stride, pixel_stride, channel_stride;
     uint32_t width, height, channels, from_channels;
     uint32_t size, one, stores, is_float;
+    int32_t layer_stride;  // in the buffer
 };
 
 // By its kind, `image` stands in place of `from` or `to`.
@@ -39,9 +42,10 @@ struct vkb_gather_work {
     struct vkb_gather_layout layout;
     VkDescriptorBufferInfo from, to, counts;
     VkDescriptorImageInfo image;
+    uint32_t layers;  // 0: it is one image
 };
 
-// Bytes from the counts of one request to those of the next.
+// Bytes from the counts of one image to those of the next.
 enum { VKB_COUNTS_SIZE = 256 };
 
 bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather *gather,

@@ -59,7 +59,8 @@ static void destroy_image(const struct vkb_device *device, struct vkb_image_cach
 
 static uint64_t image_size(const struct vkb_image *image)
 {
-    return image->handle ? (uint64_t)image->width * image->height * vkb_pixel_size(image->format)
+    return image->handle ? (uint64_t)image->width * image->height * image->layers
+                               * vkb_pixel_size(image->format)
                          : 0;
 }
 
@@ -147,30 +148,17 @@ static bool check_dispatches(const struct vkb_device *device, const struct vkb_g
     return true;
 }
 
-// Whether passes use the image: a variant may leave out images of the method.
-static bool is_used(const struct vkb_graph *graph, uint32_t image)
-{
-    bool used = vkb_is_given(&graph->images[image]);
-
-    for (uint32_t i = 0; !used && i < graph->pass_count; ++i)
-        used = vkb_pass_writes(&graph->passes[i], image);
-    return used;
-}
-
 // The images of a convolution, which are many times larger than the frame, must fit the largest
 // heap of the device together.
 static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
                          struct vkb_error *error)
 {
-    uint64_t needed = 0, largest = 0;
+    const uint64_t needed = vkb_graph_size(graph);
+    uint64_t largest = 0;
     bool convolves = false;
 
-    for (uint32_t i = 0; i < graph->image_count; ++i) {
-        const struct vkb_image_row *row = &graph->images[i];
-        convolves = convolves || row->serial;
-        if (is_used(graph, i))
-            needed += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
-    }
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        convolves = convolves || graph->images[i].serial;
     for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
         if (device->memory.memoryHeaps[i].size > largest)
             largest = device->memory.memoryHeaps[i].size;
@@ -201,42 +189,48 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .format = row->format,
                                 .width = row->width,
                                 .height = row->height,
-                                .layers = 1,
+                                .layers = row->layers ? row->layers : 1,
                                 .levels = 1,
+                                .array = row->layers > 0,
                                 .usage = image_usage(row->format),
                                 .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);
 }
 
-static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache, const char *name)
+static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache,
+                                            const struct vkb_image_row *row)
 {
     for (size_t i = 0; i < cache->count; ++i)
-        if (strcmp(cache->images[i]->name, name) == 0)
+        if (cache->images[i]->array == (row->layers > 0)
+            && strcmp(cache->images[i]->name, row->name) == 0)
             return cache->images[i];
     return NULL;
 }
 
-static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache, const char *name,
-                                           struct vkb_error *error)
+static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache,
+                                           const struct vkb_image_row *row, struct vkb_error *error)
 {
     struct vkb_cached_image *cached =
         vkb_append(error, &cache->images, &cache->count, &cache->capacity, sizeof *cached);
 
-    if (cached)
-        memcpy(cached->name, name, sizeof cached->name);
+    if (cached) {
+        memcpy(cached->name, row->name, sizeof cached->name);
+        cached->array = row->layers > 0;
+    }
     return cached;
 }
 
 bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
 {
     return image->handle && image->format == row->format && image->width == row->width
-        && image->height == row->height;
+        && image->height == row->height && image->layers == (row->layers ? row->layers : 1)
+        && image->array == (row->layers > 0);
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
 {
-    const struct vkb_cached_image *cached = find_cached(cache, row->name);
+    const struct vkb_cached_image *cached = find_cached(cache, row);
 
     return cached && cached->image.handle && !vkb_image_fits(&cached->image, row);
 }
@@ -244,7 +238,7 @@ bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct 
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row)
 {
-    struct vkb_cached_image *cached = find_cached(cache, row->name);
+    struct vkb_cached_image *cached = find_cached(cache, row);
 
     return cached && vkb_image_fits(&cached->image, row) ? cached : NULL;
 }
@@ -253,9 +247,9 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
                              const struct vkb_image_row *row, struct vkb_cached_image **resolved,
                              struct vkb_error *error)
 {
-    struct vkb_cached_image *cached = find_cached(cache, row->name);
+    struct vkb_cached_image *cached = find_cached(cache, row);
 
-    if (!cached && !(cached = add_cached(cache, row->name, error)))
+    if (!cached && !(cached = add_cached(cache, row, error)))
         return false;
     *resolved = cached;
     cached->used = cache->now;

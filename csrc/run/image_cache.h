@@ -10,6 +10,7 @@
 
 struct vkb_cached_image {
     char name[VKB_NAME_SIZE];
+    bool array;  // the images of batches are other ones
     struct vkb_image image;
     uint64_t image_id;  // new each time that the image is created
     uint64_t used;      // the last submission that used it

@@ -28,6 +28,7 @@ struct vkb_output {
     uint32_t first_row, row_count;  // of the image
     void *memory;                   // NULL: it stays on the device
     struct vkb_export *exported;    // instead of host memory; NULL: none
+    size_t layer_stride;            // there, of a batch
     struct vkb_page_run *pages;  // the run that contains the memory; NULL: none, or a small array
     // Set by vkb_readback_plan.
     enum vkb_format format;

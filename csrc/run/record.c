@@ -209,7 +209,8 @@ static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass,
 
     run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
                                   pass->groups_width ? pass->groups_width : width,
-                                  pass->groups_height ? pass->groups_height : height, 1);
+                                  pass->groups_height ? pass->groups_height : height,
+                                  run->graph->layers ? run->graph->layers : 1);
 }
 
 // The most rows that one storage buffer descriptor can cover. They are a multiple of the block's

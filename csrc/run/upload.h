@@ -20,6 +20,9 @@ struct vkb_input {
     ptrdiff_t row_stride, pixel_stride, channel_stride;
     enum vkb_format format;
     uint32_t width, height, channels;
+    // Of a batch, which only exported memory can hold; 0: it is one image.
+    uint32_t layers;
+    ptrdiff_t layer_stride;
 };
 
 static inline const unsigned char *vkb_input_row(const struct vkb_input *input, uint32_t y)

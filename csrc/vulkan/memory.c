@@ -257,23 +257,24 @@ static VkImageLayout initial_layout(bool mapped)
 static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
                           struct vkb_image *image, struct vkb_error *error)
 {
-    return VK(error,
-              device->vk.vkCreateImage(
-                  device->handle,
-                  &(VkImageCreateInfo){
-                      .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                      .flags = spec->layers == 6 ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
-                      .imageType = VK_IMAGE_TYPE_2D,
-                      .format = vkb_formats[spec->format].vk,
-                      .extent = {spec->width, spec->height, 1},
-                      .mipLevels = spec->levels,
-                      .arrayLayers = spec->layers,
-                      .samples = VK_SAMPLE_COUNT_1_BIT,
-                      .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
-                      .usage = spec->usage,
-                      .initialLayout = initial_layout(spec->mapped),
-                  },
-                  NULL, &image->handle));
+    return VK(error, device->vk.vkCreateImage(device->handle,
+                                              &(VkImageCreateInfo){
+                                                  .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                                                  .flags = spec->layers == 6 && !spec->array
+                                                             ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT
+                                                             : 0,
+                                                  .imageType = VK_IMAGE_TYPE_2D,
+                                                  .format = vkb_formats[spec->format].vk,
+                                                  .extent = {spec->width, spec->height, 1},
+                                                  .mipLevels = spec->levels,
+                                                  .arrayLayers = spec->layers,
+                                                  .samples = VK_SAMPLE_COUNT_1_BIT,
+                                                  .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR
+                                                                         : VK_IMAGE_TILING_OPTIMAL,
+                                                  .usage = spec->usage,
+                                                  .initialLayout = initial_layout(spec->mapped),
+                                              },
+                                              NULL, &image->handle));
 }
 
 static VkImageSubresourceRange levels_of_image(const struct vkb_image *image, uint32_t levels)
@@ -293,7 +294,8 @@ static bool create_view(const struct vkb_device *device, const struct vkb_image 
                          &(VkImageViewCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
                              .image = image->handle,
-                             .viewType = image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
+                             .viewType = image->array       ? VK_IMAGE_VIEW_TYPE_2D_ARRAY
+                                       : image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
                                                             : VK_IMAGE_VIEW_TYPE_2D,
                              .format = vkb_formats[image->format].vk,
                              .subresourceRange = levels_of_image(image, levels),
@@ -444,6 +446,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .height = spec->height,
         .layers = spec->layers,
         .levels = spec->levels,
+        .array = spec->array,
         .channels = vkb_formats[spec->format].channels,
     };
     if (!create_handle(device, spec, image, error))
@@ -454,7 +457,8 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                                 &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || (spec->layers == 1 && !create_view(device, image, spec->levels, &image->view, error))) {
+        || ((spec->layers == 1 || spec->array)
+            && !create_view(device, image, spec->levels, &image->view, error))) {
         vkb_image_destroy(device, image);
         return false;
     }

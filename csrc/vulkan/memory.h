@@ -30,6 +30,7 @@ struct vkb_image {
     VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
     enum vkb_format format;
     uint32_t width, height, layers, levels;
+    bool array;              // its view is of an array, also of six layers
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
@@ -39,13 +40,13 @@ struct vkb_image {
     VkBufferView words;  // created at its first use
 };
 
-// Six layers make a cubemap. A mapped image has one layer and one level, and its memory is also a
-// buffer; this requires device->words.
+// Six layers make a cubemap, unless it is an array. A mapped image has one layer and one level, and
+// its memory is also a buffer; this requires device->words.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;
     VkImageUsageFlags usage;
-    bool mapped;
+    bool mapped, array;
 };
 
 // Advises the system to use large pages for memory that has not been written yet.

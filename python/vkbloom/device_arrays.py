@@ -62,9 +62,14 @@ class DeviceArray:
     """
 
     def __init__(
-        self, memory: _core.Exported | NDArray[Any], shape: tuple[int, ...], dtype: str
+        self,
+        memory: _core.Exported | NDArray[Any],
+        shape: tuple[int, ...],
+        dtype: str,
+        offset: int = 0,
     ) -> None:
         self._memory = memory
+        self._offset = offset  # in the memory of a batch
         self.shape = tuple(shape)
         self.dtype = np.dtype(dtype)
 
@@ -120,7 +125,7 @@ class DeviceArray:
         if isinstance(self._memory, np.ndarray):
             return self._memory.copy()
         array = np.empty(self.shape, self.dtype)
-        self._memory.read(array, 0)
+        self._memory.read(array, self._offset)
         return array
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -166,13 +171,17 @@ class DeviceArray:
             raise TypeError(f"stream: {stream!r} is not a number")
         if stream == 0:
             raise ValueError("stream: 0 is ambiguous; 1 is CUDA's default stream, 2 a thread's")
-        memory = self._memory
+        memory, offset = self._memory, self._offset
         assert not isinstance(memory, np.ndarray)
         if copy:
-            memory = memory.clone(self.nbytes)
+            memory, offset = memory.clone(self.nbytes, offset), 0
         versioned_capsule = max_version is not None and max_version[0] >= 1
         return memory.capsule(
-            self.shape, _CODES[self.dtype.name], 8 * self.dtype.itemsize, versioned_capsule
+            self.shape,
+            _CODES[self.dtype.name],
+            8 * self.dtype.itemsize,
+            versioned_capsule,
+            offset,
         )
 
     @property
@@ -183,7 +192,7 @@ class DeviceArray:
         return {
             "shape": self.shape,
             "typestr": self.dtype.str,
-            "data": (self._memory.address, False),
+            "data": (self._memory.address + self._offset, False),
             "strides": None,
             # Complete: no stream has to wait.
             "stream": None,
@@ -244,6 +253,10 @@ class Taken(NamedTuple):
         if index is not None:
             offset, shape, strides = offset + index * strides[0], shape[1:], strides[1:]
         return self.memory, offset, shape, strides, _FORMATS[self.dtype]
+
+    def layers(self, first: int, count: int) -> Any:
+        """Return images of a batch from `first` on, as the core reads them together."""
+        return *self.image(first), count, self.strides[0]
 
     def numpy(self) -> NDArray[Any]:
         """Return the array in the host's memory."""
@@ -353,7 +366,7 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")
-    made._memory.copy_to(array.address, made.nbytes, array.stream)
+    made._memory.copy_to(array.address, made.nbytes, array.stream, made._offset)
 
 
 def take(image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (3,)) -> Taken:

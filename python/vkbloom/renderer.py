@@ -16,13 +16,21 @@ import numpy as np
 from vkbloom import _core, requests
 from vkbloom.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom.argument_types import checked
+from vkbloom.batches import Batches
 from vkbloom.checks import check_attachments, check_size
 from vkbloom.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
 from vkbloom.frames import Frames
 from vkbloom.image import Image
 from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings, check_shading
-from vkbloom.sources import batch_sources, image_kind, image_source, is_image, scene_source
+from vkbloom.sources import (
+    batch_sources,
+    image_kind,
+    image_source,
+    is_image,
+    scene_source,
+    take_batch,
+)
 from vkbloom.suggestions import unknown
 from vkbloom.version import installed_version
 
@@ -118,7 +126,7 @@ def _arrays_for(
 def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Source]:
     """Yield the Source of each image; a batch on the device is copied at once."""
     if on_cuda(images):
-        yield from batch_sources(images, core)
+        yield from batch_sources(take_batch(images, core))
         return
     # Not by enumerate(), which keeps a reference to the image.
     places = itertools.count()
@@ -250,6 +258,7 @@ class Renderer:
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
         self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
+        self._batches = Batches(self._core)
         self._kept: KeptArrays | None = shared()
 
     @property
@@ -711,9 +720,12 @@ class Renderer:
             raise ValueError("the renderer is closed")
         chosen = settings or check_settings(None, of_image=True)
         self._check_names(image_source(_ANY_IMAGE), chosen, names)
-        sources = _sources(images, self._core)
-        work = requests.uploaded(self._core, _paired(sources, chosen))
-        results = requests.run(work, self._core, names, alone=True, place=self._placed(device))
+        place = self._placed(device)
+        if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
+            results = self._run_batch(images, chosen, names, place)
+        else:
+            work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+            results = requests.run(work, self._core, names, alone=True, place=place)
         return (self._frames_of(one, result) for one, result in results)
 
     @checked
@@ -1060,7 +1072,22 @@ class Renderer:
         for name, target in (out or {}).items():
             if on_cuda(target):
                 fill(target, f"out: {name}", cast("DeviceArray", frames[name]), self._core)
-        return self._finished(frames, timings, counts)
+        return self._finished(frames, timings, (counts[0], counts[1]))
+
+    def _run_batch(
+        self,
+        images: Any,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+        place: Callable[[_core.Source], requests.Place],
+    ) -> Iterator[tuple[Settings, requests.Result]]:
+        batch = take_batch(images, self._core)
+
+        def rest(first: int) -> Iterator[tuple[Settings, requests.Result]]:
+            work = _paired(batch_sources(batch, first), settings)
+            return requests.run(work, self._core, names, alone=True, place=place)
+
+        yield from self._batches.run(batch, settings, names, rest)
 
     def _placed(self, device: Device | None) -> Callable[[_core.Source], requests.Place]:
         """Return where the framebuffers of a source go."""

@@ -294,7 +294,7 @@ def run(
             requests.reverse()
             timings.reverse()
             while requests:
-                yield _taken(requests.pop(), timings.pop(), counts)
+                yield _taken(requests.pop(), timings.pop(), (counts[0], counts[1]))
             ahead = IMAGES_AHEAD if alone else AHEAD
     finally:
         # Waits here for submissions whose results nobody takes, not at the next garbage

@@ -27,6 +27,7 @@ __all__ = [
     "is_image",
     "scene_arguments",
     "scene_source",
+    "take_batch",
 ]
 
 
@@ -78,10 +79,14 @@ def _device_source(
     return _core.image_source(arrays[0], arrays[1], mask)
 
 
-def batch_sources(images: Any, core: _core.Renderer) -> Iterator[_core.Source]:
-    """Yield the Source of each image of a batch on the device, which is copied at once."""
-    batch = take(images, "images", core, (4,))
-    for index in range(batch.shape[0]):
+def take_batch(images: Any, core: _core.Renderer) -> Taken:
+    """Copy a batch on the device at once."""
+    return take(images, "images", core, (4,))
+
+
+def batch_sources(batch: Taken, first: int = 0) -> Iterator[_core.Source]:
+    """Yield the Source of each image of a batch on the device, from `first` on."""
+    for index in range(first, batch.shape[0]):
         yield _core.image_source(batch.image(index))
 
 

@@ -1,10 +1,21 @@
 // Elements from one layout to another, and how many of them are NaN or infinite. By default from a
-// buffer with any strides to a dense buffer; with TO_IMAGE to an image, with FROM_IMAGE from one.
+// buffer with any strides to a dense buffer; with TO_IMAGE to an image, with FROM_IMAGE from one. With
+// LAYERS for each image of a batch, whose number is that of the workgroup along z.
 
 layout(local_size_x = 128) in;
 
+#ifdef LAYERS
+#define SAMPLED sampler2DArray
+#define STORED image2DArray
+#define AT(place) ivec3(place, gl_WorkGroupID.z)
+#else
+#define SAMPLED sampler2D
+#define STORED image2D
+#define AT(place) (place)
+#endif
+
 #ifdef FROM_IMAGE
-layout(binding = 0) uniform sampler2D from_image;
+layout(binding = 0) uniform SAMPLED from_image;
 #else
 layout(std430, binding = 0) readonly buffer From
 {
@@ -13,7 +24,7 @@ layout(std430, binding = 0) readonly buffer From
 #endif
 
 #ifdef TO_IMAGE
-layout(binding = 1) uniform writeonly image2D to_image;
+layout(binding = 1) uniform writeonly STORED to_image;
 #else
 layout(std430, binding = 1) writeonly buffer To
 {
@@ -23,7 +34,7 @@ layout(std430, binding = 1) writeonly buffer To
 
 layout(std430, binding = 2) buffer Counts
 {
-    uint counts[2];  // NaN, infinity
+    uint counts[];  // NaN, infinity
 };
 
 // struct vkb_gather_layout; offsets and strides in bytes.
@@ -36,6 +47,7 @@ layout(push_constant) uniform Layout
     uint one;       // the element of a channel that is not there
     uint stores;    // 0: elements are only counted
     uint is_float;
+    int layer_stride;
 } layout_;
 
 shared uint sums[2];
@@ -44,7 +56,7 @@ shared uint sums[2];
 uint element(uint pixel, uint channel)
 {
     ivec2 place = ivec2(pixel % layout_.width, pixel / layout_.width);
-    float value = texelFetch(from_image, place, 0)[channel];
+    float value = texelFetch(from_image, AT(place), 0)[channel];
     return layout_.size == 4 ? floatBitsToUint(value)
          : layout_.size == 2 ? packHalf2x16(vec2(value, 0))
                              : uint(value * 255.0 + 0.5);
@@ -55,13 +67,16 @@ uint element(uint pixel, uint channel)
     if (channel >= layout_.from_channels)
         return layout_.one;
     int y = int(pixel / layout_.width), x = int(pixel % layout_.width);
-    uint place = uint(layout_.offset + y * layout_.row_stride + x * layout_.pixel_stride
+    uint place = uint(layout_.offset + int(gl_WorkGroupID.z) * layout_.layer_stride
+                      + y * layout_.row_stride + x * layout_.pixel_stride
                       + int(channel) * layout_.channel_stride);
     uint word = from_words[place >> 2];
     return layout_.size == 4 ? word
          : (word >> (8 * (place & 3))) & (layout_.size == 2 ? 0xffffu : 0xffu);
 }
 #endif
+
+const uint COUNTS_WORDS = 64;  // VKB_COUNTS_SIZE
 
 // What one invocation moves, and its number.
 uint invocation = gl_GlobalInvocationID.x
@@ -97,7 +112,8 @@ void move()
         colour[channel] = number(value);
     }
     if (layout_.stores != 0)
-        imageStore(to_image, ivec2(invocation % layout_.width, invocation / layout_.width), colour);
+        imageStore(to_image, AT(ivec2(invocation % layout_.width, invocation / layout_.width)),
+                   colour);
 }
 #else
 void move()
@@ -114,7 +130,7 @@ void move()
         }
     }
     if (layout_.stores != 0 && invocation * per_word < total)
-        to_words[invocation] = packed;
+        to_words[invocation + gl_WorkGroupID.z * (uint(layout_.layer_stride) >> 2)] = packed;
 }
 #endif
 
@@ -132,7 +148,7 @@ void main()
     }
     barrier();
     if (gl_LocalInvocationIndex == 0 && sums[0] + sums[1] > 0) {
-        atomicAdd(counts[0], sums[0]);
-        atomicAdd(counts[1], sums[1]);
+        atomicAdd(counts[COUNTS_WORDS * gl_WorkGroupID.z], sums[0]);
+        atomicAdd(counts[COUNTS_WORDS * gl_WorkGroupID.z + 1], sums[1]);
     }
 }
