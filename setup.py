@@ -41,7 +41,6 @@ ONE_FUNCTION = f"""
     --wrap-opkill --eliminate-dead-branches --merge-return --inline-entry-points-exhaustive
     --eliminate-dead-functions --private-to-local {SPLIT} --ccp --eliminate-dead-code-aggressive
 """.split()
-UNROLL = ["--loop-unroll"]
 SIMPLER = f"""
     --eliminate-dead-branches --redundancy-elimination --combine-access-chains
     --simplify-instructions {SPLIT} --vector-dce --eliminate-dead-inserts
@@ -49,9 +48,8 @@ SIMPLER = f"""
     --reduce-load-size --eliminate-dead-code-aggressive --merge-blocks --redundancy-elimination
     --eliminate-dead-branches --merge-blocks --simplify-instructions
 """.split()
-# Unrolled, a module of many filters becomes some times as large, of which its constants leave
-# little. Then its loops stay.
-MOST_GROWTH = 4
+# Larger modules keep their loops: those of many filters, of which their constants leave little.
+MOST_UNROLLED = 260_000
 
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
@@ -174,14 +172,13 @@ def build_module(module: Module, target: Path) -> None:
     """Write a module to a file, as the package contains it."""
     compile_shader(module, target)
     decorate(target)
-    compiled = target.read_bytes()
-    for unrolled in (UNROLL, []):
-        target.write_bytes(compiled)
-        optimize(module, target, ONE_FUNCTION + unrolled)
-        decorate(target)
-        optimize(module, target, SIMPLER)
-        if target.stat().st_size < MOST_GROWTH * len(compiled):
-            return
+    optimize(module, target, ONE_FUNCTION)
+    rolled = target.read_bytes()
+    optimize(module, target, ["--loop-unroll"])
+    if target.stat().st_size > MOST_UNROLLED:
+        target.write_bytes(rolled)
+    decorate(target)
+    optimize(module, target, SIMPLER)
 
 
 def compile_module(module: Module) -> tuple[int, ...]:
