@@ -1,95 +1,8 @@
 #include "graph/specialize.h"
 
+#include "graph/spirv.h"
+
 #include <string.h>
-
-// SPIR-V 1.3: a header of five words, then instructions. The first word of an instruction is its
-// number of words and its opcode.
-enum {
-    MAGIC = 0x07230203,
-    HEADER_WORDS = 5,
-    BOUND = 3,
-    SPEC_ID = 1,
-    GLSL_MODF = 35,
-    GLSL_FREXP = 51
-};
-
-enum opcode {
-    OP_SOURCE_CONTINUED = 2,
-    OP_LINE = 8,
-    OP_EXT_INST = 12,
-    OP_ENTRY_POINT = 15,
-    OP_TYPE_VOID = 19,
-    OP_TYPE_BOOL,
-    OP_TYPE_INT,
-    OP_TYPE_FORWARD_POINTER = 39,
-    OP_CONSTANT_TRUE = 41,
-    OP_CONSTANT_FALSE,
-    OP_CONSTANT,
-    OP_SPEC_CONSTANT_TRUE = 48,
-    OP_SPEC_CONSTANT_FALSE,
-    OP_SPEC_CONSTANT,
-    OP_SPEC_CONSTANT_OP = 52,
-    OP_FUNCTION = 54,
-    OP_FUNCTION_END = 56,
-    OP_FUNCTION_CALL,
-    OP_VARIABLE = 59,
-    OP_LOAD = 61,
-    OP_ACCESS_CHAIN = 65,
-    OP_IN_BOUNDS_ACCESS_CHAIN,
-    OP_DECORATE = 71,
-    OP_VECTOR_EXTRACT_DYNAMIC = 77,
-    OP_IMAGE_READ = 98,
-    OP_IMAGE = 100,
-    OP_IMAGE_QUERY_SAMPLES = 107,
-    OP_CONVERT_F_TO_U = 109,
-    OP_BITCAST = 124,
-    OP_S_NEGATE = 126,
-    OP_I_ADD = 128,
-    OP_I_SUB = 130,
-    OP_I_MUL = 132,
-    OP_U_DIV = 134,
-    OP_S_DIV,
-    OP_U_MOD = 137,
-    OP_S_REM,
-    OP_S_MOD,
-    OP_LOGICAL_EQUAL = 164,
-    OP_LOGICAL_NOT_EQUAL,
-    OP_LOGICAL_OR,
-    OP_LOGICAL_AND,
-    OP_LOGICAL_NOT,
-    OP_SELECT,
-    OP_I_EQUAL,
-    OP_I_NOT_EQUAL,
-    OP_U_GREATER,
-    OP_S_GREATER,
-    OP_U_GREATER_EQUAL,
-    OP_S_GREATER_EQUAL,
-    OP_U_LESS,
-    OP_S_LESS,
-    OP_U_LESS_EQUAL,
-    OP_S_LESS_EQUAL,
-    OP_SHIFT_RIGHT_LOGICAL = 194,
-    OP_SHIFT_LEFT_LOGICAL = 196,
-    OP_BITWISE_OR,
-    OP_BITWISE_XOR,
-    OP_BITWISE_AND,
-    OP_NOT,
-    OP_FWIDTH_COARSE = 215,
-    OP_ATOMIC_LOAD = 227,
-    OP_ATOMIC_STORE,
-    OP_ATOMIC_XOR = 242,
-    OP_PHI = 245,
-    OP_LOOP_MERGE,
-    OP_SELECTION_MERGE,
-    OP_LABEL,
-    OP_BRANCH,
-    OP_BRANCH_CONDITIONAL,
-    OP_SWITCH,
-    OP_UNREACHABLE = 255,
-    OP_NO_LINE = 317,
-    OP_MODULE_PROCESSED = 330,
-    OP_TERMINATE_INVOCATION = 4416,
-};
 
 // A block that nothing reaches has to stay where a header names it.
 enum role { NO_ROLE, MERGE_BLOCK, CONTINUE_BLOCK };
@@ -116,68 +29,13 @@ struct module {
     size_t stack_count;
 };
 
-static uint32_t opcode(const uint32_t *at)
-{
-    return at[0] & 0xffff;
-}
-
-static uint32_t word_count(const uint32_t *at)
-{
-    return at[0] >> 16;
-}
-
-static const uint32_t *next(const uint32_t *at)
-{
-    return at + word_count(at);
-}
-
-static bool is_debug(const uint32_t *at)
-{
-    const uint32_t code = opcode(at);
-
-    return (code >= OP_SOURCE_CONTINUED && code <= OP_LINE) || code == OP_NO_LINE
-        || code == OP_MODULE_PROCESSED;
-}
-
-static bool ends_block(const uint32_t *at)
-{
-    return (opcode(at) >= OP_BRANCH && opcode(at) <= OP_UNREACHABLE)
-        || opcode(at) == OP_TERMINATE_INVOCATION;
-}
-
-// Whether an instruction without uses has no effect.
-static bool is_pure(const uint32_t *at)
-{
-    const uint32_t code = opcode(at);
-
-    return code == OP_PHI || code == OP_LOAD || code == OP_ACCESS_CHAIN
-        || code == OP_IN_BOUNDS_ACCESS_CHAIN
-        || (code == OP_EXT_INST && at[4] != GLSL_MODF && at[4] != GLSL_FREXP)
-        || (code >= OP_VECTOR_EXTRACT_DYNAMIC && code <= OP_IMAGE_READ)
-        || (code >= OP_IMAGE && code <= OP_IMAGE_QUERY_SAMPLES)
-        || (code >= OP_CONVERT_F_TO_U && code <= OP_FWIDTH_COARSE);
-}
-
-// The result of an instruction, as far as it matters here; 0: none.
-static uint32_t result(const uint32_t *at)
-{
-    const uint32_t code = opcode(at);
-
-    if (code == OP_LABEL || (code >= OP_TYPE_VOID && code < OP_TYPE_FORWARD_POINTER))
-        return at[1];
-    return is_pure(at) || (code >= OP_CONSTANT_TRUE && code <= OP_SPEC_CONSTANT_OP)
-                || (code >= OP_FUNCTION && code <= OP_VARIABLE && code != OP_FUNCTION_END)
-                || (code >= OP_ATOMIC_LOAD && code <= OP_ATOMIC_XOR && code != OP_ATOMIC_STORE)
-             ? at[2]
-             : 0;
-}
-
 // Whether values of a type can be known.
 static bool is_word(const struct module *module, uint32_t type)
 {
     const uint32_t *at = module->ids[type].at;
 
-    return at && (opcode(at) == OP_TYPE_BOOL || (opcode(at) == OP_TYPE_INT && at[2] == 32));
+    return at
+        && (vkb_opcode(at) == SPV_TYPE_BOOL || (vkb_opcode(at) == SPV_TYPE_INT && at[2] == 32));
 }
 
 // Notes where each id is defined. Fails if an instruction or an id is outside.
@@ -185,122 +43,30 @@ static bool read_module(struct module *module)
 {
     uint32_t block = 0, function = 0;
 
-    for (const uint32_t *at = module->words + HEADER_WORDS; at < module->end; at = next(at)) {
-        if (word_count(at) == 0 || word_count(at) > (size_t)(module->end - at)
-            || result(at) >= module->bound)
+    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->end;
+         at = vkb_next(at)) {
+        if (vkb_word_count(at) == 0 || vkb_word_count(at) > (size_t)(module->end - at)
+            || vkb_result(at) >= module->bound)
             return false;
-        struct id *id = &module->ids[result(at)];
-        if (opcode(at) == OP_FUNCTION) {
+        struct id *id = &module->ids[vkb_result(at)];
+        if (vkb_opcode(at) == SPV_FUNCTION) {
             function = at[2];
             module->functions = module->functions ? module->functions : at;
-        } else if (opcode(at) == OP_LABEL) {
+        } else if (vkb_opcode(at) == SPV_LABEL) {
             block = at[1];
             if (!module->ids[function].block)
                 module->ids[function].block = block;
         }
-        if (result(at)) {
+        if (vkb_result(at)) {
             id->at = at;
-            id->block = opcode(at) == OP_FUNCTION ? 0 : block;
+            id->block = vkb_opcode(at) == SPV_FUNCTION ? 0 : block;
         }
-        if (ends_block(at)) {
+        if (vkb_ends_block(at)) {
             module->ids[block].end = at;
             block = 0;
         }
     }
     return module->functions != NULL;
-}
-
-static bool arithmetic(uint32_t code, uint32_t x, uint32_t y, uint32_t *value)
-{
-    const int32_t signed_x = (int32_t)x, signed_y = (int32_t)y;
-    const bool divides = y != 0 && !((x | y) >> 31);  // where signs make no difference
-
-    switch (code) {
-    case OP_S_NEGATE:
-        *value = 0 - x;
-        return true;
-    case OP_NOT:
-        *value = ~x;
-        return true;
-    case OP_LOGICAL_NOT:
-        *value = !x;
-        return true;
-    case OP_BITCAST:
-        *value = x;
-        return true;
-    case OP_I_ADD:
-        *value = x + y;
-        return true;
-    case OP_I_SUB:
-        *value = x - y;
-        return true;
-    case OP_I_MUL:
-        *value = x * y;
-        return true;
-    case OP_U_DIV:
-    case OP_S_DIV:
-        *value = divides ? x / y : 0;
-        return divides;
-    case OP_U_MOD:
-    case OP_S_REM:
-    case OP_S_MOD:
-        *value = divides ? x % y : 0;
-        return divides;
-    case OP_LOGICAL_EQUAL:
-    case OP_I_EQUAL:
-        *value = x == y;
-        return true;
-    case OP_LOGICAL_NOT_EQUAL:
-    case OP_I_NOT_EQUAL:
-        *value = x != y;
-        return true;
-    case OP_LOGICAL_OR:
-        *value = x || y;
-        return true;
-    case OP_LOGICAL_AND:
-        *value = x && y;
-        return true;
-    case OP_U_GREATER:
-        *value = x > y;
-        return true;
-    case OP_S_GREATER:
-        *value = signed_x > signed_y;
-        return true;
-    case OP_U_GREATER_EQUAL:
-        *value = x >= y;
-        return true;
-    case OP_S_GREATER_EQUAL:
-        *value = signed_x >= signed_y;
-        return true;
-    case OP_U_LESS:
-        *value = x < y;
-        return true;
-    case OP_S_LESS:
-        *value = signed_x < signed_y;
-        return true;
-    case OP_U_LESS_EQUAL:
-        *value = x <= y;
-        return true;
-    case OP_S_LESS_EQUAL:
-        *value = signed_x <= signed_y;
-        return true;
-    case OP_SHIFT_RIGHT_LOGICAL:
-        *value = y < 32 ? x >> y : 0;
-        return y < 32;
-    case OP_SHIFT_LEFT_LOGICAL:
-        *value = y < 32 ? x << y : 0;
-        return y < 32;
-    case OP_BITWISE_OR:
-        *value = x | y;
-        return true;
-    case OP_BITWISE_XOR:
-        *value = x ^ y;
-        return true;
-    case OP_BITWISE_AND:
-        *value = x & y;
-        return true;
-    }
-    return false;
 }
 
 // The value of an operation on ids, if it follows from what is known.
@@ -317,21 +83,21 @@ static bool evaluate(const struct module *module, uint32_t code, const uint32_t 
         of[i] = &module->ids[operands[i]];
     }
     // One operand decides.
-    for (size_t i = 0; i < 2 && (code == OP_LOGICAL_AND || code == OP_LOGICAL_OR); ++i)
-        if (of[i]->known && of[i]->value == (code == OP_LOGICAL_OR)) {
-            *value = code == OP_LOGICAL_OR;
+    for (size_t i = 0; i < 2 && (code == SPV_LOGICAL_AND || code == SPV_LOGICAL_OR); ++i)
+        if (of[i]->known && of[i]->value == (code == SPV_LOGICAL_OR)) {
+            *value = code == SPV_LOGICAL_OR;
             return true;
         }
     if (!of[0]->known)
         return false;
-    if (code == OP_SELECT) {
+    if (code == SPV_SELECT) {
         const struct id *chosen = of[0]->value ? of[1] : of[2];
         *value = chosen->value;
         return chosen->known;
     }
     if (count == 2 && !of[1]->known)
         return false;
-    return count < 3 && arithmetic(code, of[0]->value, count == 2 ? of[1]->value : 0, value);
+    return count < 3 && vkb_arithmetic(code, of[0]->value, count == 2 ? of[1]->value : 0, value);
 }
 
 // The block that a branch of two targets always goes to; 0: not known. The branch that closes a
@@ -340,7 +106,7 @@ static uint32_t only_target(const struct module *module, const uint32_t *at)
 {
     const struct id *ids = module->ids;
 
-    if (opcode(at) != OP_BRANCH_CONDITIONAL || !ids[at[1]].known || ids[at[2]].at <= at
+    if (vkb_opcode(at) != SPV_BRANCH_CONDITIONAL || !ids[at[1]].known || ids[at[2]].at <= at
         || ids[at[3]].at <= at)
         return 0;
     return ids[at[1]].value ? at[2] : at[3];
@@ -353,13 +119,13 @@ static uint32_t target(const struct module *module, const uint32_t *at, uint32_t
 
     if (only)
         return i == 0 ? only : 0;
-    switch (opcode(at)) {
-    case OP_BRANCH:
+    switch (vkb_opcode(at)) {
+    case SPV_BRANCH:
         return i == 0 ? at[1] : 0;
-    case OP_BRANCH_CONDITIONAL:
+    case SPV_BRANCH_CONDITIONAL:
         return i < 2 ? at[2 + i] : 0;
-    case OP_SWITCH:
-        return 2 + 2 * i < word_count(at) ? at[2 + 2 * i] : 0;
+    case SPV_SWITCH:
+        return 2 + 2 * i < vkb_word_count(at) ? at[2 + 2 * i] : 0;
     }
     return 0;
 }
@@ -390,8 +156,8 @@ static void find_reached(struct module *module)
     reach(module, module->ids[module->entry].block);
     while (module->stack_count > 0) {
         const struct id *block = &module->ids[module->stack[--module->stack_count]];
-        for (const uint32_t *at = block->at; at < block->end; at = next(at))
-            if (opcode(at) == OP_FUNCTION_CALL)
+        for (const uint32_t *at = block->at; at < block->end; at = vkb_next(at))
+            if (vkb_opcode(at) == SPV_FUNCTION_CALL)
                 reach(module, module->ids[at[3]].block);
         for (uint32_t i = 0; target(module, block->end, i); ++i)
             reach(module, target(module, block->end, i));
@@ -402,7 +168,7 @@ static bool phi_value(const struct module *module, const uint32_t *at, uint32_t 
 {
     const struct id *found = NULL;
 
-    for (uint32_t i = 3; i + 1 < word_count(at); i += 2) {
+    for (uint32_t i = 3; i + 1 < vkb_word_count(at); i += 2) {
         const struct id *one = &module->ids[at[i]];
         if (at[i] == at[2] || !follows(module, at[i + 1], module->ids[at[2]].block))
             continue;
@@ -420,13 +186,14 @@ static bool find_values(struct module *module)
 {
     bool more = false;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = next(at)) {
-        struct id *id = &module->ids[result(at)];
-        if (!is_pure(at) || id->known || !module->ids[id->block].reached || !is_word(module, at[1]))
+    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+        struct id *id = &module->ids[vkb_result(at)];
+        if (!vkb_is_pure(at) || id->known || !module->ids[id->block].reached
+            || !is_word(module, at[1]))
             continue;
-        id->known = opcode(at) == OP_PHI
-                      ? phi_value(module, at, &id->value)
-                      : evaluate(module, opcode(at), at + 3, word_count(at) - 3, &id->value);
+        id->known = vkb_opcode(at) == SPV_PHI ? phi_value(module, at, &id->value)
+                                              : evaluate(module, vkb_opcode(at), at + 3,
+                                                         vkb_word_count(at) - 3, &id->value);
         more |= id->known;
     }
     return more;
@@ -448,23 +215,24 @@ static void give_value(struct module *module, const uint32_t *decoration,
 
 static void find_constants(struct module *module, const struct vkb_constants *constants)
 {
-    for (const uint32_t *at = module->words + HEADER_WORDS; at < module->functions; at = next(at)) {
-        const uint32_t code = opcode(at);
-        struct id *id = &module->ids[result(at)];
-        if (code == OP_ENTRY_POINT)
+    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->functions;
+         at = vkb_next(at)) {
+        const uint32_t code = vkb_opcode(at);
+        struct id *id = &module->ids[vkb_result(at)];
+        if (code == SPV_ENTRY_POINT)
             module->entry = at[2];
-        else if (code == OP_DECORATE && at[2] == SPEC_ID)
+        else if (code == SPV_DECORATE && at[2] == SPV_SPEC_ID)
             give_value(module, at, constants);
-        else if (code == OP_CONSTANT || code == OP_SPEC_CONSTANT) {
+        else if (code == SPV_CONSTANT || code == SPV_SPEC_CONSTANT) {
             id->value = id->known ? id->value : at[3];
             id->known = is_word(module, at[1]);
-        } else if (code == OP_CONSTANT_TRUE || code == OP_CONSTANT_FALSE
-                   || code == OP_SPEC_CONSTANT_TRUE || code == OP_SPEC_CONSTANT_FALSE) {
+        } else if (code == SPV_CONSTANT_TRUE || code == SPV_CONSTANT_FALSE
+                   || code == SPV_SPEC_CONSTANT_TRUE || code == SPV_SPEC_CONSTANT_FALSE) {
             id->value = id->known ? id->value != 0
-                                  : code == OP_CONSTANT_TRUE || code == OP_SPEC_CONSTANT_TRUE;
+                                  : code == SPV_CONSTANT_TRUE || code == SPV_SPEC_CONSTANT_TRUE;
             id->known = true;
-        } else if (code == OP_SPEC_CONSTANT_OP && is_word(module, at[1]))
-            id->known = evaluate(module, at[3], at + 4, word_count(at) - 4, &id->value);
+        } else if (code == SPV_SPEC_CONSTANT_OP && is_word(module, at[1]))
+            id->known = evaluate(module, at[3], at + 4, vkb_word_count(at) - 4, &id->value);
     }
 }
 
@@ -481,9 +249,9 @@ static void use(struct module *module, uint32_t word)
 // Uses all operands. A number among them may equal an id: then an instruction too many stays.
 static void use_operands(struct module *module, const uint32_t *at)
 {
-    const bool is_phi = opcode(at) == OP_PHI;
+    const bool is_phi = vkb_opcode(at) == SPV_PHI;
 
-    for (uint32_t i = 1; i < word_count(at); ++i)
+    for (uint32_t i = 1; i < vkb_word_count(at); ++i)
         if (!is_phi || i < 3 || i % 2 == 0 || follows(module, at[i + 1], module->ids[at[2]].block))
             use(module, at[i]);
 }
@@ -495,7 +263,7 @@ static void keep_structure(struct module *module, const uint32_t *at, uint32_t h
 
     if (!ids[at[1]].reached)
         ids[at[1]].role = MERGE_BLOCK;
-    if (opcode(at) == OP_LOOP_MERGE && !ids[at[2]].reached) {
+    if (vkb_opcode(at) == SPV_LOOP_MERGE && !ids[at[2]].reached) {
         ids[at[2]].role = CONTINUE_BLOCK;
         ids[at[2]].loop = header;
         ids[header].loop = at[2];
@@ -505,7 +273,7 @@ static void keep_structure(struct module *module, const uint32_t *at, uint32_t h
 // A selection whose branch always goes one way is none.
 static bool stays(const struct module *module, const uint32_t *at)
 {
-    return opcode(at) != OP_SELECTION_MERGE || !only_target(module, next(at));
+    return vkb_opcode(at) != SPV_SELECTION_MERGE || !only_target(module, vkb_next(at));
 }
 
 // Finds the instructions that what has effects uses.
@@ -513,12 +281,12 @@ static void find_used(struct module *module)
 {
     uint32_t block = 0;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = next(at)) {
-        if (opcode(at) == OP_LABEL)
+    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+        if (vkb_opcode(at) == SPV_LABEL)
             block = at[1];
-        if (!module->ids[block].reached || is_pure(at) || !stays(module, at))
+        if (!module->ids[block].reached || vkb_is_pure(at) || !stays(module, at))
             continue;
-        if (opcode(at) == OP_SELECTION_MERGE || opcode(at) == OP_LOOP_MERGE)
+        if (vkb_opcode(at) == SPV_SELECTION_MERGE || vkb_opcode(at) == SPV_LOOP_MERGE)
             keep_structure(module, at, block);
         else if (!only_target(module, at))
             use_operands(module, at);
@@ -529,17 +297,17 @@ static void find_used(struct module *module)
 
 static uint32_t *copy(uint32_t *out, const uint32_t *at)
 {
-    memcpy(out, at, word_count(at) * sizeof *at);
-    return out + word_count(at);
+    memcpy(out, at, vkb_word_count(at) * sizeof *at);
+    return out + vkb_word_count(at);
 }
 
 static uint32_t *write_constant(const struct module *module, uint32_t *out, const uint32_t *at)
 {
-    const bool is_bool = opcode(module->ids[at[1]].at) == OP_TYPE_BOOL;
+    const bool is_bool = vkb_opcode(module->ids[at[1]].at) == SPV_TYPE_BOOL;
     const uint32_t value = module->ids[at[2]].value;
 
-    *out++ =
-        is_bool ? 3 << 16 | (value ? OP_CONSTANT_TRUE : OP_CONSTANT_FALSE) : 4 << 16 | OP_CONSTANT;
+    *out++ = is_bool ? 3 << 16 | (value ? SPV_CONSTANT_TRUE : SPV_CONSTANT_FALSE)
+                     : 4 << 16 | SPV_CONSTANT;
     *out++ = at[1];
     *out++ = at[2];
     if (!is_bool)
@@ -549,14 +317,15 @@ static uint32_t *write_constant(const struct module *module, uint32_t *out, cons
 
 static uint32_t *write_declarations(const struct module *module, uint32_t *out)
 {
-    for (const uint32_t *at = module->words + HEADER_WORDS; at < module->functions; at = next(at)) {
-        const uint32_t code = opcode(at);
-        const struct id *id = &module->ids[code == OP_DECORATE ? at[1] : result(at)];
-        if (is_debug(at)
-            || (code == OP_DECORATE
-                && (at[2] == SPEC_ID || (id->at >= module->functions && !id->used))))
+    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->functions;
+         at = vkb_next(at)) {
+        const uint32_t code = vkb_opcode(at);
+        const struct id *id = &module->ids[code == SPV_DECORATE ? at[1] : vkb_result(at)];
+        if (vkb_is_debug(at)
+            || (code == SPV_DECORATE
+                && (at[2] == SPV_SPEC_ID || (id->at >= module->functions && !id->used))))
             continue;
-        if (id->known && code >= OP_SPEC_CONSTANT_TRUE && code <= OP_SPEC_CONSTANT_OP)
+        if (id->known && code >= SPV_SPEC_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
             out = write_constant(module, out, at);
         else
             out = copy(out, at);
@@ -566,7 +335,7 @@ static uint32_t *write_declarations(const struct module *module, uint32_t *out)
 
 static uint32_t *write_branch(uint32_t *out, uint32_t label)
 {
-    *out++ = 2 << 16 | OP_BRANCH;
+    *out++ = 2 << 16 | SPV_BRANCH;
     *out++ = label;
     return out;
 }
@@ -579,7 +348,7 @@ static uint32_t *write_unreached(const struct id *label, uint32_t *out)
     out = copy(out, label->at);
     if (label->role == CONTINUE_BLOCK)
         return write_branch(out, label->loop);
-    *out++ = 1 << 16 | OP_UNREACHABLE;
+    *out++ = 1 << 16 | SPV_UNREACHABLE;
     return out;
 }
 
@@ -590,8 +359,8 @@ static uint32_t *write_phi(const struct module *module, uint32_t *out, const uin
     const uint32_t block = module->ids[at[2]].block;
     uint32_t *first = out;
 
-    out = copy(out, at) - (word_count(at) - 3);
-    for (uint32_t i = 3; i < word_count(at); i += 2)
+    out = copy(out, at) - (vkb_word_count(at) - 3);
+    for (uint32_t i = 3; i < vkb_word_count(at); i += 2)
         if (follows(module, at[i + 1], block)) {
             *out++ = at[i];
             *out++ = at[i + 1];
@@ -600,7 +369,7 @@ static uint32_t *write_phi(const struct module *module, uint32_t *out, const uin
         *out++ = at[2];
         *out++ = module->ids[block].loop;
     }
-    *first = (uint32_t)(out - first) << 16 | OP_PHI;
+    *first = (uint32_t)(out - first) << 16 | SPV_PHI;
     return out;
 }
 
@@ -608,23 +377,23 @@ static uint32_t *write_functions(const struct module *module, uint32_t *out)
 {
     bool reached = false, function_reached = false;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = next(at)) {
-        const uint32_t code = opcode(at), only = only_target(module, at);
-        const struct id *id = &module->ids[result(at)];
-        if (code == OP_FUNCTION)
+    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+        const uint32_t code = vkb_opcode(at), only = only_target(module, at);
+        const struct id *id = &module->ids[vkb_result(at)];
+        if (code == SPV_FUNCTION)
             reached = function_reached = module->ids[id->block].reached;
-        else if (code == OP_FUNCTION_END)
+        else if (code == SPV_FUNCTION_END)
             reached = function_reached;
-        else if (code == OP_LABEL) {
+        else if (code == SPV_LABEL) {
             reached = id->reached;
             if (!reached)
                 out = write_unreached(id, out);
         }
-        if (!reached || is_debug(at) || (is_pure(at) && !id->used) || !stays(module, at))
+        if (!reached || vkb_is_debug(at) || (vkb_is_pure(at) && !id->used) || !stays(module, at))
             continue;
-        out = only           ? write_branch(out, only)
-            : code == OP_PHI ? write_phi(module, out, at)
-                             : copy(out, at);
+        out = only            ? write_branch(out, only)
+            : code == SPV_PHI ? write_phi(module, out, at)
+                              : copy(out, at);
     }
     return out;
 }
@@ -636,8 +405,8 @@ bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants 
     struct module module = {.words = shader->code, .end = shader->code + count};
 
     *code = NULL;
-    if (count > HEADER_WORDS && shader->code[0] == MAGIC)
-        module.bound = shader->code[BOUND];
+    if (count > SPV_HEADER_WORDS && shader->code[0] == SPV_MAGIC)
+        module.bound = shader->code[SPV_BOUND];
     module.ids = vkb_alloc(error, (size_t)module.bound + 1, sizeof *module.ids);
     module.stack = vkb_alloc(error, (size_t)module.bound + 1, sizeof *module.stack);
     uint32_t *out = vkb_alloc(error, count, sizeof *out);
@@ -650,10 +419,11 @@ bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants 
             find_reached(&module);
         while (find_values(&module));
         find_used(&module);
-        memcpy(out, module.words, HEADER_WORDS * sizeof *out);
-        *size = (size_t)(write_functions(&module, write_declarations(&module, out + HEADER_WORDS))
-                         - out)
-              * sizeof *out;
+        memcpy(out, module.words, SPV_HEADER_WORDS * sizeof *out);
+        *size =
+            (size_t)(write_functions(&module, write_declarations(&module, out + SPV_HEADER_WORDS))
+                     - out)
+            * sizeof *out;
         *code = out;
     } else
         vkb_free(out);
