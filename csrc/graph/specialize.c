@@ -1,6 +1,6 @@
 #include "graph/specialize.h"
 
-#include "graph/spirv.h"
+#include "graph/instructions.h"
 
 #include <string.h>
 

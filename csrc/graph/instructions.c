@@ -1,4 +1,4 @@
-#include "graph/spirv.h"
+#include "graph/instructions.h"
 
 // Of GLSL.std.450: they also write through a pointer.
 enum { GLSL_MODF = 35, GLSL_FREXP = 51 };

@@ -1,7 +1,7 @@
 // Instructions of SPIR-V 1.3. A module is a header of five words, then instructions, whose first
 // word is their number of words and their opcode.
-#ifndef VKB_SPIRV_WORDS_H
-#define VKB_SPIRV_WORDS_H
+#ifndef VKB_INSTRUCTIONS_H
+#define VKB_INSTRUCTIONS_H
 
 #include <stdbool.h>
 #include <stdint.h>
