@@ -17,7 +17,14 @@ from tests.core.test_spirv import modules
 from tests.exhaustive import examples
 
 CONSTANT, STORE = 43, 62
-SOURCES = ("vulkan/error", "vulkan/process", "graph/params", "graph/specialize", "graph/instructions")
+SPECIALIZED = ("graph/specialize", "graph/instructions")
+SOURCES = ("vulkan/error", "vulkan/process", "graph/params", *SPECIALIZED)
+    "vulkan/error",
+    "vulkan/process",
+    "graph/params",
+    "graph/specialize",
+    "graph/instructions",
+)
 Specialize = Callable[[bytes, list[int]], bytes]
 
 
