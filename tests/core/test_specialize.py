@@ -17,8 +17,7 @@ from tests.core.test_spirv import modules
 from tests.exhaustive import examples
 
 CONSTANT, STORE = 43, 62
-SPECIALIZED = ("graph/specialize", "graph/instructions")
-SOURCES = ("vulkan/error", "vulkan/process", "graph/params", *SPECIALIZED)
+SOURCES = (
     "vulkan/error",
     "vulkan/process",
     "graph/params",
