@@ -31,6 +31,7 @@ bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings
         return vkb_check_sizes(settings, "size", source->scene.size, max_side, error)
             && build_scene(source->shading, settings, &source->scene, graph, error);
     case VKB_SOURCE_IMAGE:
+        graph->layers = source->image.layers;
         return vkb_check_sizes(settings, "image", source->image.size, max_side, error)
             && vkb_build_image(settings, &source->image, graph, error);
     }
@@ -66,8 +67,8 @@ static bool levels_fit(const struct vkb_image_source *planned, const struct vkb_
 static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
 {
     return planned->format == given->format && planned->channels == given->channels
-        && planned->layers == given->layers
-        && planned->size.width == given->size.width && planned->size.height == given->size.height
+        && planned->layers == given->layers && planned->size.width == given->size.width
+        && planned->size.height == given->size.height
         && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask
         && levels_fit(planned, given);
 }

@@ -164,13 +164,13 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
     return tuple;
 }
 
-static bool layer_graph(const struct vkb_device *device, uint32_t layers, struct vkb_graph *graph,
+static bool layer_graph(const struct vkb_device *device, struct vkb_graph *graph,
                         struct vkb_error *error)
 {
-    if (layers > device->limits.maxImageArrayLayers || device->words)
+    if (graph->layers > device->limits.maxImageArrayLayers || device->words)
         return vkb_fail(error, VKB_ERROR_VALUE, "batch: the device has no images of %u layers",
-                        layers);
-    return vkb_graph_layer(graph, layers, error);
+                        graph->layers);
+    return vkb_graph_layer(graph, error);
 }
 
 // `portion` may be NULL.
@@ -189,8 +189,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_image_cache_check(device, graph, error)
-        && (source->kind != VKB_SOURCE_IMAGE || !source->image.layers
-            || layer_graph(device, source->image.layers, graph, error));
+        && (!graph->layers || layer_graph(device, graph, error));
 }
 
 // The kernel of a convolution for the source's sizes. The graph is built once before it is

@@ -36,7 +36,7 @@ struct variant {
     enum vkb_variants variants;
     const char *name;
     vkb_variant_add *add;
-    uint32_t least_pixels;  // of the target
+    uint32_t least_pixels;  // of the target, in all layers
 };
 
 // On a GPU, strips are slow in small images, since one invocation writes a complete strip. On an
@@ -95,7 +95,9 @@ static bool add_variant(const struct vkb_variant_choice *choice, const struct vk
                         struct vkb_error *error)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const uint64_t pixels = (uint64_t)target->width * target->height;
+    // The images of a batch are written together.
+    const uint32_t layers = choice->plain.layers ? choice->plain.layers : 1;
+    const uint64_t pixels = (uint64_t)target->width * target->height * layers;
 
     for (size_t i = 0; i < sizeof variants_table / sizeof variants_table[0]; ++i) {
         const uint32_t first = choice->graph->pass_count;

@@ -124,10 +124,7 @@ class Batches:
             self._last = settings, names, self._core.plan(source, settings, names)
         plan = self._last[2]
         arrays = tuple(
-            [
-                self._core.export(layers * _stride(shape, dtype))
-                for _, shape, dtype in plan.outputs
-            ]
+            [self._core.export(layers * _stride(shape, dtype)) for _, shape, dtype in plan.outputs]
         )
         return _Part(self._core.run(source, (plan,), (arrays,)), plan, arrays, first, fresh)
 

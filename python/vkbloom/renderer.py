@@ -683,7 +683,8 @@ class Renderer:
         Notes
         -----
         The device works on the next images while the caller uses a frame. So after the first frame,
-        the number of images taken is up to two larger than the number of yielded frames. An error
+        the number of images taken is up to two larger than the number of yielded frames. Of a batch
+        on the GPU with one Settings, each pass runs for many images at once. An error
         of an image or of the iterable is raised after the frames of all earlier images, and ends
         the iteration.
 

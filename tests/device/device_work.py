@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
-from vkbloom import Pyramid, Renderer, Separable
+from vkbloom import Convolution, Pyramid, Renderer, Separable
 
 VALIDATION = "validated" in sys.argv
 ADAPTER = os.environ.get("VKBLOOM_TEST_NAME") or "software"
@@ -150,6 +150,45 @@ def sequences(renderer: Any) -> None:
         same(frames, renderer.apply(images[0], one))
     handle = renderer.upload(OnDevice(images[1]), mask=np.ones((16, 24), np.float32))
     same(renderer.apply(handle), renderer.apply(images[1], mask=np.ones((16, 24), np.float32)))
+
+
+def layers(renderer: Any) -> None:
+    """Batches of which each pass runs for many images, where the adapter is not a CPU."""
+    images = np.stack([picture(9, 7, 3, "float16", seed=i) for i in range(10)])
+    images[2, 3, 3, 1], images[9, 0, 0, 0] = np.inf, np.nan
+    batch = OnDevice(images[:, ::-1])
+    # In turns with single images: both have images of the same names.
+    for settings, together in ((LOW, 10), (Separable(), 10), (Convolution(), 0), (LOW, 10)):
+        frames = list(renderer.apply_each(batch, settings))
+        for made, image in zip(frames, images, strict=True):
+            same(made, renderer.apply(image[::-1], settings))
+        shared = len({one["final"]._memory for one in frames}) == 1
+        assert shared == (renderer.info.type != "cpu" and together > 0)
+    # As parts of five, of which the last begins in the one before.
+    batches: Any = renderer._batches
+    size = batches._size and batches._size[2]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vkbloom.batches.BYTES", 5 * (size or 0))
+        for count in (9, 10):
+            part = OnDevice(images[:count, ::-1])
+            frames = list(renderer.apply_each(part, LOW, attachments="final"))
+            for made, image in zip(frames, images[:count], strict=True):
+                expected = renderer.apply(image[::-1], LOW, attachments="final")
+                same(made, expected)
+        abandoned = renderer.apply_each(batch, LOW)
+        same(next(abandoned), renderer.apply(images[0, ::-1], LOW))
+        abandoned.close()
+    # What the arrays of a batch give to others begins at their own pixels.
+    last: Any = frames[-1]["final"]
+    right = last.numpy()
+    address = last.__cuda_array_interface__["data"][0]
+    assert vkbloom._core.read_dlpack(last.__dlpack__(stream=1))[0] == address
+    view = np.ctypeslib.as_array((ctypes.c_uint16 * right.size).from_address(address))
+    np.testing.assert_array_equal(view, right.view(np.uint16).ravel())
+    copied = vkbloom._core.read_dlpack(last.__dlpack__(stream=1, copy=True))[0]
+    view = np.ctypeslib.as_array((ctypes.c_uint16 * right.size).from_address(copied))
+    np.testing.assert_array_equal(view, right.view(np.uint16).ravel())
+    same(renderer.apply(last, LOW), renderer.apply(right, LOW))
 
 
 def places(renderer: Any) -> None:
@@ -297,7 +336,7 @@ def errors(renderer: Any) -> None:
     same(apply(wide), apply(image))
 
 
-WORK = (layouts, streams, sequences, places, capsules, recycling, lifetime, errors)
+WORK = (layouts, streams, sequences, layers, places, capsules, recycling, lifetime, errors)
 
 
 # As the default, of levels that do not take most of the time.
@@ -309,7 +348,9 @@ def use_low_levels() -> None:
     apply, each = Renderer.apply, Renderer.apply_each
     changed: Any = Renderer
     changed.apply = lambda self, image, settings=LOW, **more: apply(self, image, settings, **more)
-    changed.apply_each = lambda self, images, settings=LOW: each(self, images, settings)
+    changed.apply_each = lambda self, images, settings=LOW, **more: each(
+        self, images, settings, **more
+    )
 
 
 def main() -> None:

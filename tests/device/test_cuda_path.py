@@ -38,7 +38,15 @@ def test_dispatches_access_images(
     layer: Path,  # noqa: F811
 ) -> None:
     """What reads and writes pixels on an adapter that is not a CPU, as GPUs do it."""
-    program = ("-m", "tests.device.device_work", "validated", "layouts", "sequences", "places")
+    program = (
+        "-m",
+        "tests.device.device_work",
+        "validated",
+        "layouts",
+        "sequences",
+        "places",
+        "layers",
+    )
     check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
 
 
