@@ -28,6 +28,29 @@ LIMITED_API = [("Py_LIMITED_API", "0x030b0000")] if LIMITED else []
 # Of the package itself, which cannot be imported before its core is built.
 without_contraction = runpy.run_path("python/vkbloom/own/spirv.py")["without_contraction"]
 
+# The passes of spirv-opt. Without them a CPU's driver spends most of the time of a first frame on
+# the work that they do once, for all who use the package. Functions become one, variables values,
+# and loops of known length their bodies: copies of operations, which need NoContraction again
+# before the rest simplifies them.
+TO_VALUES = """
+    --eliminate-local-single-block --eliminate-local-single-store
+    --eliminate-dead-code-aggressive --ssa-rewrite --eliminate-dead-code-aggressive
+"""
+SPLIT = f"--scalar-replacement=100 --convert-local-access-chains {TO_VALUES}"
+ONE_FUNCTION = f"""
+    --wrap-opkill --eliminate-dead-branches --merge-return --inline-entry-points-exhaustive
+    --eliminate-dead-functions --private-to-local {SPLIT} --ccp --eliminate-dead-code-aggressive
+""".split()
+SIMPLER = f"""
+    --eliminate-dead-branches --redundancy-elimination --combine-access-chains
+    --simplify-instructions {SPLIT} --vector-dce --eliminate-dead-inserts
+    --eliminate-dead-branches --simplify-instructions --if-conversion --copy-propagate-arrays
+    --reduce-load-size --eliminate-dead-code-aggressive --merge-blocks --redundancy-elimination
+    --eliminate-dead-branches --merge-blocks --simplify-instructions
+""".split()
+# Larger modules keep their loops: those of many filters, of which their constants leave little.
+MOST_UNROLLED = 260_000
+
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
@@ -56,10 +79,6 @@ WORDS_ALONE = {
 }
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
-# For shaders that keep arrays in registers: the optimizer makes one function of all. A driver may
-# call large functions, and what these share is then in memory.
-INLINED = ("-Os",)
-
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
 
@@ -81,12 +100,11 @@ def modules(shader: Path) -> list[Module]:
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
-    inlined = INLINED if '#include "lib/fourier.glsl"' in text else ()
     if '#include "variants/pixels.glsl"' in text:
         found = []
         for ours, glsl in FORMATS.items():
             if shader.name not in WORDS_ALONE:
-                options = (f"-DSOURCE_FORMAT={glsl}", *inlined)
+                options = (f"-DSOURCE_FORMAT={glsl}",)
                 found.append(Module(f"{name}_{ours}", shader, options))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             if shader.name in WORDS_STORED:
@@ -103,7 +121,7 @@ def modules(shader: Path) -> list[Module]:
         return found
     if "SOURCE_FORMAT" in text:
         return [
-            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}", *inlined))
+            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
             for ours, glsl in FORMATS.items()
         ]
     if '#include "lib/fullscreen.glsl"' in text:
@@ -112,19 +130,55 @@ def modules(shader: Path) -> list[Module]:
     return [Module(name, shader)]
 
 
-def compile_shader(module: Module, target: Path) -> None:
-    """Compile one module, as glslang does, to a file."""
-    compiler = shutil.which("glslangValidator") or shutil.which("glslang")
-    if compiler is None:
-        raise SystemExit(
-            "glslangValidator is missing; on Debian or Ubuntu: apt install glslang-tools"
-        )
-    command = [compiler, "-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
-    command += module.options
-    command += ["-o", str(target), str(module.shader)]
+def tool(*names: str, package: str) -> str:
+    """Return the path of a program, or end with the package that is missing."""
+    for name in names:
+        if path := shutil.which(name):
+            return path
+    raise SystemExit(f"{names[0]} is missing; on Debian or Ubuntu: apt install {package}")
+
+
+def run_tool(what: Path, *command: str) -> None:
+    """Run a program on a shader; end with its output if it fails."""
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
-        raise SystemExit(f"{module.shader} does not compile:\n{result.stdout}{result.stderr}")
+        raise SystemExit(f"{what}: {command[0]} fails:\n{result.stdout}{result.stderr}")
+
+
+def compile_shader(module: Module, target: Path) -> None:
+    """Compile one module, as glslang does, to a file."""
+    compiler = tool("glslangValidator", "glslang", package="glslang-tools")
+    options = ["-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
+    run_tool(
+        module.shader, compiler, *options, *module.options, "-o", str(target), str(module.shader)
+    )
+
+
+def decorate(target: Path) -> None:
+    """Give the operations of a module in a file NoContraction."""
+    code = target.read_bytes()
+    words = without_contraction(struct.unpack(f"={len(code) // 4}I", code))
+    target.write_bytes(struct.pack(f"={len(words)}I", *words))
+
+
+def optimize(module: Module, target: Path, passes: list[str]) -> None:
+    """Run spirv-opt on a module in a file."""
+    optimizer = tool("spirv-opt", package="spirv-tools")
+    options = ["--target-env=vulkan1.1", "--scalar-block-layout", *passes]
+    run_tool(module.shader, optimizer, *options, str(target), "-o", str(target))
+
+
+def build_module(module: Module, target: Path) -> None:
+    """Write a module to a file, as the package contains it."""
+    compile_shader(module, target)
+    decorate(target)
+    optimize(module, target, ONE_FUNCTION)
+    rolled = target.read_bytes()
+    optimize(module, target, ["--loop-unroll"])
+    if target.stat().st_size > MOST_UNROLLED:
+        target.write_bytes(rolled)
+    decorate(target)
+    optimize(module, target, SIMPLER)
 
 
 def compile_module(module: Module) -> tuple[int, ...]:
@@ -133,9 +187,11 @@ def compile_module(module: Module) -> tuple[int, ...]:
     sources = [Path("setup.py"), Path("python/vkbloom/own/spirv.py")]
     sources += [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
     if not target.exists() or target.stat().st_mtime < max(s.stat().st_mtime for s in sources):
-        compile_shader(module, target)
+        made = target.with_suffix(".part")
+        build_module(module, made)
+        made.replace(target)
     code = target.read_bytes()
-    return without_contraction(struct.unpack(f"={len(code) // 4}I", code))
+    return struct.unpack(f"={len(code) // 4}I", code)
 
 
 def write_spirv() -> None:

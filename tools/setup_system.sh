@@ -75,6 +75,7 @@ check() {
             need "a C compiler" "gcc libc6-dev" has_header stdio.h
             need "Python's C headers" python3-dev has_python_headers
             need "glslang" glslang-tools has_glslang
+            need "spirv-opt" spirv-tools command -v spirv-opt
             need "the Vulkan headers" libvulkan-dev has_header vulkan/vulkan.h
             need "volk" libvulkan-volk-dev has_header volk.h
             need "the Vulkan loader" libvulkan1 has_loader

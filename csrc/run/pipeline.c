@@ -1,5 +1,6 @@
 #include "run/pipeline.h"
 
+#include "graph/specialize.h"
 #include "scene/scene.h"
 
 #include <string.h>
@@ -230,28 +231,25 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
 }
 
 static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
-                                                    VkShaderModule module,
-                                                    const VkSpecializationInfo *constants)
+                                                    VkShaderModule module)
 {
     return (VkPipelineShaderStageCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
         .stage = stage,
         .module = module,
         .pName = "main",
-        .pSpecializationInfo = constants,
     };
 }
 
 static bool create_compute(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
                            const struct vkb_pass_row *pass, VkShaderModule module,
-                           const VkSpecializationInfo *constants, VkPipeline *pipeline,
-                           struct vkb_error *error)
+                           VkPipeline *pipeline, struct vkb_error *error)
 {
     return VK(error, device->vk.vkCreateComputePipelines(
                          device->handle, pipelines->cache, 1,
                          &(VkComputePipelineCreateInfo){
                              .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                             .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module, constants),
+                             .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
                              .layout = vkb_bindings_layout(&pipelines->bindings, pass),
                          },
                          NULL, pipeline));
@@ -342,8 +340,7 @@ static VkPipelineColorBlendAttachmentState blending(enum vkb_blend blend)
 
 static bool create_graphics(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
                             const struct vkb_pass_row *pass, const VkShaderModule modules[2],
-                            const VkSpecializationInfo *constants, VkRenderPass render_pass,
-                            VkPipeline *pipeline, struct vkb_error *error)
+                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
@@ -361,8 +358,8 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                       .stageCount = 2,
                       .pStages =
                           (VkPipelineShaderStageCreateInfo[]){
-                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], NULL),
-                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], constants),
+                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0]),
+                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1]),
                           },
                       .pVertexInputState = &vertices,
                       .pInputAssemblyState = &triangles,
@@ -384,43 +381,39 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
 }
 
 static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
-                          VkShaderModule *module, struct vkb_error *error)
+                          const struct vkb_constants *constants, VkShaderModule *module,
+                          struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateShaderModule(
-                         device->handle,
-                         &(VkShaderModuleCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                             .codeSize = shader->size,
-                             .pCode = shader->code,
-                         },
-                         NULL, module));
+    uint32_t *code;
+    size_t size;
+
+    if (!vkb_specialize(shader, constants, &code, &size, error))
+        return false;
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
+    vkb_free(code);
+    return done;
 }
 
 static bool create_pipeline(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
                             const struct vkb_pass_row *pass, VkRenderPass render_pass,
                             VkPipeline *pipeline, struct vkb_error *error)
 {
-    VkSpecializationMapEntry map[VKB_CONSTANT_COUNT];
-
-    // Vulkan ignores constants that the shader does not declare.
-    for (uint32_t i = 0; i < VKB_CONSTANT_COUNT; ++i)
-        map[i] = (VkSpecializationMapEntry){vkb_constant_rows[i].id, vkb_constant_rows[i].offset,
-                                            sizeof(int32_t)};
-    VkSpecializationInfo constants = {
-        .mapEntryCount = VKB_CONSTANT_COUNT,
-        .pMapEntries = map,
-        .dataSize = sizeof pass->constants,
-        .pData = &pass->constants,
-    };
     // A driver copies what it needs of a module: none has to be kept.
     VkShaderModule modules[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};
     const bool done =
-        (!pass->vertex || create_module(device, pass->vertex, &modules[0], error))
-        && create_module(device, pass->shader, &modules[1], error)
+        (!pass->vertex || create_module(device, pass->vertex, &pass->constants, &modules[0], error))
+        && create_module(device, pass->shader, &pass->constants, &modules[1], error)
         && (pass->geometry == VKB_GEOMETRY_DISPATCH
-                ? create_compute(device, pipelines, pass, modules[1], &constants, pipeline, error)
-                : create_graphics(device, pipelines, pass, modules, &constants, render_pass,
-                                  pipeline, error));
+                ? create_compute(device, pipelines, pass, modules[1], pipeline, error)
+                : create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error));
     for (int i = 0; i < 2; ++i)
         device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);
     return done;

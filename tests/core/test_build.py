@@ -37,6 +37,7 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         ("check_vulkan_headers", (), "vulkan/vulkan.h", "libvulkan-dev"),
         ("volk_folder", (), "volk", "libvulkan-volk-dev"),
         ("compile_shader", ("module", Path("a.spv")), "glslangValidator", "glslang-tools"),
+        ("optimize", ("module", Path("a.spv"), []), "spirv-opt", "spirv-tools"),
     ],
 )
 def test_missing_build_tool_is_named_with_its_package(

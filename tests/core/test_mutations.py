@@ -94,18 +94,21 @@ MUTATIONS = {
 
 # Compiles one shader of the tree anew, and writes all of them into build/spirv/spirv.c.
 SPIRV = """
+import shutil
 import sys
 import setuptools
 setuptools.setup = lambda **_: None
 import setup
 
-compile_shader = setup.compile_shader
+build_module = setup.build_module
 
-def compile_changed(module, target):
+def build_changed(module, target):
     if module.shader.name == sys.argv[1]:
-        compile_shader(module, target)
+        build_module(module, target)
+    else:
+        shutil.copyfile(target.with_suffix(".spv"), target)
 
-setup.compile_shader = compile_changed
+setup.build_module = build_changed
 setup.write_spirv()
 """
 

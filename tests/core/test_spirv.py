@@ -18,8 +18,8 @@ NO_CONTRACTION = 42
 FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
 
 
-def modules() -> Iterator[list[tuple[int, ...]]]:
-    """Yield the instructions of each module that the core holds."""
+def modules() -> Iterator[tuple[bytes, list[tuple[int, ...]]]]:
+    """Yield each module that the core holds, and its instructions."""
     data = Path(_core.__file__).read_bytes()
     words = np.frombuffer(data[: len(data) // 4 * 4], np.uint32)
     for start in np.flatnonzero(words == MAGIC):
@@ -37,12 +37,12 @@ def modules() -> Iterator[list[tuple[int, ...]]]:
             length = int(words[position]) >> 16
             instructions.append(tuple(map(int, words[position : position + length])))
             position += length
-        yield instructions
+        yield words[start:position].tobytes(), instructions
 
 
 def test_no_operation_on_floats_may_be_contracted() -> None:
     counts = []
-    for instructions in modules():
+    for _, instructions in modules():
         decorated = {
             words[1]
             for words in instructions

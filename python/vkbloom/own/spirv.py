@@ -17,16 +17,19 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
     Else a compiler may make one operation of a product and a sum, which rounds once, in one shader
     and not in another that has the same expression: variants of a pass would differ in the last
     bit. GLSL's `precise` does the same for a variable, but where it is forgotten only some GPUs
-    show it.
+    show it. Results that have it keep it.
     """
     decorations = []
+    decorated = set()
     first_type = 0
     position = HEADER_WORDS
     while position < len(words):
         opcode, count = words[position] & 0xFFFF, words[position] >> 16
         if opcode in TYPES and not first_type:
             first_type = position
-        if opcode in FLOAT_ARITHMETIC:
+        if words[position] == DECORATE and words[position + 2] == NO_CONTRACTION:
+            decorated.add(words[position + 1])
+        if opcode in FLOAT_ARITHMETIC and words[position + 2] not in decorated:
             decorations += [DECORATE, words[position + 2], NO_CONTRACTION]
         position += count
     # Decorations come before all types.
