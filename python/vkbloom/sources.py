@@ -46,10 +46,10 @@ class Inputs(NamedTuple):
 
     def kept(self) -> Inputs:
         """Return inputs that the caller cannot change."""
-        image, emission, mask = (
+        copies: list[Any] = [
             part if part is None or isinstance(part, Taken) else part.copy() for part in self
-        )
-        return Inputs(image, emission, mask)
+        ]
+        return Inputs(*copies)
 
     def on_host(self) -> dict[str, NDArray[Any]]:
         """Return the arrays by name, in the host's memory."""

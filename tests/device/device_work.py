@@ -290,7 +290,7 @@ def gradients(renderer: Any) -> None:
         settings = PULLED[step % len(PULLED)]
         image, cotangent = strided(rng, ("float16", "float32")[step % 2]), strided(rng, "float32")
         cotangent = np.resize(cotangent, image.shape).astype(("float32", "float16")[step // 2 % 2])
-        glowing = {"emission": image[::-1].copy()} if step % 2 == 0 else {}
+        glowing: dict[str, Any] = {"emission": image[::-1].copy()} if step % 2 == 0 else {}
         expected = renderer.vjp(image, settings, **glowing)[1]({"final": cotangent})
         before = bytes_so_far()
         glowing = {name: OnDevice(part) for name, part in glowing.items()}
@@ -387,8 +387,10 @@ def errors(renderer: Any) -> None:
     same(apply(wide), apply(image))
 
 
-WORK = (layouts, streams, sequences, places, capsules, recycling, lifetime, errors, gradients)
-WORK += (gradient_places,)
+WORK = (
+    *(layouts, streams, sequences, places, capsules, recycling, lifetime, errors),
+    *(gradients, gradient_places),
+)
 
 
 # As the default, of levels that do not take most of the time.
