@@ -54,7 +54,9 @@ static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source 
         || adjoint->brought[image] != VKB_NO_IMAGE)
         return vkb_fail(error, VKB_ERROR_VALUE, "cotangents: unknown framebuffer '%s'", name);
     struct vkb_image_row row = {
-        .format = VKB_FORMAT_RGBA32_FLOAT,
+        // Half floats come from arrays on the device.
+        .format = level->format == VKB_FORMAT_RGBA16_FLOAT ? VKB_FORMAT_RGBA16_FLOAT
+                                                           : VKB_FORMAT_RGBA32_FLOAT,
         .width = adjoint->graph->images[image].width,
         .height = adjoint->graph->images[image].height,
         .input = (enum vkb_input_kind)(VKB_INPUT_LEVEL + number),
@@ -151,7 +153,7 @@ static void show_results(struct vkb_adjoint *adjoint, uint32_t image_count)
         struct vkb_image_row *row = &adjoint->graph->images[brought];
         snprintf(row->name, sizeof row->name, "%s", names[forward->input]);
         row->framebuffer = true;
-        row->channels = forward->input == VKB_INPUT_MASK ? 0 : forward->channels;
+        row->channels = forward->input == VKB_INPUT_MASK ? 1 : forward->channels;
     }
 }
 

@@ -325,29 +325,43 @@ static bool reaches(const struct exported_object *self, Py_ssize_t offset, Py_ss
     return false;
 }
 
-static PyObject *read_bytes(PyObject *object, PyObject *arguments)
+// Between an array of the host and the memory, from `offset` on.
+static PyObject *move_bytes(PyObject *object, PyObject *array, Py_ssize_t offset, bool writes)
 {
     struct exported_object *self = exported_of(object);
-    PyObject *array;
-    Py_ssize_t offset;
     Py_buffer view;
     struct vkb_error error = {0};
     bool done = false;
 
-    if (!PyArg_ParseTuple(arguments, "On:read", &array, &offset)
-        || PyObject_GetBuffer(array, &view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
+    if (PyObject_GetBuffer(array, &view, PyBUF_C_CONTIGUOUS | (writes ? 0 : PyBUF_WRITABLE)) < 0)
         return NULL;
     if (reaches(self, offset, view.len)) {
+        const vkb_cuda_address address = self->run->memory.address + (vkb_cuda_address)offset;
+        const size_t size = (size_t)view.len;
         Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_read(self->exports->cuda, view.buf,
-                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)view.len,
-                             &error);
+        done = writes ? vkb_cuda_write(self->exports->cuda, address, view.buf, size, &error)
+                      : vkb_cuda_read(self->exports->cuda, view.buf, address, size, &error);
         Py_END_ALLOW_THREADS
         if (!done)
             vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
     }
     PyBuffer_Release(&view);
     return done ? Py_NewRef(Py_None) : NULL;
+}
+
+static PyObject *read_bytes(PyObject *object, PyObject *arguments)
+{
+    PyObject *array;
+    Py_ssize_t offset;
+
+    return PyArg_ParseTuple(arguments, "On:read", &array, &offset)
+             ? move_bytes(object, array, offset, false)
+             : NULL;
+}
+
+static PyObject *write_bytes(PyObject *object, PyObject *array)
+{
+    return move_bytes(object, array, 0, true);
 }
 
 static PyObject *copy_to(PyObject *object, PyObject *arguments)
@@ -426,6 +440,7 @@ static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
      "capsule(shape, code, bits, versioned, offset=0) -> a capsule of DLPack."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
+    {"write", write_bytes, METH_O, "write(array). Copies an array of the host there."},
     {"clone", clone_export, METH_VARARGS,
      "clone(size, offset=0) -> Exported. A copy of so many bytes."},
     {"copy_to", copy_to, METH_VARARGS,

@@ -104,7 +104,9 @@ struct uuid {
     NAME(cuMemFree, "cuMemFree_v2", (vkb_cuda_address)) \
     NAME(cuMemcpyDtoDAsync, "cuMemcpyDtoDAsync_v2", \
          (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
-    NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *))
+    NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *)) \
+    NAME(cuMemcpyHtoDAsync, "cuMemcpyHtoDAsync_v2", \
+         (vkb_cuda_address, const void *, size_t, void *))
 #define LATER_FUNCTIONS(NAME) NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *))
 
 struct vkb_cuda {
@@ -375,6 +377,14 @@ bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_
 {
     return enter(cuda, error)
         && leave(cuda, CU(error, cuda->cuMemcpyDtoHAsync(to, from, size, cuda->stream))
+                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
+                    struct vkb_error *error)
+{
+    return enter(cuda, error)
+        && leave(cuda, CU(error, cuda->cuMemcpyHtoDAsync(to, from, size, cuda->stream))
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 

@@ -48,6 +48,8 @@ bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address 
                    void *after, struct vkb_error *error);
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
+bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
+                    struct vkb_error *error);
 
 // Remembers the work that the context has got so far, which may use the memory; and whether it is
 // over.

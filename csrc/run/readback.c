@@ -103,8 +103,8 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
     // A run of three channels is as long as three quarters of one of four, see store.glsl.
     const size_t run = VKB_STORE_SIZE / 4 * output->channels;
 
-    return output->imported && output->row_count == height && output_row_size(output) % run == 0
-        && output_row_size(output) % VKB_WORD_SIZE == 0
+    return output->imported && output->channels >= 3 && output->row_count == height
+        && output_row_size(output) % run == 0 && output_row_size(output) % VKB_WORD_SIZE == 0
         && output->imported_offset % VKB_WORD_SIZE == 0 && output->imported_offset % align == 0;
 }
 
@@ -175,6 +175,14 @@ static inline void drop_alpha(unsigned char *to, const unsigned char *from, size
     memcpy(to, from, 3 * size);
 }
 
+// Copies the first channel of each pixel.
+static void take_first(unsigned char *to, const unsigned char *from, size_t pixels, size_t pixel,
+                       size_t size)
+{
+    for (size_t i = 0; i < pixels; ++i)
+        memcpy(to + i * size, from + i * pixel, size);
+}
+
 static void fetch_staging(const struct vkb_readback *readback, const struct vkb_output *output)
 {
     const size_t pixels = (size_t)output->width * output->row_count;
@@ -182,6 +190,11 @@ static void fetch_staging(const struct vkb_readback *readback, const struct vkb_
 
     if (vkb_readback_is_complete(output)) {
         memcpy(output->memory, from, row_size(output) * output->row_count);
+        return;
+    }
+    if (output->channels == 1) {
+        take_first(output->memory, from, pixels, vkb_pixel_size(output->format),
+                   vkb_formats[output->format].channel_size);
         return;
     }
     switch (vkb_formats[output->format].channel_size) {

@@ -100,7 +100,7 @@ class Batches:
         if settings._has_state or count < LEAST:
             return 0
         if self._size is None or self._size[:2] != (settings, kind):
-            one = self._core.plan(_core.image_source(batch.image(0)), settings, None)
+            one = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
             self._size = settings, kind, one.image_size
         parts = math.ceil(count / max(1, min(LAYERS, BYTES // self._size[2])))
         layers = math.ceil(count / parts)

@@ -13,10 +13,24 @@ from vkbloom.checks import on_another_device
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Device", "DeviceArray", "Taken", "fill", "likeness", "on_cuda", "on_host", "take"]
+__all__ = [
+    "Device",
+    "DeviceArray",
+    "Place",
+    "Taken",
+    "fill",
+    "likeness",
+    "on_cuda",
+    "on_host",
+    "place_of",
+    "placed",
+    "take",
+]
 
 #: Where framebuffers are wanted.
 Device = Literal["host", "device"]
+#: Where framebuffers go: arrays of NumPy; the same as a `DeviceArray`; memory that CUDA shares.
+Place = Literal["host", "viewed", "cuda"]
 
 # DLPack's types of devices and elements.
 _CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
@@ -205,6 +219,24 @@ def on_host(array: Any) -> NDArray[Any]:
     return array.numpy() if isinstance(array, DeviceArray) else array
 
 
+def place_of(array: object) -> Place:
+    """Return where a framebuffer is."""
+    if not isinstance(array, DeviceArray):
+        return "host"
+    return "viewed" if isinstance(array._memory, np.ndarray) else "cuda"
+
+
+def placed(array: NDArray[Any], place: Place, core: _core.Renderer) -> NDArray[Any] | DeviceArray:
+    """Return an array of the host as if it were a framebuffer at that place."""
+    if place == "host":
+        return array
+    memory: _core.Exported | NDArray[Any] = array
+    if place == "cuda":
+        memory = core.export(array.nbytes)
+        memory.write(np.ascontiguousarray(array))
+    return DeviceArray(memory, array.shape, array.dtype.name)
+
+
 def on_cuda(image: object) -> bool:
     """Return whether an object is an array in the memory of a GPU with CUDA."""
     if isinstance(image, np.ndarray | DeviceArray):
@@ -247,24 +279,26 @@ class Taken(NamedTuple):
     strides: tuple[int, ...]
     dtype: str
 
-    def image(self, index: int | None = None) -> Any:
-        """Return it, or one image of a batch, as the core reads it."""
-        offset, shape, strides = self.offset, self.shape, self.strides
-        if index is not None:
-            offset, shape, strides = offset + index * strides[0], shape[1:], strides[1:]
-        return self.memory, offset, shape, strides, _FORMATS[self.dtype]
+    def at(self, index: int) -> Taken:
+        """Return one image of a batch."""
+        offset = self.offset + index * self.strides[0]
+        return self._replace(offset=offset, shape=self.shape[1:], strides=self.strides[1:])
+
+    def image(self) -> Any:
+        """Return it as the core reads it."""
+        return self.memory, self.offset, self.shape, self.strides, _FORMATS[self.dtype]
 
     def layers(self, first: int, count: int) -> Any:
         """Return images of a batch from `first` on, as the core reads them together."""
-        return *self.image(first), count, self.strides[0]
+        return *self.at(first).image(), count, self.strides[0]
 
     def numpy(self) -> NDArray[Any]:
         """Return the array in the host's memory."""
         low, high = _span(self.shape, self.strides, self.dtype)
         span = np.empty(high - low, np.uint8)
-        self.memory.read(span, 0)
+        self.memory.read(span, self.offset + low)
         return np.ndarray(
-            self.shape, self.dtype, buffer=span.data, offset=self.offset, strides=self.strides
+            self.shape, self.dtype, buffer=span.data, offset=-low, strides=self.strides
         ).copy()
 
 

@@ -542,6 +542,7 @@ class Renderer:
         *,
         mask: NDArray[Any] | None = None,
         emission: NDArray[Any] | None = None,
+        device: Device | None = None,
     ) -> tuple[Frames, Pullback]:
         """Add bloom to an image, and return a function for the derivatives of a sum over it.
 
@@ -549,26 +550,30 @@ class Renderer:
         ----------
         image, settings, mask, emission
             As for `apply`. The bloom buffers are "rgba32float", whatever `Settings.format` says.
+        device : {"host", "device"}, optional
+            As for `apply`. The derivatives by image, mask and emission go where the framebuffers
+            go.
 
         Returns
         -------
         frames : Frames
             As of `apply`.
         pullback : callable
-            ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum
-            over all of them of (framebuffer . cotangent), it returns the derivatives of S as
-            float32: by "image", "mask" (H, W) and "emission" if they were given, by "kernel" (of
-            `Convolution`), and by each real field under its name, such as "intensity" or
-            "glare.0.intensity". Those of a uint8 image are by value / 255. At NaN and infinity of
-            the image they are 0.
+            ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. They may be on
+            the GPU, as an image. With S the sum over all of them of (framebuffer . cotangent), it
+            returns the derivatives of S as float32: by "image", "mask" (H, W) and "emission" if
+            they were given, by "kernel" (of `Convolution`), and by each real field under its name,
+            such as "intensity" or "glare.0.intensity". Those by fields and kernel are arrays of
+            NumPy. Those of a uint8 image are by value / 255. At NaN and infinity of the image they
+            are 0.
 
         Raises
         ------
         ValueError, TypeError
             As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
             which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
-            has another shape, or is not finite. Its result raises ValueError for names that have no
-            derivative, such as "levels".
+            has another shape or dtype, or is not finite. Its result raises ValueError for names
+            that have no derivative, such as "levels".
         OutOfMemoryError, DeviceLostError, ValidationError, Error
             The device failed.
 
@@ -590,7 +595,8 @@ class Renderer:
         """
         from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
 
-        return vjp(self, image, check_settings(settings, of_image=True), mask, emission)
+        settings = check_settings(settings, of_image=True)
+        return vjp(self, image, settings, mask, emission, device)
 
     @checked
     def apply_many(

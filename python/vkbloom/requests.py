@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.device_arrays import DeviceArray
+from vkbloom.device_arrays import DeviceArray, Place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +19,17 @@ if TYPE_CHECKING:
 
     from vkbloom.settings import Settings
 
-__all__ = ["Result", "Work", "named", "new_array", "new_arrays", "new_memory", "run", "uploaded"]
+__all__ = [
+    "Place",
+    "Result",
+    "Work",
+    "named",
+    "new_array",
+    "new_arrays",
+    "new_memory",
+    "run",
+    "uploaded",
+]
 
 #: The most requests in one submission.
 REQUESTS = 32
@@ -36,10 +46,6 @@ IMAGES_AHEAD = 3
 #: Arrays of this size or more are in a renderer's pages, to which the device writes directly. For
 #: smaller arrays NumPy recycles some memory.
 LARGE_BYTES = 1 << 20
-
-
-#: Where framebuffers go: arrays of NumPy; the same as a `DeviceArray`; memory that CUDA shares.
-Place = Literal["host", "viewed", "cuda"]
 
 
 class Result(NamedTuple):

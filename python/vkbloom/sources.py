@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_size, check_time
@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import numpy as np
+    from numpy.typing import NDArray
 
     from vkbloom.scene import Mesh, Scene
     from vkbloom.scene.textures import Texture
     from vkbloom.settings import Shading
 
 __all__ = [
+    "Inputs",
     "batch_sources",
+    "checked_inputs",
     "image_kind",
     "image_source",
     "is_image",
@@ -29,6 +32,65 @@ __all__ = [
     "scene_source",
     "take_batch",
 ]
+
+
+class Inputs(NamedTuple):
+    """An image with its mask and emission, checked: arrays of the host, or copies on the device."""
+
+    image: NDArray[Any] | Taken
+    emission: NDArray[Any] | Taken | None = None
+    mask: NDArray[np.float32] | None = None
+
+    def named(self) -> dict[str, NDArray[Any] | Taken]:
+        """Return those that are there by name."""
+        return {name: part for name, part in self._asdict().items() if part is not None}
+
+    def kept(self) -> Inputs:
+        """Return inputs that the caller cannot change."""
+        copies: list[Any] = [
+            part if part is None or isinstance(part, Taken) else part.copy() for part in self
+        ]
+        return Inputs(*copies)
+
+    def on_host(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays by name, in the host's memory."""
+        return {
+            name: part.numpy() if isinstance(part, Taken) else part
+            for name, part in self.named().items()
+        }
+
+    def source(self, levels: tuple[NDArray[Any] | Taken, ...] = ()) -> _core.Source:
+        """Return the core's Source. The arrays must not change while it is used."""
+        return _core.image_source(
+            _as_read(self.image), _as_read(self.emission), self.mask, tuple(map(_as_read, levels))
+        )
+
+
+def _as_read(array: Any) -> Any:
+    return array.image() if isinstance(array, Taken) else array
+
+
+def checked_inputs(
+    image: object,
+    mask: object | None = None,
+    emission: object | None = None,
+    core: _core.Renderer | None = None,
+    name: str = "image",
+) -> Inputs:
+    """Check the arrays of an image, and copy those that are on the renderer's device."""
+    if core is None or not any(map(on_cuda, (image, mask, emission))):
+        core = None
+    pixels: Any = take(image, name, core) if core and on_cuda(image) else check_image(image, name)
+    glowing: Any = emission
+    if core and on_cuda(emission):
+        glowing = take(emission, "emission", core)
+    elif emission is not None:
+        glowing = check_emission(emission, pixels)
+    if core and on_cuda(mask):
+        # Its values are checked on the host; it has one channel of the image's three or four.
+        mask = take(mask, "mask", core, (2,)).numpy()
+    height, width, _ = pixels.shape
+    return Inputs(pixels, glowing, None if mask is None else check_mask(mask, (height, width)))
 
 
 def image_source(
@@ -50,33 +112,7 @@ def image_source(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
         return image._source
-    if core is not None and any(map(on_cuda, (image, mask, emission))):
-        return _device_source(image, mask, emission, core)
-    checked = check_image(image, name)
-    height, width, _ = checked.shape
-    return _core.image_source(
-        checked,
-        None if emission is None else check_emission(emission, checked),
-        None if mask is None else check_mask(mask, (height, width)),
-    )
-
-
-def _device_source(
-    image: object, mask: Any, emission: object | None, core: _core.Renderer
-) -> _core.Source:
-    """Return the Source of arrays of which some are on the device."""
-    checked: Any = take(image, "image", core) if on_cuda(image) else check_image(image)
-    glowing: Any = None
-    if emission is not None:
-        glowing = take(emission, "emission", core) if on_cuda(emission) else emission
-        if not isinstance(glowing, Taken):
-            glowing = check_emission(glowing, checked)
-    if mask is not None:
-        # Its values are checked on the host; it has one channel of the image's three or four.
-        host = take(mask, "mask", core, (2,)).numpy() if on_cuda(mask) else mask
-        mask = check_mask(host, (checked.shape[0], checked.shape[1]))
-    arrays = [one.image() if isinstance(one, Taken) else one for one in (checked, glowing)]
-    return _core.image_source(arrays[0], arrays[1], mask)
+    return checked_inputs(image, mask, emission, core, name).source()
 
 
 def take_batch(images: Any, core: _core.Renderer) -> Taken:
@@ -87,7 +123,7 @@ def take_batch(images: Any, core: _core.Renderer) -> Taken:
 def batch_sources(batch: Taken, first: int = 0) -> Iterator[_core.Source]:
     """Yield the Source of each image of a batch on the device, from `first` on."""
     for index in range(first, batch.shape[0]):
-        yield _core.image_source(batch.image(index))
+        yield Inputs(batch.at(index)).source()
 
 
 def is_image(source: object) -> bool:

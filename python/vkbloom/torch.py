@@ -24,13 +24,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from vkbloom.checks import import_extra
-from vkbloom.gradients import Pullback, checked_inputs, pullback_of
+from vkbloom.checks import check_mask, import_extra
+from vkbloom.core_access import core_of
+from vkbloom.device_arrays import DeviceArray, take
+from vkbloom.gradients import pull_each, pullback_of
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import check_cotangents, differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
+from vkbloom.sources import Inputs, checked_inputs
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
@@ -52,9 +55,9 @@ def bloom(
     ----------
     image : Tensor, shape (..., H, W, C)
         Linear light with 3 or 4 channels, of float16, float32 or float64. Those of float64 are
-        computed in NumPy by `vkbloom.reference`, all others by the renderer. Tensors of CUDA stay
-        on their GPU; only a mask, which is checked there, and the derivatives take the way through
-        the host.
+        computed in NumPy by `vkbloom.reference`, all others by the renderer. Tensors of CUDA, and
+        the derivatives by them, stay on their GPU; only a mask, whose values are checked on the
+        host, and what `Renderer.vjp` takes from the reference go through the host.
     settings : Settings
         `Settings.format` is not read: the bloom buffers are "rgba32float".
     mask : Tensor, shape (..., H, W), optional
@@ -290,11 +293,12 @@ def _renderer_on(index: int) -> Renderer:
     return Renderer(f"uuid:{torch.cuda.get_device_properties(index).uuid}")
 
 
-def _renderer(number: int) -> Renderer:
+def _renderer(number: int, image: Any = None) -> Renderer:
+    """Return the renderer with that number; for tensors of CUDA, this module's is on their GPU."""
     if number != _OWN:
         return _RENDERERS[number]
     with _opening:
-        return _own_renderer()
+        return _own_renderer() if image is None else _renderer_on(image.device.index)
 
 
 def _number(renderer: Renderer | None) -> int:
@@ -323,15 +327,48 @@ def _split(names: str) -> list[str]:
     return names.split(",") if names else []
 
 
-def _pullback(arrays: dict[str, Any], settings: Settings, renderer: int) -> Pullback:
-    """Return the pullback: of the reference for float64, else of the renderer."""
-    given = dict(arrays)
-    image = given.pop("image")
-    if image.dtype == np.float64:
-        return reference_vjp(image, settings, **given)[1]
-    pixels, checked = checked_inputs(image, given.get("mask"), given.get("emission"))
-    pullback = pullback_of(_renderer(renderer), pixels, settings, checked)
-    return lambda cotangents: pullback(check_cotangents(cotangents, {"final": pixels}))
+def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
+    """Return the derivatives: of the reference for float64, else of the renderer."""
+    if arrays["image"].dtype == np.float64:
+        return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
+    pullback = pullback_of(_renderer(renderer), checked_inputs(**arrays), settings)
+    return pullback(check_cotangents({"final": cotangent}, {"final": cotangent}))
+
+
+def _pulled_on_device(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    settings: Settings,
+    number: int,
+) -> Iterator[Any]:
+    """Yield the derivatives of each image, with those by images as tensors of the GPU."""
+    renderer = _renderer(number, image)
+    core = core_of(renderer)
+    masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
+    images, emissions, cotangents = (
+        None if one is None else take(_batch(one), name, core, (4,))
+        for name, one in (("image", image), ("emission", emission), ("cotangent", cotangent))
+    )
+    assert images
+    assert cotangents
+    sequence = (
+        (
+            Inputs(
+                images.at(index),
+                emissions.at(index) if emissions else None,
+                None if masks is None else check_mask(masks[index], masks.shape[1:]),
+            ),
+            {"final": cotangents.at(index)},
+        )
+        for index in range(images.shape[0])
+    )
+    yield from pull_each(renderer, settings, sequence, "cuda")
+
+
+def _batch(tensor: Any) -> Any:
+    return tensor.detach().reshape(-1, *tensor.shape[-3:])
 
 
 def _operator(name: str, parameters: str, result: str) -> Any:
@@ -379,8 +416,8 @@ def _on_device(  # noqa: PLR0917
     """Run the operator without the host; a batch without masks changes the context once."""
     settings = _replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
     settings = settings.replace(format="rgba32float")
-    renderer = _renderer(number) if number != _OWN else _renderer_on(image.device.index)
-    images = image.detach().reshape(-1, *image.shape[-3:])
+    renderer = _renderer(number, image)
+    images = _batch(image)
     if mask is None and emission is None:
         frames = renderer.apply_each(images, settings, attachments="final")
     else:
@@ -392,9 +429,7 @@ def _on_device(  # noqa: PLR0917
             renderer.apply(one, settings, mask=masks[i], emission=emissions[i], attachments="final")
             for i, one in enumerate(images)
         )
-    finals = [torch.from_dlpack(one["final"]) for one in frames]
-    final = finals[0] if len(finals) == 1 else torch.stack(finals)
-    return final.reshape(image.shape)
+    return _joined([torch.from_dlpack(one["final"]) for one in frames], image)
 
 
 def _dtype(tensor: Any) -> Any:
@@ -424,24 +459,41 @@ def _backward(  # noqa: PLR0917
     Of a batch, the derivatives by values are added.
     """
     inputs = {"image": image, "mask": mask, "emission": emission}
-    found = {
-        name: np.zeros(part.shape, np.float64)
-        for name, part in [*inputs.items(), *zip(_split(names), values, strict=True)]
-        if part is not None
-    }
-    wanted = cotangent.detach().cpu().numpy()
-    for index, arrays, one in _each(image, mask, emission, values, names, settings):
-        gradients = _pullback(arrays, one, renderer)({"final": wanted[index]})
-        for name, total in found.items():
-            if name in inputs:
-                total[index] = gradients[name]
-            else:
-                np.add(total, gradients[name], out=total)
-    parts = [*(part for part in inputs.values() if part is not None), *values]
+    images = {name: part for name, part in inputs.items() if part is not None}
+    fields = dict(zip(_split(names), values, strict=True))
+    found: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
+    on_device = image.is_cuda and image.dtype != torch.float64
+    if on_device:
+        one = _replaced(_settings(settings), fields)
+        pulled = _pulled_on_device(cotangent, image, mask, emission, one, renderer)
+    else:
+        wanted = cotangent.detach().cpu().numpy()
+        pulled = (
+            _pulled(arrays, one, renderer, wanted[index])
+            for index, arrays, one in _each(image, mask, emission, values, names, settings)
+        )
+    for gradients in pulled:
+        for name, parts in found.items():
+            parts.append(_as_tensor(gradients[name]))
     return [
-        torch.from_numpy(total).to(part.device, part.dtype)
-        for total, part in zip(found.values(), parts, strict=True)
+        *(_joined(found[name], part) for name, part in images.items()),
+        *(sum(found[name], torch.zeros(part.shape)).to(part) for name, part in fields.items()),
     ]
+
+
+def _as_tensor(part: Any) -> Any:
+    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact."""
+    if isinstance(part, DeviceArray):
+        return torch.from_dlpack(part)
+    return torch.from_numpy(np.array(part, np.float64))
+
+
+def _joined(parts: list[Any], like: Any) -> Any:
+    """Return images as a tensor of the kind of another one."""
+    if not parts:
+        return like.new_zeros(like.shape)
+    joined = parts[0] if len(parts) == 1 else torch.stack(parts)
+    return joined.reshape(like.shape).to(like).contiguous()
 
 
 @_backward.register_fake  # type: ignore[untyped-decorator]

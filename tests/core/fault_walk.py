@@ -206,11 +206,16 @@ def own_passes(renderer: Renderer) -> Arrays:
 
 
 def on_device(renderer: Any) -> Arrays:
-    """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before."""
+    """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before.
+
+    The derivatives by the emission are passes', those by the image zeros of the host.
+    """
     images = np.stack([picture(*SIZE, dtype="float16", seed=seed) for seed in range(3)])
     settings = vkbloom.Separable(threshold=0.3)
-    one = renderer.apply(OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]))
+    one, pullback = renderer.vjp(OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]))
+    found = pullback({"bloom": OnDevice(np.ones(one["bloom"].shape, np.float16))})
     arrays = {name: array.numpy() for name, array in one.items()}
+    arrays |= {f"by {name}": found[name].numpy() for name in ("image", "emission")}
     copied = np.from_dlpack(Consumer(one["bloom"]))
     del one
     for index, frames in enumerate(renderer.apply_each(OnDevice(images), settings)):

@@ -14,8 +14,8 @@
 enum { SUCCESS, INVALID_VALUE, OUT_OF_MEMORY, INVALID_DEVICE = 101 };
 enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
 
-// What is there now, by kind; and bytes copied to the host.
-static long contexts, streams, events, memories, mappings, read_bytes, current;
+// What is there now, by kind; and bytes that go to and come from the host.
+static long contexts, streams, events, memories, mappings, host_bytes, current;
 
 struct memory_handle {
     int type;
@@ -41,7 +41,7 @@ static void report(void)
     if (!file)
         return;
     fprintf(file, "%ld %ld %ld %ld %ld %ld %ld\n", contexts, streams, events, memories, mappings,
-            current, read_bytes);
+            current, host_bytes);
     fclose(file);
 }
 
@@ -253,7 +253,20 @@ EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, 
 
 EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
 {
-    __atomic_add_fetch(&read_bytes, (long)size, __ATOMIC_SEQ_CST);
+    __atomic_add_fetch(&host_bytes, (long)size, __ATOMIC_SEQ_CST);
     memcpy(to, (const void *)(uintptr_t)from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuMemcpyHtoDAsync_v2(unsigned long long to, const void *from, size_t size, void *stream)
+{
+    __atomic_add_fetch(&host_bytes, (long)size, __ATOMIC_SEQ_CST);
+    memcpy((void *)(uintptr_t)to, from, size);
+    return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+// Not of CUDA: the bytes so far.
+EXPORT long stand_in_host_bytes(void)
+{
+    return host_bytes;
 }

@@ -299,6 +299,96 @@ def lifetime(renderer: Any) -> None:
     same(renderer.apply(OnDevice(image)), renderer.apply(image))
 
 
+def equal_gradients(found: Any, expected: Any, place: type = vkbloom.DeviceArray) -> None:
+    images = [name for name in ("image", "mask", "emission") if name in expected]
+    for name in (*images, "intensity"):
+        assert isinstance(found[name], place) or name not in images, name
+        array = found[name].numpy() if isinstance(found[name], vkbloom.DeviceArray) else found[name]
+        np.testing.assert_array_equal(array, expected[name], err_msg=name)
+        assert array.shape == expected[name].shape
+        assert array.dtype == np.float32
+
+
+# The last has no adjoint passes: its derivatives are the reference's.
+PULLED = (
+    Separable(threshold=0.3, knee=0.5, intensity=0.4),
+    Pyramid(levels=2, threshold=0.3, tonemap="reinhard"),
+    vkbloom.DualKawase(levels=2),
+    vkbloom.BevyBloom(max_mip_dimension=16),
+    vkbloom.Convolution(psf=np.ones((3, 5, 3))),
+    Separable(glare=(vkbloom.Ghosts(),)),
+)
+
+
+def gradients(renderer: Any) -> None:
+    """The bits of derivatives through NumPy, without a byte through the host."""
+    bytes_so_far = ctypes.CDLL("libcuda.so.1").stand_in_host_bytes
+    bytes_so_far.restype = ctypes.c_long
+    rng = np.random.default_rng(2)
+    for step in range(18 if EXHAUSTIVE else 6):
+        settings = PULLED[step % len(PULLED)]
+        image, cotangent = strided(rng, ("float16", "float32")[step % 2]), strided(rng, "float32")
+        cotangent = np.resize(cotangent, image.shape).astype(("float32", "float16")[step // 2 % 2])
+        glowing: dict[str, Any] = {"emission": image[::-1].copy()} if step % 2 == 0 else {}
+        expected = renderer.vjp(image, settings, **glowing)[1]({"final": cotangent})
+        before = bytes_so_far()
+        glowing = {name: OnDevice(part) for name, part in glowing.items()}
+        frames, pullback = renderer.vjp(OnDevice(image), settings, **glowing)
+        found = pullback({"final": OnDevice(cotangent)})
+        assert isinstance(frames["final"], vkbloom.DeviceArray)
+        assert isinstance(found["image"], vkbloom.DeviceArray)
+        assert settings.glare or bytes_so_far() == before
+        equal_gradients(found, expected)
+        equal_gradients(pullback({"final": cotangent}), expected)
+        # Channels first, and all of one element, as PyTorch has them.
+        first = np.ascontiguousarray(np.moveaxis(cotangent, -1, 0))
+        equal_gradients(pullback({"final": Interfaced(np.moveaxis(first, 0, -1))}), expected)
+    one = np.lib.stride_tricks.as_strided(np.ones(1, np.float32), image.shape, (0, 0, 0))
+    expected = renderer.vjp(image, Pyramid(levels=2))[1]({"final": np.ones(image.shape)})
+    _, pullback = renderer.vjp(OnDevice(image), Pyramid(levels=2))
+    equal_gradients(pullback({"final": OnDevice(one)}), expected)
+
+
+def gradient_places(renderer: Any) -> None:
+    """Masks, emissions, `device`, levels of bytes, other framebuffers, and what is refused."""
+    image = picture(24, 16)
+    mask = np.random.default_rng(1).random((16, 24), np.float32)
+    settings = Separable(threshold=0.3, composite="mix", intensity=0.4)
+    both = {"final": np.ones_like(image), "bloom": np.ones((16, 24, 4), np.float32)}
+    expected = renderer.vjp(image, settings, mask=mask)[1](both)
+    moved = {name: OnDevice(part) for name, part in both.items()}
+    _, pullback = renderer.vjp(OnDevice(image), settings, mask=OnDevice(mask))
+    equal_gradients(pullback(moved), expected)
+    equal_gradients(pullback({**both, "bloom": OnDevice(both["bloom"].astype("u1"))}), expected)
+    for device, place in (("host", np.ndarray), (None, np.ndarray), ("device", None)):
+        pullback = renderer.vjp(image, settings, mask=mask, device=device)[1]
+        equal_gradients(pullback(moved), expected, place or vkbloom.DeviceArray)
+    # The image is not read: its derivative is 0, where the others are.
+    _, pullback = renderer.vjp(OnDevice(image), settings, emission=OnDevice(image))
+    found = pullback({"bloom": moved["bloom"]})["image"]
+    assert isinstance(found, vkbloom.DeviceArray)
+    assert not found.numpy().any()
+    _, pullback = renderer.vjp(OnDevice(image), settings)
+    wrong = image.copy()
+    wrong[3, 4, 1] = np.nan
+    refused: list[tuple[str, Any, type[Exception], str]] = [
+        ("final", OnDevice(wrong), ValueError, "cotangents: 'final' has NaN or infinity"),
+        ("final", OnDevice(wrong.astype("f2")), ValueError, "'final' has NaN or infinity"),
+        ("final", OnDevice(image[1:]), ValueError, "the shape of 'final' is (15, 24, 4), not (16,"),
+        ("final", OnDevice(image[0]), ValueError, "cotangents['final']: shape (24, 4) is not"),
+        ("final", OnDevice(image, (2, 0)), ValueError, "cotangents['final']: it is on Stand-in 0"),
+        ("final", OnDevice(image.astype("f8")), TypeError, "float64 is not one of"),
+        ("final", OnDevice(image.astype("f2"), code=4), TypeError, "cotangents['final'].to(torch."),
+        ("final", Interfaced(image, data=(1, False)), ValueError, "may have been freed"),
+        ("blom", OnDevice(image), ValueError, "unknown framebuffer 'blom'; available: glow"),
+    ]
+    for name, given, kind, part in refused:
+        raises(kind, part, functools.partial(pullback, {name: given}))
+    # NaN of the image is not the cotangent's.
+    spoilt = renderer.vjp(wrong, settings)[1]({"final": image})
+    equal_gradients(renderer.vjp(OnDevice(wrong), settings)[1]({"final": OnDevice(image)}), spoilt)
+
+
 def raises(kind: type[Exception], part: str, call: Callable[[], object]) -> None:
     with pytest.raises(kind) as caught:
         call()
@@ -336,7 +426,10 @@ def errors(renderer: Any) -> None:
     same(apply(wide), apply(image))
 
 
-WORK = (layouts, streams, sequences, layers, places, capsules, recycling, lifetime, errors)
+WORK = (
+    *(layouts, streams, sequences, layers, places, capsules, recycling, lifetime, errors),
+    *(gradients, gradient_places),
+)
 
 
 # As the default, of levels that do not take most of the time.

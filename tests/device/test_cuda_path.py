@@ -32,21 +32,16 @@ def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None
     check(done, folder)
 
 
+WORK = ("layouts", "sequences", "layers", "places", "gradients")
+
+
 def test_dispatches_access_images(
     folder: Path,
     software: AdapterInfo,
     layer: Path,  # noqa: F811
 ) -> None:
     """What reads and writes pixels on an adapter that is not a CPU, as GPUs do it."""
-    program = (
-        "-m",
-        "tests.device.device_work",
-        "validated",
-        "layouts",
-        "sequences",
-        "places",
-        "layers",
-    )
+    program = ("-m", "tests.device.device_work", "validated", *WORK)
     check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
 
 

@@ -25,7 +25,7 @@ from vkbloom.gradients import pullback_of
 from vkbloom.image import Image
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
-from vkbloom.sources import image_source
+from vkbloom.sources import Inputs, image_source
 
 __all__ = ["Maker", "fit"]
 
@@ -377,7 +377,7 @@ def _derivatives(
 ) -> Callable[[NDArray[np.float64]], Any]:
     """Return the function from a cotangent to the derivatives by each field."""
     assert stage.pixels is not None
-    pullback = pullback_of(renderer, stage.pixels, _smaller(settings, stage.factor), {})
+    pullback = pullback_of(renderer, Inputs(stage.pixels), _smaller(settings, stage.factor))
     # The shape of a framebuffer of four channels, such as "bloom", differs from the image's.
     channels = stage.pixels.shape[2] if framebuffer == "final" else 4
 

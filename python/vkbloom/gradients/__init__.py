@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from vkbloom.gradients.passes import on_device
-from vkbloom.gradients.pulling import Pullback, checked_inputs, pullback_of, vjp
+from vkbloom.gradients.pulling import Pullback, pull_each, pullback_of, vjp
 
-__all__ = ["Pullback", "checked_inputs", "on_device", "pullback_of", "vjp"]
+__all__ = ["Pullback", "on_device", "pull_each", "pullback_of", "vjp"]

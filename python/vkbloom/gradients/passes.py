@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core, requests
 from vkbloom.core_access import HasCore, core_of
+from vkbloom.device_arrays import Place, Taken, placed
 from vkbloom.reference.derivatives import Gradients, differentiable
+from vkbloom.sources import Inputs
 
 if TYPE_CHECKING:
     from vkbloom.settings import Settings
 
-__all__ = ["DeviceGradients", "Passes", "device_fields", "on_device"]
+__all__ = ["DeviceGradients", "Passes", "Running", "check_finite", "device_fields", "on_device"]
 
 #: The most framebuffers with cotangents that a source can bring.
 _MOST: Final = 7
@@ -31,43 +33,86 @@ _LEAST: Final = 0.3
 _STEEP: Final = {"aces", "agx", "pq", "hlg"}
 
 
+def check_finite(cotangents: Mapping[str, NDArray[Any] | Taken]) -> None:
+    """Raise ValueError if a cotangent on the device is not finite; those of the host are."""
+    for name, part in cotangents.items():
+        if isinstance(part, Taken) and not np.isfinite(part.numpy()).all():
+            raise ValueError(f"cotangents: {name!r} has NaN or infinity")
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """Adjoint passes that were submitted; without a submission there is nothing to run."""
+
+    passes: Passes
+    plan: _core.Plan
+    arrays: tuple[NDArray[Any] | _core.Exported, ...]
+    place: Place
+    submission: _core.Submission | None
+
+    def named(self) -> dict[str, NDArray[Any]]:
+        """Wait, and return the framebuffers."""
+        counts = self.submission.wait()[1] if self.submission else (1, 0)
+        # The device counts what is not finite in all inputs together.
+        if any(counts):
+            check_finite(self.passes.cotangents)
+        return requests.named(self.plan, self.arrays, self.place)
+
+    def images(self) -> dict[str, NDArray[Any]]:
+        """Wait, and return the derivatives by image, mask and emission."""
+        found = self.named()
+        return {
+            name: found[f"by_{name}"] if f"by_{name}" in found else self._zeros(part.shape)
+            for name, part in self.passes.inputs.named().items()
+        }
+
+    def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        core = core_of(self.passes.renderer)
+        return cast("NDArray[Any]", placed(np.zeros(shape, np.float32), self.place, core))
+
+
 @dataclass(frozen=True, eq=False)
 class Passes:
     """The adjoint passes of an image with settings and cotangents.
 
-    - `given`: Mask and emission.
-    - `cotangents`: Checked, by framebuffer.
+    - `cotangents`: Checked, by framebuffer; those on the device but for NaN and infinity.
+    - `place`: Where the derivatives by images go.
     """
 
     renderer: HasCore
-    pixels: NDArray[Any]
+    inputs: Inputs
     settings: Settings
-    given: Mapping[str, NDArray[Any]]
-    cotangents: Mapping[str, NDArray[Any]]
+    cotangents: Mapping[str, NDArray[Any] | Taken]
+    place: Place = "host"
 
-    def images(self) -> dict[str, NDArray[np.float32]] | None:
-        """Return the derivatives by image, mask and emission.
+    def submit(self, *, sums: bool = False) -> Running | None:
+        """Submit the passes of the derivatives by images, or the sums of those by fields.
 
         None: a pass has no adjoint, or the renderer is closed.
         """
-        found = self._run(sums=False)
-        if found is None:
+        core = core_of(self.renderer)
+        levels = tuple(map(_level, self.cotangents.values()))
+        if core.closed or not 0 < len(levels) <= _MOST:
             return None
-        results = {
-            name: found.get(f"by_{name}", np.zeros(array.shape, np.float32))
-            for name, array in (("image", self.pixels), *sorted(self.given.items()))
-        }
-        if "by_mask" in found:
-            results["mask"] = np.ascontiguousarray(results["mask"][..., 0])
-        return results
+        if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
+            return None
+        source = self.inputs.source(levels)
+        plan = core.adjoint(source, self.settings, tuple(self.cotangents), sums)
+        if plan is None:
+            return None
+        place: Place = "host" if sums else self.place
+        arrays = requests.new_arrays(core, plan, place)
+        submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
+        return Running(self, plan, arrays, place, submission)
 
     def fields(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivatives by fields that are exact to single floats."""
         wanted = device_fields(self.settings)
-        found = self._run(sums=True) if wanted else None
+        running = self.submit(sums=True) if wanted else None
+        found = running.named() if running else {}
         results: dict[str, NDArray[np.float32]] = {}
         for kind, names in _SUMS.items():
-            if found is None or kind not in found:
+            if kind not in found:
                 continue
             sums, squares = (found[key][0, 0] for key in (kind, f"{kind}_squares"))
             for name, total, square in zip(names, sums, squares, strict=False):
@@ -75,28 +120,18 @@ class Passes:
                     results[name] = np.asarray(total)
         return results
 
-    def _run(self, *, sums: bool) -> dict[str, NDArray[Any]] | None:
-        core = core_of(self.renderer)
-        levels = tuple(np.ascontiguousarray(one, np.float32) for one in self.cotangents.values())
-        if core.closed or not 0 < len(levels) <= _MOST:
-            return None
-        if any(level.ndim != 3 or level.shape[2] not in (3, 4) for level in levels):
-            return None
-        given = self.given
-        source = _core.image_source(self.pixels, given.get("emission"), given.get("mask"), levels)
-        plan = core.adjoint(source, self.settings, tuple(self.cotangents), sums)
-        if plan is None or not plan.outputs:
-            return None if plan is None else {}
-        arrays = requests.new_arrays(core, plan)
-        core.run(source, (plan,), (arrays,)).wait()
-        return requests.named(plan, arrays)
+
+def _level(cotangent: NDArray[Any] | Taken) -> NDArray[Any] | Taken:
+    if isinstance(cotangent, Taken):
+        return cotangent
+    return np.ascontiguousarray(cotangent, np.float32)
 
 
 def on_device(renderer: HasCore, settings: Settings) -> bool:
     """Return whether the device has passes for the derivative of "final" by an image with alpha."""
     pixels = np.zeros((32, 40, 4), np.float32)
     floats = settings.replace(format="rgba32float")
-    return Passes(renderer, pixels, floats, {}, {"final": pixels}).images() is not None
+    return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
 
 
 def device_fields(settings: Settings) -> frozenset[str]:

@@ -15,7 +15,7 @@ from .framebuffers import checked_image, framebuffers
 from .sampling import Array
 from .tape import Traced, gradients, value_of
 
-__all__ = ["DISCRETE", "Gradients", "check_cotangents", "differentiable", "vjp"]
+__all__ = ["DISCRETE", "Gradients", "check_cotangents", "check_shape", "differentiable", "vjp"]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
@@ -194,18 +194,20 @@ def check_cotangents(
     return {name: _checked_cotangent(name, part, values) for name, part in cotangents.items()}
 
 
-def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
+def check_shape(name: str, shape: tuple[int, ...], values: Mapping[str, Any]) -> None:
+    """Raise ValueError unless a framebuffer has the cotangent's shape."""
     if name not in values:
         known = ", ".join(values)
         raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {known}")
+    if shape != values[name].shape:
+        raise ValueError(f"cotangents: the shape of {name!r} is {shape}, not {values[name].shape}")
 
+
+def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
     given = np.asarray(cotangent)
+    check_shape(name, given.shape, values)
     if given.dtype.kind not in "fiub":
         raise TypeError(f"cotangents: {name!r} is of dtype {given.dtype}, not of real numbers")
-    if given.shape != values[name].shape:
-        raise ValueError(
-            f"cotangents: the shape of {name!r} is {given.shape}, not {values[name].shape}"
-        )
     array = given.astype(np.float64)
     if not np.isfinite(array).all():
         raise ValueError(f"cotangents: {name!r} has NaN or infinity")
