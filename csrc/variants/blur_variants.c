@@ -284,20 +284,58 @@ static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, ui
              : NULL;
 }
 
+// The graph's chain for tiles. The formats of image and bloom may differ.
+static bool find_any_chain(const struct vkb_graph *graph, struct chain *chain)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (find_chain(graph, &graph->passes[i], TILE_RADIUS, vkb_writer_of, chain))
+            return true;
+    return false;
+}
+
+static bool is_differentiated(const struct vkb_graph *graph, uint32_t bloom)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].shader == &vkb_shader_adjoint_composite_frag
+            && vkb_pass_reads(&graph->passes[i], bloom))
+            return true;
+    return false;
+}
+
+// The bloom alone in tiles, where derivatives need it.
+bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
+{
+    struct chain chain;
+
+    *fits = vkb_is_line_blur(pass) && fits_tiles(choice->device)
+         && is_differentiated(&choice->plain, pass->targets[0])
+         && find_any_chain(&choice->plain, &chain) && chain.horizontal == pass;
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = fused_row(choice, &chain);
+    memcpy(row.name, pass->name, sizeof row.name);
+    row.targets[0] = pass->targets[0];
+    row.constants.composite = COMPOSITE_OFF;
+    row.constants.format =
+        vkb_stored_as(choice->device, choice->plain.images[pass->targets[0]].format);
+    make_tiles(&row, &vkb_shader_tile_comp, &chain);
+    return vkb_add_fullscreen(choice, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // The transposes of a chain, of which `pass` is the last one.
 static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                                struct chain *chain, const struct vkb_pass_row **by_bloom)
 {
     const struct vkb_shader *filter = &vkb_shader_adjoint_filter_frag;
     const struct vkb_shader *composite = &vkb_shader_adjoint_composite_frag;
-    bool found = false;
 
     if (pass->shader != &vkb_shader_adjoint_threshold_frag || pass->constants.by != BY_SCENE
         || pass->constants.masked || !pass->constants.add_own)
         return false;
-    for (uint32_t i = 0; !found && i < graph->pass_count; ++i)
-        found = find_chain(graph, &graph->passes[i], TILE_RADIUS, vkb_writer_of, chain);
-    const struct vkb_pass_row *first = found ? sole_adjoint(graph, pass->reads[2], filter) : NULL;
+    const struct vkb_pass_row *first =
+        find_any_chain(graph, chain) ? sole_adjoint(graph, pass->reads[2], filter) : NULL;
     const struct vkb_pass_row *second = first ? sole_adjoint(graph, first->reads[0], filter) : NULL;
     const struct vkb_pass_row *by_scene = sole_adjoint(graph, pass->reads[3], composite);
     *by_bloom = second ? sole_adjoint(graph, second->reads[0], composite) : NULL;
@@ -325,7 +363,8 @@ bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct
         row.reads[row.read_count] = by_bloom->reads[row.read_count];
     row.reads[row.read_count++] = by_bloom->reads[3];
     row.constants.dither = 0;
+    // Its sums have another order, so it is taken always: all runs have the same bits.
+    row.fused = false;
     make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
