@@ -99,23 +99,6 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
         && add_halved_image(choice, pass, &row, error);
 }
 
-// The same for a pass whose shader only removes NaN and infinity from the image, as the threshold
-// pass of a published method does.
-static bool add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           const struct vkb_pass_row *reducing, struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    struct vkb_pass_row row;
-
-    if (!threshold || threshold->constants.threshold_mode != THRESHOLD_NONE)
-        return true;
-    memcpy(&row, reducing, sizeof row);
-    row.reads[0] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
@@ -208,7 +191,7 @@ static bool add_prefilter(const struct vkb_variant_choice *choice, const struct 
     vkb_drop_reads(&row, 1);
     vkb_make_words(&row, shader, columns, rows);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && add_from_image(choice, pass, &row, error);
+        && vkb_add_from_image(choice, pass, &row, error);
 }
 
 bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

@@ -73,10 +73,26 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
+// Whether the pass has a shader that can also read what the threshold pass reads: it removes NaN
+// and infinity from each texel, which filters of the hardware would not.
+static bool reads_images(const struct vkb_pass_row *pass)
+{
+    return pass->shader == &vkb_shader_bevy_prefilter_frag && !pass->constants.masked
+        && pass->constants.sampling != SAMPLING_FILTER;
+}
+
 bool vkb_add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
     *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    return !*fits || vkb_add_fullscreen(choice, pass, error);
+    if (!*fits)
+        return true;
+    if (!vkb_add_fullscreen(choice, pass, error))
+        return false;
+    if (choice->variants != VKB_VARIANTS_GPU || !reads_images(pass))
+        return true;
+    struct vkb_pass_row row;
+    memcpy(&row, &choice->graph->passes[choice->graph->pass_count - 1], sizeof row);
+    return vkb_add_from_image(choice, pass, &row, error);
 }

@@ -1,5 +1,7 @@
 #include "variants/variant.h"
 
+#include <string.h>
+
 enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format)
 {
     return format == VKB_FORMAT_RGBA8_UNORM
@@ -75,6 +77,24 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
                 && graph->images[pass->reads[0]].format == graph->images[image].format
              ? pass
              : NULL;
+}
+
+bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        const struct vkb_pass_row *reducing, struct vkb_error *error)
+{
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    struct vkb_pass_row row;
+
+    if (!threshold || threshold->constants.threshold_mode != THRESHOLD_NONE)
+        return true;
+    memcpy(&row, reducing, sizeof row);
+    // Also in place of a mask, if there is none.
+    for (uint32_t i = 0; i < row.read_count; ++i)
+        if (row.reads[i] == pass->reads[0])
+            row.reads[i] = threshold->reads[0];
+    row.fused = true;
+    row.constants.from_image = true;
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)

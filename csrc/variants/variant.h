@@ -65,6 +65,12 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
 // pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
 
+// If a threshold pass that only removes NaN and infinity, as that of a published method does,
+// writes what `pass` reads, adds a fused pass that reads the image itself. It may replace
+// `reducing`, the variant of `pass`.
+bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        const struct vkb_pass_row *reducing, struct vkb_error *error);
+
 // Whether an upsampling by a linear filter reads an image of the target's size.
 bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass);
 

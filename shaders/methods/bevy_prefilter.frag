@@ -3,6 +3,10 @@
 #extension GL_EXT_control_flow_attributes : require
 // Bevy's first downsampling: 13 taps.
 #include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+// Where the pass reads the image itself, as the threshold pass does.
+#define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 
