@@ -52,6 +52,10 @@ class Batches:
         self._last: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
         self._size: tuple[Settings, tuple[Any, ...], int] | None = None
 
+    def forget(self) -> None:
+        """Release the plan."""
+        self._last = None
+
     def run(
         self,
         batch: Taken,

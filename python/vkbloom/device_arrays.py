@@ -11,6 +11,8 @@ from vkbloom import _core
 from vkbloom.checks import on_another_device
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "Taken",
     "fill",
     "likeness",
+    "merged",
     "on_cuda",
     "on_host",
     "place_of",
@@ -212,6 +215,25 @@ class DeviceArray:
             "stream": None,
             "version": 3,
         }
+
+
+def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
+    """Return images as batches: those that follow one another in the same memory are one."""
+    batches: list[DeviceArray] = []
+    for image in images:
+        if batches:
+            last = batches[-1]
+            after = last._offset + last.nbytes
+            same = last._memory is image._memory and last.shape[1:] == image.shape
+            if same and after == image._offset and last.dtype == image.dtype:
+                batches[-1] = DeviceArray(
+                    last._memory, (len(last) + 1, *image.shape), last.dtype.name, last._offset
+                )
+                continue
+        batches.append(
+            DeviceArray(image._memory, (1, *image.shape), image.dtype.name, image._offset)
+        )
+    return batches
 
 
 def on_host(array: Any) -> NDArray[Any]:

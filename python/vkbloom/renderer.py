@@ -286,6 +286,7 @@ class Renderer:
         True
         """
         self._planned = self._kept = None
+        self._batches.forget()
         self._core.close()
 
     @checked

@@ -20,13 +20,13 @@ import functools
 import threading
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 from vkbloom.checks import check_mask, import_extra
 from vkbloom.core_access import core_of
-from vkbloom.device_arrays import DeviceArray, take
+from vkbloom.device_arrays import DeviceArray, merged, take
 from vkbloom.gradients import pull_each, pullback_of
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
@@ -429,7 +429,9 @@ def _on_device(  # noqa: PLR0917
             renderer.apply(one, settings, mask=masks[i], emission=emissions[i], attachments="final")
             for i, one in enumerate(images)
         )
-    return _joined([torch.from_dlpack(one["final"]) for one in frames], image)
+    # The images of a batch are in the same memory.
+    batches = merged([cast("DeviceArray", one["final"]) for one in frames])
+    return _joined([torch.from_dlpack(one) for one in batches], image, torch.cat)
 
 
 def _dtype(tensor: Any) -> Any:
@@ -488,11 +490,11 @@ def _as_tensor(part: Any) -> Any:
     return torch.from_numpy(np.array(part, np.float64))
 
 
-def _joined(parts: list[Any], like: Any) -> Any:
-    """Return images as a tensor of the kind of another one."""
+def _joined(parts: list[Any], like: Any, join: Any = None) -> Any:
+    """Return images, or with `join` batches, as a tensor of the kind of another one."""
     if not parts:
         return like.new_zeros(like.shape)
-    joined = parts[0] if len(parts) == 1 else torch.stack(parts)
+    joined = parts[0] if len(parts) == 1 else (join or torch.stack)(parts)
     return joined.reshape(like.shape).to(like).contiguous()
 
 

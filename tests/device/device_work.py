@@ -24,6 +24,7 @@ import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Convolution, Pyramid, Renderer, Separable
+from vkbloom.device_arrays import merged
 
 VALIDATION = "validated" in sys.argv
 ADAPTER = os.environ.get("VKBLOOM_TEST_NAME") or "software"
@@ -189,6 +190,14 @@ def layers(renderer: Any) -> None:
     view = np.ctypeslib.as_array((ctypes.c_uint16 * right.size).from_address(copied))
     np.testing.assert_array_equal(view, right.view(np.uint16).ravel())
     same(renderer.apply(last, LOW), renderer.apply(right, LOW))
+    # As PyTorch takes them: with rows of 256 bytes and more they follow one another.
+    wide = np.stack([picture(32, 4, 4, "float16", seed=i) for i in range(6)])
+    finals = [one["final"] for one in renderer.apply_each(OnDevice(wide), Pyramid(levels=2))]
+    found = merged([*finals, finals[0]])
+    assert [len(one) for one in found] == ([6, 1] if renderer.info.type != "cpu" else [1] * 7)
+    # The last one comes again; on a CPU each is an array of its own.
+    joined = np.concatenate([one.numpy() for one in found])
+    np.testing.assert_array_equal(joined[:6], np.stack([one.numpy() for one in finals]))
 
 
 def places(renderer: Any) -> None:
