@@ -140,7 +140,10 @@ static const struct vkb_pass_row *blur_of(const struct vkb_graph *graph, uint32_
              : NULL;
 }
 
+// `threshold_of` finds the threshold pass of a bloom buffer.
 static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
+                       const struct vkb_pass_row *(*threshold_of)(const struct vkb_graph *graph,
+                                                                  uint32_t image),
                        struct chain *chain)
 {
     *chain = (struct chain){.composite = pass};
@@ -150,8 +153,9 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
     if (chain->horizontal)
         chain->vertical = blur_of(graph, chain->horizontal->reads[0], DIRECTION_VERTICAL);
     if (chain->vertical)
-        chain->threshold = vkb_threshold_of(graph, chain->vertical->reads[0]);
-    return chain->threshold && chain->threshold->reads[0] == pass->reads[0]
+        chain->threshold = threshold_of(graph, chain->vertical->reads[0]);
+    return chain->threshold && vkb_is_threshold(chain->threshold)
+        && chain->threshold->reads[0] == pass->reads[0]
         && vkb_blur_kernel(chain->vertical, radius, &chain->vertical_kernel)
         && vkb_blur_kernel(chain->horizontal, radius, &chain->horizontal_kernel);
 }
@@ -197,7 +201,8 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     const uint32_t columns = strip_columns(target->width);
     struct chain chain;
 
-    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, &chain) && vkb_fits_words(choice, pass);
+    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &chain)
+         && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
@@ -231,24 +236,135 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
     return vkb_add_fullscreen(choice, pass, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
-// The same in tiles, for kernels of up to TILE_RADIUS in three steps.
+static bool fits_tiles(const struct vkb_device *device)
+{
+    const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
+
+    return device->limits.maxComputeSharedMemorySize >= shared
+        && device->limits.maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS;
+}
+
+// For kernels of up to TILE_RADIUS in three steps.
+static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                       const struct chain *chain)
+{
+    int radius = TILE_RADIUS / 4;
+
+    while (radius < chain->vertical_kernel.radius || radius < chain->horizontal_kernel.radius)
+        radius *= 2;
+    vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
+    row->constants.radius = radius;
+}
+
+// The same in tiles.
 bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
-    const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
     struct chain chain;
-    int radius = TILE_RADIUS / 4;
 
-    *fits = choice->device->limits.maxComputeSharedMemorySize >= shared
-         && choice->device->limits.maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS
-         && find_chain(&choice->plain, pass, TILE_RADIUS, &chain);
+    *fits = fits_tiles(choice->device)
+         && find_chain(&choice->plain, pass, TILE_RADIUS, vkb_threshold_of, &chain);
     if (!*fits)
         return true;
-    while (radius < chain.vertical_kernel.radius || radius < chain.horizontal_kernel.radius)
-        radius *= 2;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    vkb_make_dispatch(&row, &vkb_shader_tile_comp, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
-    row.constants.radius = radius;
+    make_tiles(&row, &vkb_shader_tile_comp, &chain);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// The pass that writes the cotangents of an image, if it has this shader and nothing else brings
+// any; else NULL.
+static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, uint32_t image,
+                                               const struct vkb_shader *shader)
+{
+    const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
+
+    return pass && pass->shader == shader && !pass->constants.add_own && !pass->constants.masked
+             ? pass
+             : NULL;
+}
+
+// The graph's chain for tiles. The formats of image and bloom may differ.
+static bool find_any_chain(const struct vkb_graph *graph, struct chain *chain)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (find_chain(graph, &graph->passes[i], TILE_RADIUS, vkb_writer_of, chain))
+            return true;
+    return false;
+}
+
+static bool is_differentiated(const struct vkb_graph *graph, uint32_t bloom)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].shader == &vkb_shader_adjoint_composite_frag
+            && vkb_pass_reads(&graph->passes[i], bloom))
+            return true;
+    return false;
+}
+
+// The bloom alone in tiles, where derivatives need it.
+bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
+{
+    struct chain chain;
+
+    *fits = vkb_is_line_blur(pass) && fits_tiles(choice->device)
+         && is_differentiated(&choice->plain, pass->targets[0])
+         && find_any_chain(&choice->plain, &chain) && chain.horizontal == pass;
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = fused_row(choice, &chain);
+    memcpy(row.name, pass->name, sizeof row.name);
+    row.targets[0] = pass->targets[0];
+    row.constants.composite = COMPOSITE_OFF;
+    row.constants.format =
+        vkb_stored_as(choice->device, choice->plain.images[pass->targets[0]].format);
+    make_tiles(&row, &vkb_shader_tile_comp, &chain);
+    return vkb_add_fullscreen(choice, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// The transposes of a chain, of which `pass` is the last one.
+static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                               struct chain *chain, const struct vkb_pass_row **by_bloom)
+{
+    const struct vkb_shader *filter = &vkb_shader_adjoint_filter_frag;
+    const struct vkb_shader *composite = &vkb_shader_adjoint_composite_frag;
+
+    if (pass->shader != &vkb_shader_adjoint_threshold_frag || pass->constants.by != BY_SCENE
+        || pass->constants.masked || !pass->constants.add_own)
+        return false;
+    const struct vkb_pass_row *first =
+        find_any_chain(graph, chain) ? sole_adjoint(graph, pass->reads[2], filter) : NULL;
+    const struct vkb_pass_row *second = first ? sole_adjoint(graph, first->reads[0], filter) : NULL;
+    const struct vkb_pass_row *by_scene = sole_adjoint(graph, pass->reads[3], composite);
+    *by_bloom = second ? sole_adjoint(graph, second->reads[0], composite) : NULL;
+    return *by_bloom && by_scene && (*by_bloom)->constants.by == BY_BLOOM
+        && by_scene->constants.by == BY_SCENE && chain->threshold->reads[0] == pass->reads[0];
+}
+
+// The derivatives by the image in tiles: one pass instead of the composite's two, the blurs' and
+// the threshold's. Nothing is rounded between them, whatever the formats are.
+bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           bool *fits, struct vkb_error *error)
+{
+    const struct vkb_pass_row *by_bloom;
+    struct chain chain;
+
+    *fits =
+        fits_tiles(choice->device) && find_adjoint_chain(&choice->plain, pass, &chain, &by_bloom);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = fused_row(choice, &chain);
+    memcpy(row.name, pass->name, sizeof row.name);
+    row.targets[0] = pass->targets[0];
+    // Image, bloom and cotangents of the composite.
+    for (row.read_count = 0; row.read_count < 2; ++row.read_count)
+        row.reads[row.read_count] = by_bloom->reads[row.read_count];
+    row.reads[row.read_count++] = by_bloom->reads[3];
+    row.constants.dither = 0;
+    // Its sums have another order, so it is taken always: all runs have the same bits.
+    row.fused = false;
+    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }

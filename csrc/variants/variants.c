@@ -74,6 +74,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "from_lines", vkb_add_from_lines, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_bloom_tiles, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_tiles, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},
     {VKB_VARIANTS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
     {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},

@@ -1,17 +1,12 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
 // last two images are what other readers of the image have brought, and the image itself. Include
 // finite.glsl before this file.
+#include "lib/where_finite.glsl"
 
 #define ADDED_BINDING (TARGET_BINDING - 2)
 #define IMAGE_BINDING (TARGET_BINDING - 1)
 layout(set = 0, binding = ADDED_BINDING) uniform sampler2D added;
 layout(set = 0, binding = IMAGE_BINDING) uniform sampler2D differentiated;
-
-vec4 where_finite(vec4 cotangent, vec4 value)
-{
-    return vec4(mix(vec3(0.0), cotangent.rgb, is_finite(value.rgb)),
-                is_finite(value.aaa).r ? cotangent.a : 0.0);
-}
 
 // The cotangents of this pixel. The image of a source has none at NaN and infinity.
 vec4 gathered(vec4 cotangent)

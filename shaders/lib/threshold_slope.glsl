@@ -25,3 +25,14 @@ vec4 back_through_soft(vec4 colour, vec4 brought, float threshold, float width, 
     return slope.x * brought
          + vec4(shares_of_brightest(colour.rgb), 0.0) * (slope.y * dot(brought, colour));
 }
+
+// Through apply_threshold().
+vec4 back_through_threshold(vec4 colour, vec4 brought, int mode, float threshold, float knee)
+{
+    if (mode == THRESHOLD_NONE)
+        return brought;
+    if (mode == THRESHOLD_HARD)
+        return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > threshold ? brought : vec4(0.0);
+    float width = threshold * knee;
+    return back_through_soft(colour, brought, threshold, width, 4.0 * width + 1e-5, 1e-5);
+}

@@ -8,7 +8,6 @@
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
-#include "lib/tonemap_slopes.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
@@ -18,87 +17,14 @@ layout(set = 0, binding = 4) uniform sampler2D cotangents;
 #define TARGET_BINDING 7
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
+#include "lib/adjoint_composite.glsl"
 #include "lib/sums.glsl"
-
-// A pixel, and the cotangents of the picture before exposure and curves.
-struct Pixel {
-    vec4 scene, bloom, brought;
-    float share;
-    vec3 mixed, by_mixed;
-    // By exposure and reference white.
-    vec2 by_curves;
-};
 
 Pixel pixel_at(ivec2 at)
 {
-    Pixel p;
-    vec4 given = texelFetch(scene, at, 0);
-    p.scene = finite_or_zero(given);
-    p.bloom = COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, at, 0);
-    p.share = MASKED != 0 ? texelFetch(mask, at, 0).r : 1.0;
-    p.brought = where_finite(texelFetch(cotangents, at, 0), given);
-    p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
-    vec3 exposed = p.mixed * exp2(params.exposure), toned = apply_tonemap(exposed, TONEMAP);
-    vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
-    vec3 kept = p.brought.rgb * inside(result, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
-    vec3 by_toned = kept * encoding_slope(toned, ENCODING, params.reference_white);
-    vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
-    p.by_mixed = by_exposed * exp2(params.exposure);
-    p.by_curves.x = log(2.0) * dot(by_exposed, exposed);
-    // The encoding takes the product of both.
-    p.by_curves.y =
-        ENCODING == ENCODING_PQ ? dot(by_toned, toned) / params.reference_white : 0.0;
-    return p;
-}
-
-// What one unit of light, i b, brings.
-vec3 by_light(Pixel p)
-{
-    if (COMPOSITE != COMPOSITE_SCREEN)
-        return p.by_mixed;
-    return p.by_mixed * (1.0 - clamp(p.scene.rgb, 0.0, 1.0)) * inside(light_of(p.bloom.rgb), 0.0, 1.0);
-}
-
-// The light that the alpha shows, as the alpha's cotangent weighs it.
-vec4 by_alpha_light(Pixel p)
-{
-    if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
-        return vec4(0.0);
-    if (ALPHA == ALPHA_BLUR) {
-        float light = light_of(p.bloom.aaa).r;
-        return vec4(vec3(0.0), p.brought.a * (1.0 - p.scene.a) * inside(vec3(light), 0.0, 1.0).r);
-    }
-    float brightest = max(p.bloom.r, max(p.bloom.g, p.bloom.b)), light = light_of(vec3(brightest)).r;
-    float held = clamp(light, 0.0, 1.0);
-    float share = held > p.scene.a ? 1.0 : held == p.scene.a ? 0.5 : 0.0;
-    share *= inside(vec3(light), 0.0, 1.0).r;
-    return vec4(p.brought.a * share * equal_shares(p.bloom.rgb, brightest), 0.0);
-}
-
-vec4 by_scene(Pixel p)
-{
-    vec3 colour = p.by_mixed;
-    if (COMPOSITE == COMPOSITE_MIX)
-        colour *= 1.0 - params.intensity * p.share;
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
-    if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
-        colour *= vec3(greaterThan(p.scene.rgb, vec3(0.0)));
-    float alpha = 1.0;
-    if (ALPHA != ALPHA_KEEP && COMPOSITE != COMPOSITE_OFF) {
-        float light = ALPHA == ALPHA_MAX ? max(p.bloom.r, max(p.bloom.g, p.bloom.b)) : p.bloom.a;
-        light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
-        alpha = ALPHA == ALPHA_BLUR   ? 1.0 - light
-              : p.scene.a == light ? 0.5
-                                   : float(p.scene.a > light);
-    }
-    return vec4(colour, alpha * p.brought.a);
-}
-
-vec4 by_bloom(Pixel p)
-{
-    float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
-    return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
+    return pixel_of(texelFetch(scene, at, 0),
+                    COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, at, 0),
+                    MASKED != 0 ? texelFetch(mask, at, 0).r : 1.0, texelFetch(cotangents, at, 0));
 }
 
 vec4 by_values(ivec2 at)

@@ -58,16 +58,6 @@ vec2 soft_values(float brightness)
     return by_top / max(brightness, 1e-5);
 }
 
-vec4 by_image(vec4 colour, vec4 brought)
-{
-    if (THRESHOLD_MODE == THRESHOLD_NONE)
-        return brought;
-    if (THRESHOLD_MODE == THRESHOLD_HARD)
-        return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > params.threshold ? brought : vec4(0.0);
-    float width = params.threshold * params.knee;
-    return back_through_soft(colour, brought, params.threshold, width, 4.0 * width + 1e-5, 1e-5);
-}
-
 vec4 by_values(ivec2 pixel)
 {
     vec4 colour = reduced(pixel);
@@ -87,5 +77,6 @@ vec4 shade()
         vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
         return gathered(vec4(dot(kept, brought), 0.0, 0.0, 0.0));
     }
-    return gathered(by_image(colour, mask_at(PIXEL) * brought));
+    return gathered(back_through_threshold(colour, mask_at(PIXEL) * brought, THRESHOLD_MODE,
+                                           params.threshold, params.knee));
 }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // The complete bloom of an image for GPUs. A workgroup writes a tile, and keeps its vertical sums
-// in shared memory between the two blurs.
+// in shared memory between the two blurs. With COMPOSITE_OFF it is the bloom alone.
 #include "variants/fused_bloom.glsl"
 
 const int RUN = TILE_ROWS / TILE_RUNS;
@@ -85,8 +85,11 @@ void main()
         // adjacent in memory.
         int row = i * TILE_RUNS + int(gl_LocalInvocationID.y);
         ivec2 pixel = first + ivec2(column, row);
-        if (pixel.y <= last.y)
-            imageStore(target, pixel,
-                       finish(texelFetch(image, pixel, 0), vec4(sum_horizontally(row, column), 1.0), pixel));
+        if (pixel.y > last.y)
+            continue;
+        vec4 result = vec4(sum_horizontally(row, column), 1.0);
+        if (COMPOSITE != COMPOSITE_OFF)
+            result = finish(texelFetch(image, pixel, 0), result, pixel);
+        imageStore(target, pixel, result);
     }
 }

@@ -20,7 +20,9 @@ from vkbloom import (
     UrpBloom,
     reference,
 )
-from vkbloom.gradients.passes import DeviceGradients
+from vkbloom.core_access import core_of
+from vkbloom.gradients.passes import DeviceGradients, Passes
+from vkbloom.sources import Inputs
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, in all sizes.
@@ -99,6 +101,39 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
             check(found, expected, part)
         again = pullback(cotangents)
         assert np.array_equal(found["image"], again["image"])
+
+
+#: Sizes of several tiles, and kernels of all lengths that tiles have.
+TILED = (
+    (Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61), "f4", 2),
+    (Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50), "f4", 1),
+    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", 2),
+    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", 2),
+    (Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1), "u1", 2),
+)
+
+
+def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
+    random = np.random.default_rng(1)
+    with Renderer("software") as renderer:
+        for settings, size, dtype, passes in TILED:
+            pixels = random.random((*size, 4)) ** 2 * (255 if dtype == "u1" else 1.5)
+            image = pixels.astype(dtype)
+            cotangents = {"final": random.standard_normal(image.shape).astype(np.float32)}
+            found = renderer.vjp(image, settings)[1](cotangents)
+            check(found, reference.vjp(image, settings)[1](cotangents), "image")
+            floats = settings.replace(format="rgba32float")
+            source = Inputs(image).source((cotangents["final"],))
+            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+            assert plan
+            shaders = [shader for _, shader, *_ in plan.passes]
+            assert shaders == ["tile_comp", "adjoint_tile_comp"][2 - passes :]
+            # The sums need the images between; the other derivatives keep their bits.
+            both = Passes(renderer, Inputs(image), floats, cotangents)
+            both.fields()
+            again = renderer.vjp(image, settings)[1](cotangents)
+            assert np.array_equal(again["image"], found["image"])
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])
