@@ -33,7 +33,10 @@ mkdir -p "$folder"
 # A separate tree, so that the sanitized core does not replace the one in use.
 rm -rf "$folder/tree" "$folder/log"
 mkdir -p "$folder/tree" "$folder/log"
-cp -r csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
+cp -rp csrc shaders python setup.py pyproject.toml README.md tests tools examples "$folder/tree/"
+# The shaders' modules are the same ones. Those older than their sources are compiled again.
+mkdir "$folder/tree/build"
+test ! -d build/spirv || cp -rp build/spirv "$folder/tree/build/"
 rm -f "$folder"/tree/python/vkbloom/_core*.so
 test -d ../shared && ln -sfn "$(cd .. && pwd)/shared" "$folder/shared"
 cd "$folder/tree"
