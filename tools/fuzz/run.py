@@ -9,8 +9,8 @@ exception that the reader does not document, more than MIB of additional memory,
 an input that takes more than two minutes. The input is then written to the folder as
 ``finding-TARGET-SEED``.
 
-``python tools/fuzz/run.py own --plain --jobs 0 --executions 1000000`` tries a million sources of
-own methods on all cores.
+``python tools/fuzz/run.py own --plain --jobs 0 --executions 1000000 --forks`` tries a million
+sources of own methods on all cores. The compiler of --forks is built from ``forks.cpp``, or given.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import zipfile
 from collections.abc import Callable
@@ -62,6 +63,7 @@ def spread(options: argparse.Namespace) -> int:
     arguments = [*options.targets, "--plain", f"--seconds={options.seconds}"]
     arguments += [f"--memory={options.memory}"]
     arguments += [f"--inputs={options.inputs}"] if options.inputs else []
+    arguments += [f"--forks={options.forks}"] if options.forks else []
     if options.executions:
         arguments += [f"--executions={-(-options.executions // jobs)}"]
     started = [
@@ -84,6 +86,7 @@ def read_options() -> argparse.Namespace:
     parser.add_argument("--plain", action="store_true")
     parser.add_argument("--executions", type=int, help="--plain: how many, in place of --seconds")
     parser.add_argument("--jobs", type=int, default=1, help="--plain: processes; 0: all cores")
+    parser.add_argument("--forks", nargs="?", const="", help="own: compile by forks.cpp, as built")
     options = parser.parse_args()
     if not options.plain:
         options.plain = importlib.util.find_spec("atheris") is None
@@ -126,6 +129,10 @@ def run_guided(options: argparse.Namespace, name: str, seeds: list[bytes], run: 
 def main() -> int:
     """Run the targets; return 1 if there is a finding."""
     options = read_options()
+    if options.forks == "":
+        import forks
+
+        options.forks = str(forks.built(Path(tempfile.mkdtemp(prefix="vkbloom-fuzz-"))))
     if options.plain and options.jobs != 1:
         return spread(options)
     if options.plain:
@@ -135,6 +142,12 @@ def main() -> int:
 
         with atheris.instrument_imports(include=["vkbloom"]):
             import targets
+    if options.forks:
+        import forks
+
+        from vkbloom.own import compiler
+
+        compiler.run_limited = forks.Forks(Path(options.forks)).run_limited
 
     def run(name: str, data: bytes) -> None:
         signal.alarm(LONGEST if options.plain else 0)
