@@ -139,6 +139,7 @@ FAULTS = [
     # Other programs
     ("shadertoy", "// a\nvoid mainImage(out vec4 c, in vec2 p) {}\n", 2, "Shadertoy's syntax"),
     ("reshade", "float x;\ntechnique Bloom\n{ pass {} }\n", 2, "ReShade's syntax"),
+    ("reshade_part", '// a\n#include "ReShade.fxh"\nfloat x;\n', 2, "ReShade's syntax"),
 ]
 
 GLSL_FAULTS = [

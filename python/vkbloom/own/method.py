@@ -270,8 +270,9 @@ def field_of(file: OwnFile, param: Param) -> tuple[Any, Any]:
         _, least, most = _core.VALUES[SHARED]
         low, high = max(low, least), min(high, most)
     elif hasattr(OwnMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
+        owner = "Python reserves" if keyword.iskeyword(param.name) else "all settings have"
         raise file.source.fault(
-            param.line, f"PARAM: {param.name!r} is a name that all settings have; rename it"
+            param.line, f"PARAM: {param.name!r} is a name that {owner}; rename it"
         )
     if param.names:
         read = EnumReader(param.name, param.names)

@@ -23,7 +23,7 @@ OTHER_SYNTAXES: Final = (
         "'HOOKED_tex(p)'",
     ),
     (
-        re.compile(r"^\s*technique\d*\s+\w+", re.MULTILINE),
+        re.compile(r'^\s*(?:technique\d*\s+\w|#include\s+"ReShade)|\bSV_Target', re.MULTILINE),
         "this is ReShade's syntax: write each 'pass' of the technique as a block that begins with "
         "lines '//!HOOK MAIN' and '//!BIND HOOKED' and defines 'vec4 hook()' in GLSL, a render "
         "target as '//!SAVE NAME', and an annotated uniform as a block '//!PARAM name'",
