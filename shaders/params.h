@@ -470,8 +470,16 @@
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
 
-// The distance of Filament's taps in texels.
+// Taps of published methods that their adjoints read, too: the distance of Filament's in texels and
+// the share of the outer ones along an axis; the distances of those of HDRP's prefilter; the kernel
+// of its blur, a binomial of order 8; the half-kernel of Godot's.
 #define FILAMENT_OFFSET 1.761629
+#define FILAMENT_OUTER  (7.46602 / 32.0)
+#define HDRP_FAR        0.9
+#define HDRP_NEAR       0.4
+#define HDRP_KERNEL \
+    0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
+#define GODOT_KERNEL    0.2024, 0.1790, 0.1240, 0.0672, 0.0285
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -635,6 +643,7 @@
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KAWASE, 10, kawase) \
     NAME(GROUPS_KINO, 11, kino) \
+    NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(BY_SCENE, 0, by_scene) \
     NAME(BY_BLOOM, 1, by_bloom) \
     NAME(BY_MASK, 2, by_mask) \

@@ -27,17 +27,15 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_urp_prefilter_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_unreal_prefilter_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_kino_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_pygfx_down_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_filament_prefilter_frag, vkb_transpose_filament_reduction, NULL},
+        {&vkb_shader_filament_down_frag, vkb_transpose_filament_down, NULL},
+        {&vkb_shader_hdrp_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_hdrp_blur_frag, vkb_transpose_hdrp_blur, NULL},
     };
-    const struct vkb_constants *constants = &pass->constants;
-
-    // Positions that are limited have none.
-    if ((pass->shader == &vkb_shader_pyramid_up_frag || pass->shader == &vkb_shader_gather_frag)
-        && (constants->upsample == UPSAMPLE_INSET_LINEAR
-            || constants->upsample == UPSAMPLE_INSET_CUBIC))
-        return NULL;
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)
-            return constants->firefly_filter ? families[i].weighted : families[i].transpose;
+            return pass->constants.firefly_filter ? families[i].weighted : families[i].transpose;
     return NULL;
 }
 

@@ -32,15 +32,6 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// An axis on which each pixel reads the texel at its own place, moved by `offset`.
-static void move_axis(struct vkb_axis *axis, uint32_t from, uint32_t to, double offset)
-{
-    const struct vkb_tap tap = {.offset = offset, .weights = {1.0}};
-
-    *axis = (struct vkb_axis){.from = from, .to = to, .aligned = true};
-    vkb_axis_set(axis, &tap, 1);
-}
-
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                                const struct vkb_pass_row *pass, struct vkb_error *error)
 {
@@ -64,8 +55,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
 
     mirrored.choices[VKB_CHOICE_boundary] =
         boundary == BOUNDARY_ZERO ? BOUNDARY_ZERO : BOUNDARY_WRAP;
-    move_axis(&filter.x, extended.width, size.width, left);
-    move_axis(&filter.y, extended.height, size.height, above);
+    vkb_axis_move(&filter.x, extended.width, size.width, left);
+    vkb_axis_move(&filter.y, extended.height, size.height, above);
     if (!mirror_kernel(kernel, graph, &mirrored.kernel, error)
         || (edge_y
             && !vkb_filter_apart(adjoint, &filter, source.glow, extended, &source.glow, error))
@@ -73,7 +64,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
         return false;
     for (uint32_t i = first; i < graph->pass_count; ++i)
         graph->passes[i].constants.alpha = pass->constants.alpha;
-    move_axis(&filter.x, size.width, extended.width, -left);
-    move_axis(&filter.y, size.height, extended.height, -above);
+    vkb_axis_move(&filter.x, size.width, extended.width, -left);
+    vkb_axis_move(&filter.y, size.height, extended.height, -above);
     return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
 }

@@ -52,10 +52,17 @@ bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *r
 bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                     struct vkb_size size, const char *name, struct vkb_error *error);
 
+// Makes both axes those of 3 x 3 taps, of which the outer ones have the share `side` along an axis;
+// or of the pyramid's 13 taps. These are those of two kernels: nine around the centre, and four
+// between them, each with half of the weight.
+void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
+void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y);
+
 // The families of passes.
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
 vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_transpose_gather,
-    vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box;
+    vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box,
+    vkb_transpose_filament_down, vkb_transpose_filament_reduction, vkb_transpose_hdrp_blur;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
 

@@ -49,8 +49,24 @@ static void add_taps(struct vkb_axis *axis, int kernel, double distance, double 
     }
 }
 
-// 13 taps are those of two kernels: nine around the centre, and four between them, each with half
-// of the weight.
+void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y)
+{
+    filter->kernels = 2;
+    filter->gain = 0.5;
+    filter->x.count = filter->y.count = 0;
+    add_taps(&filter->x, 0, 2.0 * step_x, 0.25, 0.5);
+    add_taps(&filter->y, 0, 2.0 * step_y, 0.25, 0.5);
+    add_taps(&filter->x, 1, step_x, 0.5, 0.0);
+    add_taps(&filter->y, 1, step_y, 0.5, 0.0);
+}
+
+void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
+{
+    filter->x.count = filter->y.count = 0;
+    add_taps(&filter->x, 0, distance, side, 1.0 - 2.0 * side);
+    add_taps(&filter->y, 0, distance, side, 1.0 - 2.0 * side);
+}
+
 bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {
@@ -58,13 +74,7 @@ bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    filter.kernels = 2;
-    filter.gain = 0.5;
-    filter.x.count = filter.y.count = 0;
-    add_taps(&filter.x, 0, 2.0 * params->step_x, 0.25, 0.5);
-    add_taps(&filter.y, 0, 2.0 * params->step_y, 0.25, 0.5);
-    add_taps(&filter.x, 1, params->step_x, 0.5, 0.0);
-    add_taps(&filter.y, 1, params->step_y, 0.5, 0.0);
+    vkb_filter_thirteen(&filter, params->step_x, params->step_y);
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
@@ -80,14 +90,69 @@ bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *p
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
-// False: the taps depend on the position in another way.
+static bool bring_three(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        double distance, double side, struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    vkb_filter_three(&filter, distance, side);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+bool vkb_transpose_filament_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                 struct vkb_error *error)
+{
+    return bring_three(adjoint, pass, FILAMENT_OFFSET, FILAMENT_OUTER, error);
+}
+
+// Without threshold and mask the reduction is a filter.
+bool vkb_transpose_filament_reduction(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                      struct vkb_error *error)
+{
+    return pass->constants.thresholded || pass->constants.masked
+             ? vkb_transpose_groups(adjoint, pass, error)
+             : bring_three(adjoint, pass, 1.0, 0.25, error);
+}
+
+// Nine taps, pixels of the target apart.
+static void set_nine(const double weights[9], enum vkb_border border, struct vkb_axis *axis)
+{
+    axis->border = border;
+    axis->count = 0;
+    for (int tap = 0; tap < 9; ++tap)
+        axis->taps[axis->count++] = (struct vkb_tap){.offset = tap - 4, .weights = {weights[tap]}};
+}
+
+bool vkb_transpose_hdrp_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    static const double weights[9] = {HDRP_KERNEL};
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    set_nine(weights, pass->constants.first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST,
+             rows ? &filter.x : &filter.y);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+// False: the kind of filter is unknown.
 static bool set_upsampling(enum vkb_mode kind, double step, struct vkb_axis *axis)
 {
     switch ((int)kind) {
     case UPSAMPLE_LINEAR:
         return true;
     case UPSAMPLE_CUBIC:
-        axis->cubic = true;
+        axis->kind = VKB_KIND_CUBIC;
+        return true;
+    case UPSAMPLE_INSET_LINEAR:
+        axis->kind = VKB_KIND_INSET_LINEAR;
+        return true;
+    case UPSAMPLE_INSET_CUBIC:
+        axis->kind = VKB_KIND_INSET_CUBIC;
+        axis->count = 0;
+        add_taps(axis, 0, 1.0, 1.0, 0.0);
         return true;
     case UPSAMPLE_UNIT_TENT:
     case UPSAMPLE_TENT:

@@ -18,27 +18,54 @@ static void set_pair(struct vkb_axis *axis, double first, double second)
     vkb_axis_set(axis, taps, 2);
 }
 
-// The taps of a group: those of 13 taps are pairs along both axes, those of a box or a cross one
-// tap each.
-static void set_group(enum vkb_mode groups, int group, double step_x, double step_y,
-                      struct vkb_filter *filter)
+// The places of groups that are one tap each.
+static bool find_place(enum vkb_mode groups, int group, double place[2])
 {
-    if (groups == GROUPS_BOX) {
-        const struct vkb_tap x = tap_at(group & 1 ? 1.0 : -1.0, 1.0);
-        const struct vkb_tap y = tap_at(group & 2 ? 1.0 : -1.0, 1.0);
-        vkb_axis_set(&filter->x, &x, 1);
-        vkb_axis_set(&filter->y, &y, 1);
-    } else if (group == 0 && (groups == GROUPS_BEVY || groups == GROUPS_PYRAMID)) {
-        set_pair(&filter->x, -step_x, step_x);
-        set_pair(&filter->y, -step_y, step_y);
-    } else if (groups == GROUPS_KINO) {
-        const struct vkb_tap tap = tap_at(group & 1 ? -1.0 : 1.0, 1.0);
-        if (group > 0)
-            vkb_axis_set(group < 3 ? &filter->x : &filter->y, &tap, 1);
+    static const double cross[5][2] = {
+        {0.0, 0.0}, {-1.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}, {0.0, 1.0}};
+    static const double star[5][2] = {{0.0, 0.0},
+                                      {HDRP_FAR, -HDRP_NEAR},
+                                      {-HDRP_FAR, HDRP_NEAR},
+                                      {HDRP_NEAR, HDRP_FAR},
+                                      {-HDRP_NEAR, -HDRP_FAR}};
+    const bool outer = groups == GROUPS_BLENDER && group < 9;
+    const int corner = groups == GROUPS_BLENDER ? group - 9 : group;
+
+    if (groups == GROUPS_BOX || groups == GROUPS_BLENDER) {
+        place[0] = outer ? 2.0 * (group % 3 - 1) : corner & 1 ? 1.0 : -1.0;
+        place[1] = outer ? 2.0 * (group / 3 - 1) : corner & 2 ? 1.0 : -1.0;
+    } else if (groups == GROUPS_KINO || groups == GROUPS_HDRP) {
+        memcpy(place, groups == GROUPS_KINO ? cross[group] : star[group], sizeof cross[0]);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+// The taps of a group: those of 13 taps are pairs along both axes.
+static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filter *filter)
+{
+    const enum vkb_mode groups = (enum vkb_mode)row->constants.groups;
+    const double step_x = row->params.prefilter.step_x, step_y = row->params.prefilter.step_y;
+    const int corner = group - 1;
+    double place[2];
+
+    if (find_place(groups, group, place)) {
+        filter->x.taps[0].offset = place[0];
+        filter->y.taps[0].offset = place[1];
+    } else if (groups == GROUPS_FILAMENT && row->constants.thresholded) {
+        filter->x.kind = group & 1 ? VKB_KIND_RIGHT_PAIR : VKB_KIND_LEFT_PAIR;
+        filter->y.kind = group & 2 ? VKB_KIND_RIGHT_PAIR : VKB_KIND_LEFT_PAIR;
+    } else if (groups == GROUPS_FILAMENT) {
+        vkb_filter_three(filter, 1.0, 0.25);
+    } else if (groups == GROUPS_PYGFX) {
+        vkb_filter_thirteen(filter, step_x, step_y);
     } else if (group > 0) {
-        const int corner = group - 1;
         set_pair(&filter->x, 0.0, corner & 1 ? 2.0 * step_x : -2.0 * step_x);
         set_pair(&filter->y, 0.0, corner & 2 ? 2.0 * step_y : -2.0 * step_y);
+    } else if (groups != GROUPS_URP && groups != GROUPS_UNREAL) {
+        set_pair(&filter->x, -step_x, step_x);
+        set_pair(&filter->y, -step_y, step_y);
     }
 }
 
@@ -52,8 +79,9 @@ static void take_params(const struct vkb_pass_row *pass, struct vkb_prefilter_pa
     memset(params, 0, sizeof *params);
     params->target_width = pass->params.pyramid.target_width;
     params->target_height = pass->params.pyramid.target_height;
-    params->step_x = pass->params.pyramid.step_x;
-    params->step_y = pass->params.pyramid.step_y;
+    const bool unit = pass->shader == &vkb_shader_pygfx_down_frag;
+    params->step_x = unit ? 1.0f : pass->params.pyramid.step_x;
+    params->step_y = unit ? 1.0f : pass->params.pyramid.step_y;
 }
 
 // The groups by the shader of the forward pass.
@@ -68,12 +96,14 @@ static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
         {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
         {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
         {&vkb_shader_kino_prefilter_frag, GROUPS_KINO},
+        {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
+        {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
     };
 
     for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i)
         if (known[i].shader == pass->shader)
             return known[i].groups;
-    return GROUPS_PYRAMID;
+    return (enum vkb_mode)pass->constants.groups;
 }
 
 static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
@@ -81,8 +111,11 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
     switch (groups) {
     case GROUPS_BOX:
         return 4;
+    case GROUPS_FILAMENT:
+        return pass->constants.thresholded ? 4 : 1;
     case GROUPS_URP:
     case GROUPS_UNREAL:
+    case GROUPS_PYGFX:
         return 1;
     case GROUPS_KINO:
         return pass->constants.anti_flicker ? 5 : 1;
@@ -109,7 +142,7 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     for (int group = 0; group < count; ++group) {
         row.constants.levels = group;
         vkb_filter_begin(adjoint->graph, pass->reads[0], target, &filter);
-        set_group(groups, group, row.params.prefilter.step_x, row.params.prefilter.step_y, &filter);
+        set_group(&row, group, &filter);
         if (!vkb_bring_through(adjoint, &row, &filter, pass->reads[0], target, error))
             return false;
     }

@@ -12,8 +12,9 @@ enum { MOST_TEXELS = 1 << 24 };
 static void begin_axis(uint32_t from, uint32_t to, struct vkb_axis *axis)
 {
     const struct vkb_tap centre = {.weights = {1.0}};
+    const double step = (double)from / to;
 
-    *axis = (struct vkb_axis){.from = from, .to = to};
+    *axis = (struct vkb_axis){.from = from, .to = to, .origin = 0.5 * step - 0.5, .step = step};
     vkb_axis_set(axis, &centre, 1);
 }
 
@@ -28,6 +29,13 @@ void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
     filter->gain = 1.0;
 }
 
+void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin)
+{
+    begin_axis(from, to, axis);
+    axis->origin = origin;
+    axis->step = 1.0;
+}
+
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count)
 {
     memcpy(axis->taps, taps, count * sizeof *taps);
@@ -36,7 +44,8 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
 
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
-    return axis->from == axis->to && !axis->cubic && axis->count == 1 && axis->taps[0].offset == 0.0
+    return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0
+        && axis->kind == VKB_KIND_LINEAR && axis->count == 1 && axis->taps[0].offset == 0.0
         && axis->taps[0].weights[0] == 1.0;
 }
 
@@ -48,7 +57,9 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         low = fmin(low, axis->taps[i].offset);
         high = fmax(high, axis->taps[i].offset);
     }
-    return (high - low + (axis->cubic ? 4.0 : 2.0)) * axis->to / axis->from;
+    const double apart = axis->border ? axis->step : 1.0;
+    return ((high - low) * apart + (axis->kind == VKB_KIND_CUBIC ? 4.0 : 2.0)) * axis->to
+         / axis->from;
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.
@@ -58,24 +69,81 @@ struct sample {
     double shares[4];
 };
 
-static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, double offset)
+// The pixel whose sample a tap reads at pixel `at`, which may be beyond the edges.
+static double at_border(const struct vkb_axis *axis, double at)
 {
-    const double place = axis->aligned ? pixel : (pixel + 0.5) * axis->from / axis->to - 0.5;
-    double position = place + offset;
+    const double last = axis->to - 1.0, odd = fmod(fabs(at), 2.0);
+    const double pair = fmin(fmax(at - odd, 0.0), fmax(axis->to - 2.0, 0.0));
+
+    if (axis->border == VKB_BORDER_PAIRS)
+        return fmin(pair + odd, last);
+    return fmin(axis->border == VKB_BORDER_FIRST_TWO && at < 0.0 ? odd : at, last);
+}
+
+static double position_of(const struct vkb_axis *axis, uint32_t pixel, double offset)
+{
+    const double position = axis->border
+                              ? axis->origin + axis->step * at_border(axis, pixel + offset)
+                              : axis->origin + axis->step * pixel + offset;
     // A texel's centre is met with roundings.
     const double nearest = floor(position + 0.5);
 
-    if (fabs(position - nearest) < 1e-9)
-        position = nearest;
+    return fabs(position - nearest) < 1e-9 ? nearest : position;
+}
+
+static struct sample linear_sample(double position)
+{
+    const double texel = floor(position), part = position - texel;
+
+    return (struct sample){texel, part > 0.0 ? 2 : 1, {1.0 - part, part}};
+}
+
+static struct sample cubic_sample(double position)
+{
     const double texel = floor(position), part = position - texel, rest = 1.0 - part;
-    if (!axis->cubic)
-        return (struct sample){texel, part > 0.0 ? 2 : 1, {rest, part}};
+
     return (struct sample){
         texel - 1.0,
         4,
         {rest * rest * rest / 6.0, (4.0 - 3.0 * part * part * (2.0 - part)) / 6.0,
          (4.0 - 3.0 * rest * rest * (2.0 - rest)) / 6.0, part * part * part / 6.0},
     };
+}
+
+// The half of the cubic sample on the side of the offset, as a linear one.
+static struct sample inset_cubic_sample(const struct vkb_axis *axis, double position, double offset)
+{
+    const struct sample cubic = cubic_sample(position);
+    const double *shares = offset < 0.0 ? cubic.shares : cubic.shares + 2;
+    const double sum = shares[0] + shares[1], furthest = axis->from - 0.5 - axis->step;
+    struct sample half =
+        linear_sample(fmin(cubic.first + 1.0 + offset + shares[1] / sum, furthest));
+
+    half.shares[0] *= sum;
+    half.shares[1] *= sum;
+    return half;
+}
+
+static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, double offset)
+{
+    const double position = position_of(axis, pixel, offset);
+    const double texel = floor(position), part = position - texel;
+    const double inset = fmin(position, axis->from - 1.5);
+
+    switch (axis->kind) {
+    case VKB_KIND_CUBIC:
+        return cubic_sample(position);
+    case VKB_KIND_INSET_LINEAR:
+        return linear_sample(inset);
+    case VKB_KIND_INSET_CUBIC:
+        return inset_cubic_sample(axis, fmin(position - offset, axis->from - 1.5), offset);
+    case VKB_KIND_LEFT_PAIR:
+        return linear_sample(texel - 1.0 + (2.0 - part) / (3.0 - 2.0 * part));
+    case VKB_KIND_RIGHT_PAIR:
+        return linear_sample(texel + 1.0 + part / (1.0 + 2.0 * part));
+    default:
+        return linear_sample(position);
+    }
 }
 
 static uint32_t clamped(const struct vkb_axis *axis, double texel)

@@ -19,11 +19,37 @@ struct vkb_tap {
     double offset, weights[VKB_MOST_KERNELS];
 };
 
-// How `to` pixels sample `from` texels: linearly, or with a cubic B-spline.
+// What a tap samples at its position.
+enum vkb_kind {
+    VKB_KIND_LINEAR,
+    VKB_KIND_CUBIC,  // a cubic B-spline
+    // HDRP's upsampling: no position is beyond the middle of the last two texels. The cubic
+    // B-spline is two linear samples, with the offsets -1 and 1, neither beyond 1 - 1 / size of the
+    // target.
+    VKB_KIND_INSET_LINEAR,
+    VKB_KIND_INSET_CUBIC,
+    // Filament's reduction: the texels around a position have the weights (1 - f, 2 - f, 1 + f, f).
+    // The first two of them, or the last two, divided by their sum.
+    VKB_KIND_LEFT_PAIR,
+    VKB_KIND_RIGHT_PAIR,
+};
+
+// What taps read beyond the first and the last pixel, where they are pixels of the target apart.
+enum vkb_border {
+    VKB_BORDER_NONE,  // they are texels apart
+    VKB_BORDER_LAST,  // the outermost texels
+    // The first two samples in turn, and the last one; or the last two in turn, too, where these
+    // are the ends of a pair (Godot).
+    VKB_BORDER_FIRST_TWO,
+    VKB_BORDER_PAIRS,
+};
+
+// How `to` pixels sample `from` texels. Pixel i is at the position origin + i step, in texels.
 struct vkb_axis {
     uint32_t from, to;
-    bool cubic;
-    bool aligned;  // the position of a pixel is the texel of its number, whatever the sizes are
+    double origin, step;
+    enum vkb_kind kind;
+    enum vkb_border border;
     uint32_t count;
     struct vkb_tap taps[VKB_MOST_TAPS];
 };
@@ -39,6 +65,8 @@ struct vkb_filter {
 // position of the pixel.
 void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
                       struct vkb_filter *filter);
+// An axis on which pixel i is at texel `origin` + i.
+void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin);
 // Replaces the taps of an axis.
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count);
 

@@ -12,4 +12,4 @@ vec4 dimmed(vec4 value)
     return FIRST != 0 ? value / (1.0 + luminance(value)) : value;
 }
 
-const float GODOT_WEIGHTS[5] = float[](0.2024, 0.1790, 0.1240, 0.0672, 0.0285);
+const float GODOT_WEIGHTS[5] = float[](GODOT_KERNEL);

@@ -71,16 +71,18 @@ vec4 filament_prefiltered(vec4 taps[4], vec4 shares)
 // HDRP's: the centre and four diagonal taps, at these distances in texels, weighted against fireflies
 // (Karis 2013; Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition,
 // BloomPrefilter.compute @ 2309d2c2fde8).
-const vec2 HDRP_OFFSETS[5] = vec2[](vec2(0.0, 0.0), vec2(0.9, -0.4), vec2(-0.9, 0.4),
-                                    vec2(0.4, 0.9), vec2(-0.4, -0.9));
+const vec2 HDRP_OFFSETS[5] =
+    vec2[](vec2(0.0, 0.0), vec2(HDRP_FAR, -HDRP_NEAR), vec2(-HDRP_FAR, HDRP_NEAR),
+           vec2(HDRP_NEAR, HDRP_FAR), vec2(-HDRP_NEAR, -HDRP_FAR));
+
+const vec3 HDRP_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
 
 vec4 hdrp_prefiltered(vec4 taps[5])
 {
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     [[unroll]] for (int i = 0; i < 5; ++i) {
-        float luminance = dot(taps[i].rgb, vec3(0.2126729, 0.7151522, 0.0721750));
-        float share = 1.0 / (1.0 + max(luminance, 0.0));
+        float share = 1.0 / (1.0 + max(dot(taps[i].rgb, HDRP_LUMINANCE), 0.0));
         sum += share * taps[i];
         shares += share;
     }

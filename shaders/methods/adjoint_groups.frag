@@ -27,6 +27,8 @@ int group_count()
 {
     if (GROUPS == GROUPS_BOX)
         return 4;
+    if (GROUPS == GROUPS_FILAMENT)
+        return 4;
     if (GROUPS == GROUPS_URP)
         return 1;
     if (GROUPS == GROUPS_UNREAL)
@@ -36,46 +38,100 @@ int group_count()
     return 5;
 }
 
+bool are_of_thirteen()
+{
+    if (GROUPS == GROUPS_PYGFX)
+        return true;
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return true;
+    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
+}
+
 // The place of a tap that is a group of its own, in texels.
-vec2 place_of(int group)
+vec2 place_of(int group, FilamentTaps pairs)
 {
     if (GROUPS == GROUPS_BOX)
         return 2.0 * vec2(group & 1, group >> 1) - 1.0;
+    if (GROUPS == GROUPS_FILAMENT)
+        return mix(pairs.left, pairs.right, bvec2((group & 1) != 0, (group & 2) != 0));
+    if (GROUPS == GROUPS_HDRP)
+        return HDRP_OFFSETS[group];
     const vec2 cross[5] = vec2[](vec2(0, 0), vec2(-1, 0), vec2(1, 0), vec2(0, -1), vec2(0, 1));
     return cross[group];
 }
 
-vec4[5] means()
+Taps taps_of(Place place)
 {
-    Place place = PLACE_IN(source);
-    if (GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID)
-        return group_means(thirteen_taps(place, vec2(params.step_x, params.step_y)));
+    return thirteen_taps(place, vec2(params.step_x, params.step_y));
+}
+
+vec4[5] means(Place place)
+{
+    if (are_of_thirteen())
+        return group_means(taps_of(place));
+    FilamentTaps pairs = filament_taps(place.part);
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     for (int group = 0; group < group_count(); ++group)
-        found[group] = sample_at(source, place, place_of(group), SAMPLING);
+        found[group] = sample_at(source, place, place_of(group, pairs), SAMPLING);
     return found;
 }
 
-// A group's weight by brightness, and its derivative by the colour.
-float weight_of(vec4 mean, int group, out vec3 slope)
+// A group's share without the weight by brightness.
+float share_of(int group, Place place)
 {
-    bool box = GROUPS == GROUPS_BOX;
-    float share = box ? 1.0 : GROUP_SHARES[group];
-    float brightness = box ? brightest_channel(mean) : group_luminance(mean);
-    float weight = share / (1.0 + brightness);
-    slope = brightness > 0.0 ? -weight / (1.0 + brightness)
-                                   * (box ? shares_of_brightest(mean.rgb) : LUMINANCE)
-                             : vec3(0.0);
-    return weight;
+    if (GROUPS == GROUPS_PYRAMID)
+        return GROUP_SHARES[group];
+    return GROUPS == GROUPS_FILAMENT ? filament_taps(place.part).shares[group] : 1.0;
 }
 
-vec4 back_weighted(vec4 found[5], vec4 brought)
+// A group's weight by brightness, and its derivative by the colour.
+float weight_of(vec4 mean, float share, out vec3 slope)
+{
+    bool brightest = GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT;
+    vec3 coefficients = brightest             ? shares_of_brightest(mean.rgb)
+                      : GROUPS == GROUPS_HDRP ? HDRP_LUMINANCE
+                                              : LUMINANCE;
+    float brightness = brightest ? max(mean.r, max(mean.g, mean.b)) : dot(mean.rgb, coefficients);
+    // pygfx' luminances may be negative.
+    bool counts = brightness > 0.0 || GROUPS == GROUPS_PYGFX_KARIS;
+    float divisor = 1.0 + (counts ? brightness : 0.0);
+    slope = counts ? -share / (divisor * divisor) * coefficients : vec3(0.0);
+    return share / divisor;
+}
+
+// The mean of Filament's taps, above the threshold.
+vec4 back_filament(vec4 mean, vec4 brought)
+{
+    vec3 above = max(mean.rgb - params.threshold, vec3(0.0));
+    float brightness = brightest(above), divisor = 1.0 + brightness / params.highlight;
+    float value = max(mean.r, max(mean.g, mean.b));
+    float factor = value > 0.0 ? brightness / (divisor * value) : 0.0;
+    float by_factor = brought.a * mean.a;
+    float by_brightness = -dot(brought.rgb, above) / params.highlight
+                        + (value > 0.0 ? by_factor / value : 0.0);
+    vec3 by_above = brought.rgb / divisor
+                  + shares_of_brightest(above) * (by_brightness / (divisor * divisor));
+    vec3 by_value = shares_of_brightest(mean.rgb) * (value > 0.0 ? -by_factor * factor / value : 0.0);
+    return vec4(by_above * vec3(greaterThan(above, vec3(0.0))) + by_value, brought.a * factor);
+}
+
+// The weighted mean, and what a method makes of it.
+vec4 back_end(vec4 mean, vec4 brought)
+{
+    if (GROUPS == GROUPS_FILAMENT)
+        return back_filament(mean, brought);
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return brought * vec4(greaterThan(usual(mean), vec4(0.0)));
+    return brought;
+}
+
+vec4 back_weighted(vec4 found[5], vec4 brought, Place place)
 {
     vec3 slope, own_slope = vec3(0.0);
     vec4 sum = vec4(0.0), own = vec4(0.0);
     float total = 0.0, own_weight = 0.0;
     for (int group = 0; group < group_count(); ++group) {
-        float weight = weight_of(found[group], group, slope);
+        float weight = weight_of(found[group], share_of(group, place), slope);
         sum += weight * found[group];
         total += weight;
         if (group == LEVELS) {
@@ -84,7 +140,10 @@ vec4 back_weighted(vec4 found[5], vec4 brought)
             own_slope = slope;
         }
     }
-    return (own_weight * brought + vec4(own_slope, 0.0) * dot(brought, own - sum / total)) / total;
+    vec4 mean = sum / total, by_mean = back_end(mean, brought);
+    if (by_mean == vec4(0.0))
+        return by_mean;
+    return (own_weight * by_mean + vec4(own_slope, 0.0) * dot(by_mean, own - mean)) / total;
 }
 
 vec4 back_bevy(vec4 found[5], vec4 brought)
@@ -172,31 +231,50 @@ vec4 back_kino(vec4 found[5], vec4 brought)
     return vec4(brought.rgb * vec3(lessThan(found[LEVELS].rgb, vec3(65000.0))), brought.a);
 }
 
-vec4 prefiltered(vec4 found[5])
+vec4 prefiltered(vec4 found[5], Place place)
 {
-    if (GROUPS == GROUPS_BEVY) {
-        Taps taps = thirteen_taps(PLACE_IN(source), vec2(params.step_x, params.step_y));
-        return bevy_prefiltered(taps);
-    }
+    vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
+    if (GROUPS == GROUPS_BEVY)
+        return bevy_prefiltered(taps_of(place));
+    if (GROUPS == GROUPS_PYGFX)
+        return pygfx_groups(taps_of(place));
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return pygfx_groups(taps_of(place));
     if (GROUPS == GROUPS_KINO)
         return kino_bright(found[0], found[1], found[2], found[3], found[4]);
+    if (GROUPS == GROUPS_FILAMENT)
+        return filament_prefiltered(four, filament_taps(place.part).shares);
+    if (GROUPS == GROUPS_HDRP)
+        return hdrp_prefiltered(found);
     return GROUPS == GROUPS_URP ? urp_prefiltered(found[0]) : unreal_prefiltered(found[0]);
+}
+
+// The cotangents of the group, from those of what the method makes of all groups.
+vec4 back(vec4 found[5], vec4 brought, Place place)
+{
+    if (GROUPS == GROUPS_BEVY)
+        return back_bevy(found, brought);
+    if (GROUPS == GROUPS_KINO)
+        return back_kino(found, brought);
+    if (GROUPS == GROUPS_URP)
+        return back_urp(found[0], brought);
+    if (GROUPS == GROUPS_UNREAL)
+        return back_unreal(found[0], brought);
+    if (GROUPS == GROUPS_PYGFX)
+        return brought * vec4(greaterThan(pygfx_groups(taps_of(place)), vec4(0.0)));
+    // Without weights the reduction is linear, and this is no group but all of it.
+    if (GROUPS == GROUPS_FILAMENT)
+        return THRESHOLDED == 0 ? brought : back_weighted(found, brought, place);
+    return back_weighted(found, brought, place);
 }
 
 vec4 shade()
 {
-    vec4 found[5] = means(), brought = texelFetch(cotangents, PIXEL, 0);
+    Place place = PLACE_IN(source);
+    vec4 found[5] = means(place), brought = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
         brought.a = 0.0;
     if (BY == BY_MASK)
-        return gathered(vec4(dot(prefiltered(found), brought), 0.0, 0.0, 0.0));
-    brought *= mask_value();
-    if (GROUPS == GROUPS_PYRAMID || GROUPS == GROUPS_BOX)
-        return gathered(back_weighted(found, brought));
-    if (GROUPS == GROUPS_BEVY)
-        return gathered(back_bevy(found, brought));
-    if (GROUPS == GROUPS_KINO)
-        return gathered(back_kino(found, brought));
-    return gathered(GROUPS == GROUPS_URP ? back_urp(found[0], brought)
-                                         : back_unreal(found[0], brought));
+        return gathered(vec4(dot(prefiltered(found, place), brought), 0.0, 0.0, 0.0));
+    return gathered(back(found, mask_value() * brought, place));
 }

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.exhaustive import witness
 from tests.methods.reference_cases import random_image
 from vkbloom import (
     BevyBloom,
     DualKawase,
+    FilamentBloom,
+    HdrpBloom,
     KinoBloom,
+    PygfxBloom,
     Pyramid,
     Renderer,
     Separable,
@@ -25,8 +29,11 @@ from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.sources import Inputs
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
-#: Those whose fields are checked, too, in all sizes.
-COMPLETE = ("knee", "pyramid")
+#: Those that are checked in all sizes, the first two with their fields.
+FIELDS = ("knee", "pyramid")
+COMPLETE = (*FIELDS, "pygfx karis", "filament", "filament threshold", "hdrp")
+#: Those whose weights count negative luminances.
+NEGATIVE = ("pygfx karis",)
 BEVY = BevyBloom(max_mip_dimension=16)
 CASES: dict[str, Any] = {
     "separable": Separable(),
@@ -53,6 +60,12 @@ CASES: dict[str, Any] = {
     "urp": UrpBloom(threshold=0.3, knee=0.5, clamp_max=1.5),
     "unreal": UnrealBloom(threshold=0.3, smooth_width=0.4),
     "kawase": DualKawase(levels=3, offset=1.3),
+    "pygfx": PygfxBloom(levels=3, filter_radius=0.2),
+    "pygfx karis": PygfxBloom(levels=2, karis_average=True),
+    "filament": FilamentBloom(resolution=40, levels=4),
+    "filament threshold": FilamentBloom(resolution=16, levels=2, threshold=0.4, highlight=10.0),
+    "filament alpha": FilamentBloom(resolution=16, threshold=0.4, alpha="blur"),
+    "hdrp": HdrpBloom(anamorphism=0.3),
 }
 
 
@@ -93,14 +106,22 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
     parts = ("image", "intensity", "exposure", "threshold", "knee")
     for size in SIZES if name in COMPLETE else SIZES[:1]:
         image = random_image(*size, channels=channels, seed=1).astype(np.float32)
+        image -= 0.4 * (name in NEGATIVE)
         pullback, cotangents, expected = pulled(renderer, image, settings)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)
         assert [*found] == [*expected]
-        for part in parts if name in COMPLETE else parts[:1]:
+        for part in parts if name in FIELDS else parts[:1]:
             check(found, expected, part)
         again = pullback(cotangents)
         assert np.array_equal(found["image"], again["image"])
+
+
+@witness("HDRP's filter of small frames has the same border")
+def test_the_cubic_filter_of_large_frames_is_transposed(renderer: Renderer) -> None:
+    image = random_image(450, 800, channels=3, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pulled(renderer, image, HdrpBloom())
+    check(pullback(cotangents), expected, "image")
 
 
 #: Sizes of several tiles, and kernels of all lengths that tiles have.
@@ -136,6 +157,16 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             assert np.array_equal(again["image"], found["image"])
 
 
+#: Methods whose first passes read the mask.
+MASKED = (
+    BEVY,
+    PygfxBloom(levels=1, karis_average=True),
+    FilamentBloom(resolution=16, levels=1),
+    FilamentBloom(resolution=16, levels=1, threshold=0.3),
+    HdrpBloom(),
+)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])
 def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
     random = np.random.default_rng(3)
@@ -148,7 +179,8 @@ def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
     mask = random.random((13, 9), np.float32)
     separable = Separable(threshold=0.3, knee=0.5, composite="mix", intensity=0.3, bloom_scale=0.5)
     both = {"mask": mask, "emission": emission}
-    for settings, given in ((separable, {"mask": mask}), (separable, both), (BEVY, both)):
+    cases = [(separable, {"mask": mask}), *((settings, both) for settings in (separable, *MASKED))]
+    for settings, given in cases:
         pullback, cotangents, expected = pulled(renderer, image, settings, **given)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)
