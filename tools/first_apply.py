@@ -2,7 +2,8 @@
 
 ``python tools/first_apply.py`` measures each preset in processes of its own: once with empty
 caches, three times with the caches that the first one filled, of which it prints the least.
-VK_DRIVER_FILES chooses the driver.
+Python's cache of compiled modules is filled from the start, as it is where a package is installed.
+VK_DRIVER_FILES chooses the driver; arguments are the presets to measure.
 """
 
 from __future__ import annotations
@@ -26,21 +27,26 @@ with vkbloom.Renderer("software") as renderer:
 """
 
 
-def seconds(preset: str, caches: str) -> float:
+def seconds(preset: str, caches: str, modules: str) -> float:
     """Return the processor seconds of one process."""
     places = {"VKBLOOM_CACHE_DIR": caches, "MESA_SHADER_CACHE_DIR": caches}
     command = [sys.executable, "-c", FIRST, preset]
     environment = {**os.environ, **places, "OPENBLAS_NUM_THREADS": "1"}
+    environment |= {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": modules}
     return float(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
 
 
 def main() -> None:
     """Print a row for each preset."""
-    for preset in vkbloom.presets:
+    chosen = sys.argv[1:] or [*vkbloom.presets]
+    with tempfile.TemporaryDirectory() as modules:
         with tempfile.TemporaryDirectory() as caches:
-            empty = seconds(preset, caches)
-            filled = min(seconds(preset, caches) for _ in range(3))
-        print(f"| `{preset}` | {empty:.2f} | {filled:.2f} |", flush=True)
+            seconds(chosen[0], caches, modules)
+        for preset in chosen:
+            with tempfile.TemporaryDirectory() as caches:
+                empty = seconds(preset, caches, modules)
+                filled = min(seconds(preset, caches, modules) for _ in range(3))
+            print(f"| `{preset}` | {empty:.2f} | {filled:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

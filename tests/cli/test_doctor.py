@@ -590,6 +590,18 @@ def test_examining_the_cache_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_cache_of_kernels(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path))
+    (empty,) = caches.kernels()
+    assert (empty.status, empty.found) == ("ok", f"{tmp_path / 'kernels'}; no file yet")
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "one.bin").write_bytes(bytes(12))
+    (filled,) = caches.kernels()
+    assert filled.found == f"{tmp_path / 'kernels'}; 1 files, 12 bytes"
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
+    assert [*caches.kernels()] == []
+
+
 def test_caches_of_drivers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     adapter = {"name": "llvmpipe", "driver_info": "Mesa 25.0.7 (LLVM 19)"}
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)

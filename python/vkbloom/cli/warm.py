@@ -1,4 +1,4 @@
-"""``vkbloom warm``: fill the caches of compiled pipelines before the first call needs them."""
+"""``vkbloom warm``: fill the caches of pipelines and kernels before the first call needs them."""
 
 from __future__ import annotations
 
@@ -62,6 +62,8 @@ def command(
     """Compile the pipelines of presets and methods, so that later processes find them.
 
     Some pipelines are made for the size of the image: those of convolutions, and of small levels.
+
+    Kernels of convolutions, which take up to a second to compute, are kept in the cache, too.
 
     The caches are vkbloom's and the driver's; vkbloom doctor shows their folders. Call it when a
     container's image is built, or in the step whose caches CI keeps. Mesa's software driver

@@ -80,6 +80,7 @@ def examine() -> Report:
         *(_test_render(name, answer) for name, answer in renders.items()),
         *_validation(loader.value and loader.value["layers"], working[0] if working else None),
         caches.pipelines([adapter["driver_uuid"] for adapter in adapters]),
+        *caches.kernels(),
         *caches.drivers(adapters),
         *installation.extras(),
     ]

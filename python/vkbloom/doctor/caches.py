@@ -1,4 +1,4 @@
-"""Check the caches of compiled pipelines: vkbloom's own and the driver's."""
+"""Check the caches: vkbloom's pipelines and kernels, and the driver's."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom.doctor.finding import Finding
-from vkbloom.io import pipeline_cache
+from vkbloom.io import kernel_cache, pipeline_cache
 
-__all__ = ["drivers", "pipelines"]
+__all__ = ["drivers", "kernels", "pipelines"]
 
 _WARM: Final = "vkbloom warm fills it."
 
@@ -83,6 +83,13 @@ def _cache_file(file: Path, driver_uuids: Collection[str]) -> str:
     return f"{file.name} ({file.stat().st_size} bytes, intact, of {whose})"
 
 
+def kernels() -> Iterator[Finding]:
+    """Examine the cache of convolutions' kernels, which is in the folder of `pipelines`."""
+    folder = kernel_cache.folder()
+    if folder is not None:
+        yield _files("kernel cache", "VKBLOOM_CACHE_DIR", folder, "*")
+
+
 def drivers(adapters: Collection[Mapping[str, Any]]) -> Iterator[Finding]:
     """Examine the drivers' caches, which hold what takes most of the time of a first call."""
     descriptions = [f"{adapter['name']} {adapter['driver_info']}" for adapter in adapters]
@@ -99,10 +106,14 @@ def _driver_cache(topic: str, variable: str, off: bool, pattern: str) -> Finding
     if off:
         return Finding(topic, "note", "off by the environment: every new process compiles again")
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    base = Path(os.environ.get(variable) or home)
+    return _files(topic, variable, Path(os.environ.get(variable) or home), f"{pattern}/**/*")
+
+
+def _files(topic: str, variable: str, base: Path, pattern: str) -> Finding:
+    """Examine the files of a cache: those in a folder that match a pattern."""
     try:
         reason = _why_not_writable(base)
-        files = [file for file in base.glob(f"{pattern}/**/*") if file.is_file()]
+        files = [file for file in base.glob(pattern) if file.is_file()]
         size = sum(file.stat().st_size for file in files)
     except OSError as error:
         return Finding(topic, "note", f"cannot be examined: {error}", f"Set {variable}.")

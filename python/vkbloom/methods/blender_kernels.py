@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.core_kernel import CoreKernel, core_kernel
+from vkbloom.io import kernel_cache
 from vkbloom.kept_arrays import kept
 from vkbloom.psf.eye import spencer
 
@@ -83,7 +84,9 @@ def core_kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> CoreKe
 
 @kept
 def _kept_kernel(settings: _Shape, buffers: tuple[int, int]) -> CoreKernel:
-    return core_kernel(kernel_of(settings, buffers))
+    return kernel_cache.find_or_make(
+        ("blender", *settings, buffers), lambda: core_kernel(kernel_of(settings, buffers))
+    )
 
 
 def _even_length(least: int) -> int:

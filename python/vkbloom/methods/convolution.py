@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vkbloom.core_kernel import CoreKernel, core_kernel
 from vkbloom.fields import choice_field, number_field
+from vkbloom.io import kernel_cache
 from vkbloom.kept_arrays import kept
 from vkbloom.psf.base import PSF
 from vkbloom.psf.eye import spencer
@@ -193,4 +194,8 @@ def _kernel(
 def _core_kernel(
     settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
 ) -> CoreKernel:
-    return core_kernel(_kernel(settings, frame, buffers))
+    what = settings.psf, settings.normalize, settings.pixels_per_degree, settings.kernel_size
+    return kernel_cache.find_or_make(
+        ("convolution", *what, frame, buffers),
+        lambda: core_kernel(_kernel(settings, frame, buffers)),
+    )
