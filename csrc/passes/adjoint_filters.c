@@ -90,29 +90,14 @@ bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *p
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
-static bool bring_three(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                        double distance, double side, struct vkb_error *error)
+bool vkb_transpose_filament_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                 struct vkb_error *error)
 {
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    vkb_filter_three(&filter, distance, side);
+    vkb_filter_three(&filter, FILAMENT_OFFSET, FILAMENT_OUTER);
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
-}
-
-bool vkb_transpose_filament_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                 struct vkb_error *error)
-{
-    return bring_three(adjoint, pass, FILAMENT_OFFSET, FILAMENT_OUTER, error);
-}
-
-// Without threshold and mask the reduction is a filter.
-bool vkb_transpose_filament_reduction(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                      struct vkb_error *error)
-{
-    return pass->constants.thresholded || pass->constants.masked
-             ? vkb_transpose_groups(adjoint, pass, error)
-             : bring_three(adjoint, pass, 1.0, 0.25, error);
 }
 
 // Nine taps, pixels of the target apart.

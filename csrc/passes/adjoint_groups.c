@@ -152,3 +152,16 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
     return vkb_bring_through(adjoint, &row, &filter, pass->reads[1], target, error);
 }
+
+// Without threshold and mask the reduction is a filter.
+bool vkb_transpose_filament_reduction(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                      struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    if (pass->constants.thresholded || pass->constants.masked)
+        return vkb_transpose_groups(adjoint, pass, error);
+    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    vkb_filter_three(&filter, 1.0, 0.25);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
