@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vkbloom import no_bloom
 from vkbloom.argument_types import checked
-from vkbloom.banded import Band, BloomByBands, ImageByBands
+from vkbloom.bands import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
 from vkbloom.io import image_reading

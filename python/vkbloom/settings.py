@@ -35,7 +35,6 @@ BloomFormat = Literal[
 ]
 
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
-BLOOM_FORMATS: tuple[BloomFormat, ...] = get_args(BloomFormat)
 
 
 def _read_glare(glare: object) -> tuple[Glare, ...]:

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 import vkbloom
 from tests.exhaustive import by_turns
 from vkbloom import large_files
-from vkbloom.banded import BloomByBands, ImageByBands
+from vkbloom.bands import BloomByBands, ImageByBands
 from vkbloom.cli.program import program
 from vkbloom.io import rows
 

@@ -19,9 +19,10 @@ from tests.exhaustive import some
 from tests.framebuffers import decode, make, noise
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
 from vkbloom.explorer.controls import as_code, controls, settings_from
-from vkbloom.explorer.shown import picture_of, reduced, texts_of
+from vkbloom.explorer.fast_pictures import picture_of, texts_of
 from vkbloom.explorer.viewer import Viewer
 from vkbloom.registry import METHODS
+from vkbloom.views.pictures import reduced
 
 EXAMPLES = [
     *presets.values(),

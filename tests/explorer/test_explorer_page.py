@@ -24,7 +24,7 @@ from tests.exhaustive import by_turns, witness
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, jupyterlab
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
-from vkbloom.explorer.shown import picture_of
+from vkbloom.explorer.fast_pictures import picture_of
 from vkbloom.explorer.viewer import Viewer
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import pytest
 import vkbloom
 from tests.exhaustive import by_turns
 from vkbloom import Renderer, Settings
-from vkbloom.banded import Band, BloomByBands
+from vkbloom.bands import Band, BloomByBands
 
 WIDTH = 29
 # A height that those of all levels divide, and one without a common divisor.

@@ -234,18 +234,13 @@ def _help(label: str, info: FieldInfo) -> str:
 class FieldOptions(click.Option):
     """The place of the options of some classes' fields, which `Command` makes when it is called.
 
-    Parameters
-    ----------
-    param_decls : sequence of str
-        The command's keyword argument that receives the values given by the user: a dict of field
-        name to value.
-    kinds : mapping of str to type
-        Dataclasses by their label in the help; "" for no label. A field that several dataclasses
-        have becomes one option, and its help has the text of each. A registry is read at each call.
-    base : type, optional
-        A dataclass whose fields get no options.
-    prefix : str
-        Prefix of the options' names, as in "camera-".
+    - `param_decls`: The command's keyword argument that receives the values of the call: a dict of
+      field name to value.
+    - `kinds`: Dataclasses by their label in the help; "" for no label. A field that several
+      dataclasses have is one option, whose help has the text of each. A registry is read at each
+      call.
+    - `base`: A dataclass whose fields get no options.
+    - `prefix`: Of the options' names, as in "camera-".
     """
 
     def __init__(

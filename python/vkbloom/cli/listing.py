@@ -157,18 +157,12 @@ def _sheet(
             if is_photo and one.needs_hdr:
                 words += f": --expand {PHOTO_EXPANSION:g}"
             tiles.append((_tile(final, cell), one.name, words))
-    return pictures.sheet_png(tiles, "", _COLUMNS, cell)
+    return pictures.sheet_png(tiles, _COLUMNS, cell)
 
 
 def _reduced(image: NDArray[Any]) -> NDArray[Any]:
     """Return the colours of an image, its longer side at most that of the sheet's renders."""
-    colours = image[:, :, :3]
-    height, width = colours.shape[:2]
-    factor = _LARGEST_SIDE / max(height, width)
-    if factor >= 1:
-        return np.ascontiguousarray(colours)
-    size = pictures.scaled(width, height, factor)
-    return pictures.resized(colours.astype(np.float32), *size).astype(image.dtype)
+    return np.ascontiguousarray(pictures.reduced(image[:, :, :3], (_LARGEST_SIDE, _LARGEST_SIDE)))
 
 
 def _tile(final: NDArray[Any], cell: tuple[int, int]) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Framebuffers as PNG, optimized for speed: the sRGB curve is a table."""
+"""Framebuffers as PNG, optimized for speed (the sRGB curve is a table); pixels as text."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom.views import pictures
 
-__all__ = ["picture_of", "reduced", "texts_of"]
+__all__ = ["picture_of", "texts_of"]
 
 # Compression level of zlib. The pictures go to a browser on this machine or through a notebook
 # server, where compressing takes longer than sending a larger file.
@@ -41,20 +41,6 @@ def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
         colours = halves.repeat(3, axis=2)
         shown = pictures.picture(colours, encoded=is_encoded, stops=stops)
     return shown[0, :, 0]
-
-
-def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Return an image whose pixels are averaged until it fits into a size.
-
-    `image`: ndarray, shape (H, W, C); uint8, float16 or float32.
-    """
-    height, width = image.shape[:2]
-    shrink = min(size[0] / width, size[1] / height)
-    if shrink >= 1:
-        return image
-    with np.errstate(invalid="ignore"):
-        small = pictures.resized(image.astype(np.float32), *pictures.scaled(width, height, shrink))
-    return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
 
 
 def texts_of(pixel: NDArray[Any]) -> list[str]:

@@ -58,8 +58,6 @@ class Server:
     - `port`: The port to listen on; 0: any free port.
     - `url`: The address of the page.
 
-    Notes
-    -----
     Create and use it in a running event loop.
     """
 

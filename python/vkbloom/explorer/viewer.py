@@ -41,8 +41,8 @@ from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.core_access import core_of
 from vkbloom.explorer.controls import as_code, as_fields, controls, described, settings_from
+from vkbloom.explorer.fast_pictures import picture_of, texts_of
 from vkbloom.explorer.own_files import OwnFiles, current
-from vkbloom.explorer.shown import picture_of, reduced, texts_of
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.named_settings import presets
@@ -50,6 +50,7 @@ from vkbloom.plans import Pass
 from vkbloom.renderer import Renderer
 from vkbloom.settings import SHADINGS, check_settings, check_shading
 from vkbloom.sources import image_source, scene_source
+from vkbloom.views.pictures import reduced
 
 if TYPE_CHECKING:
     from vkbloom.frames import Frames
@@ -79,24 +80,9 @@ Answer = tuple[dict[str, Any], list[bytes]]
 class Viewer:
     """A source and the settings of both sides.
 
-    Parameters
-    ----------
-    source, settings, mask, emission, against, size, shading, renderer
-        As for `vkbloom.explore`.
-    adapter : str
-        Adapter of the new renderer, if `renderer` is None.
+    Arguments are those of `vkbloom.explore`, and the adapter of a new renderer.
 
-    Attributes
-    ----------
-    settings : dict of str to Settings
-        Of the sides "a" and "b".
-    frames : dict of str to Frames
-        The latest ones of each side.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `vkbloom.explore`.
+    - `settings`, `frames`: The latest ones of the sides "a" and "b".
     """
 
     def __init__(
@@ -177,18 +163,10 @@ class Viewer:
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
         """Return the answer to a message.
 
-        Parameters
-        ----------
-        message : mapping of str to object
-            See the table above.
-        files : sequence of bytes
-            Content of the file that belongs to the message.
+        It has pictures, too; it is ``{"kind": "error", "error": ...}`` if the message is invalid.
 
-        Returns
-        -------
-        (dict, list of bytes)
-            The answer and its pictures; ``{"kind": "error", "error": ...}`` if the message is
-            invalid.
+        - `message`: A mapping; see the table above.
+        - `files`: Contents of the files that belong to the message.
         """
         kinds = {
             "setup": self._setup,

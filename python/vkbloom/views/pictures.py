@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import check_index, import_extra
+from vkbloom.checks import import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io.srgb import encode_srgb
 
 __all__ = [
     "contact_sheet_html",
-    "contact_sheet_png",
     "labelled",
     "leading_png",
     "picture",
     "png",
+    "reduced",
     "resized",
     "scaled",
     "sheet_png",
@@ -109,33 +109,8 @@ def _timings_html(frames: Framebuffers) -> str:
     return "".join(rows)
 
 
-def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
-    """Return a labelled contact sheet of all framebuffers as PNG.
-
-    Pictures are shown as in a notebook, without alpha, fitted into cells with the aspect of
-    `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
-    its fonts are missing, they are left out with a warning.
-
-    `width`: Width of a picture in pixels, 128 to 4096.
-    """
-    columns = check_index("columns", columns, 1, 32)
-    width = check_index("width", width, 128, 4096)
-    if not frames:
-        raise ValueError("frames: a contact sheet needs at least one framebuffer")
-    height = round(width / _aspect(frames))
-    tiles = []
-    for name, array in frames.items():
-        fit = min(width / array.shape[1], height / array.shape[0])
-        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
-        tiles.append((picture, name, _described(array)))
-    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
-    title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
-    return sheet_png(tiles, title, columns, (width, height))
-
-
 def sheet_png(
     tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
-    title: str,
     columns: int,
     cell: tuple[int, int],
 ) -> bytes:
@@ -148,18 +123,17 @@ def sheet_png(
     columns = min(columns, len(tiles))
     text = max(11, width // 20)
     gap, caption = text, 3 * text
-    heading = 2 * text * bool(title)
     rows = -(-len(tiles) // columns)
     sheet = np.full(
-        (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
+        (gap + rows * (height + caption + gap), gap + columns * (width + gap), 3),
         24,
         np.uint8,
     )
-    labels = [(gap, gap + text, title)] if title else []
+    labels = []
     for index, (picture, *lines) in enumerate(tiles):
         row, column = divmod(index, columns)
         left = gap + column * (width + gap)
-        top = gap + heading + row * (height + caption + gap)
+        top = gap + row * (height + caption + gap)
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
         sheet[top : top + height, left : left + width] = 40
@@ -309,6 +283,17 @@ def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.f
         else:
             image = image.take(starts, axis=axis)
     return image
+
+
+def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return an (H, W, C) image whose pixels are averaged until it fits into (width, height)."""
+    height, width = image.shape[:2]
+    shrink = min(size[0] / width, size[1] / height)
+    if shrink >= 1:
+        return image
+    with np.errstate(invalid="ignore"):
+        small = resized(image.astype(np.float32), *scaled(width, height, shrink))
+    return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
 
 
 def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
