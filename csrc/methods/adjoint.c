@@ -32,6 +32,11 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_filament_down_frag, vkb_transpose_filament_down, NULL},
         {&vkb_shader_hdrp_prefilter_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_hdrp_blur_frag, vkb_transpose_hdrp_blur, NULL},
+        {&vkb_shader_godot_blur_frag, vkb_transpose_godot_blur, NULL},
+        {&vkb_shader_godot_final_frag, vkb_transpose_godot_composite, NULL},
+        {&vkb_shader_blender_prefilter_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_blender_down_frag, vkb_transpose_groups, NULL},
+        {&vkb_shader_blender_end_frag, vkb_transpose_blender_end, NULL},
     };
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)

@@ -100,25 +100,71 @@ bool vkb_transpose_filament_down(struct vkb_adjoint *adjoint, const struct vkb_p
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
-// Nine taps, pixels of the target apart.
-static void set_nine(const double weights[9], enum vkb_border border, struct vkb_axis *axis)
+// A kernel of nine taps, pixels of the target apart.
+static void set_nine(const double half[5], enum vkb_border border, struct vkb_axis *axis)
 {
     axis->border = border;
     axis->count = 0;
-    for (int tap = 0; tap < 9; ++tap)
-        axis->taps[axis->count++] = (struct vkb_tap){.offset = tap - 4, .weights = {weights[tap]}};
+    for (int tap = -4; tap <= 4; ++tap)
+        axis->taps[axis->count++] =
+            (struct vkb_tap){.offset = tap, .weights = {half[tap < 0 ? -tap : tap]}};
 }
 
 bool vkb_transpose_hdrp_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    static const double weights[9] = {HDRP_KERNEL};
+    static const double kernel[9] = {HDRP_KERNEL};
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    set_nine(weights, pass->constants.first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST,
+    set_nine(kernel + 4, pass->constants.first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST,
              rows ? &filter.x : &filter.y);
+    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+}
+
+// Of the blurs of the frame: weights by brightness are before the horizontal one, at the pixels of
+// the target, and after the vertical one.
+static bool bring_first_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_filter *blur, struct vkb_error *error)
+{
+    const uint32_t target = pass->targets[0], source = pass->reads[0];
+    const struct vkb_size size = {blur->x.to, blur->y.to};
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    uint32_t cotangents = vkb_brought(adjoint, pass);
+    struct vkb_filter filter;
+
+    if (rows && !vkb_filter_apart(adjoint, blur, cotangents, size, &cotangents, error))
+        return false;
+    const uint32_t reads[] = {source, pass->reads[pass->constants.masked ? 1 : 0], cotangents};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_godot_blur_frag, reads, 3);
+    row.constants = pass->constants;
+    row.block = VKB_BLOCK_prefilter;
+    row.params.prefilter = pass->params.prefilter;
+    vkb_filter_begin(adjoint->graph, source, target, &filter);
+    if (!vkb_bring_through(adjoint, &row, rows ? &filter : blur, source, target, error))
+        return false;
+    if (!pass->constants.masked)
+        return true;
+    row.constants.by = BY_MASK;
+    vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
+    return vkb_bring_through(adjoint, &row, &filter, pass->reads[1], target, error);
+}
+
+bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                              struct vkb_error *error)
+{
+    static const double half[5] = {GODOT_KERNEL};
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const bool first = pass->constants.first;
+    const uint32_t target = pass->targets[0];
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, first ? target : pass->reads[0], target, &filter);
+    set_nine(half, VKB_BORDER_PAIRS, rows ? &filter.x : &filter.y);
+    if (first)
+        return bring_first_blur(adjoint, pass, &filter, error);
+    filter.gain = rows ? 1.0 : pass->params.prefilter.strength;
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 

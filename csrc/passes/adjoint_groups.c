@@ -42,6 +42,16 @@ static bool find_place(enum vkb_mode groups, int group, double place[2])
     return true;
 }
 
+// The mean of as many texels for each pixel, from the first ones on, or from the last ones back.
+static void set_means(struct vkb_axis *axis, int32_t count, bool backwards)
+{
+    axis->step = count;
+    axis->origin = backwards ? axis->from - 1.0 - axis->step * (axis->to - 1.0) : 0.0;
+    axis->count = 0;
+    for (int32_t i = 0; i < count; ++i)
+        axis->taps[axis->count++] = tap_at(backwards ? -i : i, 1.0 / count);
+}
+
 // The taps of a group: those of 13 taps are pairs along both axes.
 static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filter *filter)
 {
@@ -58,12 +68,15 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
         filter->y.kind = group & 2 ? VKB_KIND_RIGHT_PAIR : VKB_KIND_LEFT_PAIR;
     } else if (groups == GROUPS_FILAMENT) {
         vkb_filter_three(filter, 1.0, 0.25);
+    } else if (groups == GROUPS_HIGHLIGHTS && row->constants.radius > 1) {
+        set_means(&filter->x, row->constants.radius, false);
+        set_means(&filter->y, row->constants.radius, true);
     } else if (groups == GROUPS_PYGFX) {
         vkb_filter_thirteen(filter, step_x, step_y);
     } else if (group > 0) {
         set_pair(&filter->x, 0.0, corner & 1 ? 2.0 * step_x : -2.0 * step_x);
         set_pair(&filter->y, 0.0, corner & 2 ? 2.0 * step_y : -2.0 * step_y);
-    } else if (groups != GROUPS_URP && groups != GROUPS_UNREAL) {
+    } else if (groups == GROUPS_PYRAMID || groups == GROUPS_BEVY || groups == GROUPS_PYGFX_KARIS) {
         set_pair(&filter->x, -step_x, step_x);
         set_pair(&filter->y, -step_y, step_y);
     }
@@ -79,7 +92,7 @@ static void take_params(const struct vkb_pass_row *pass, struct vkb_prefilter_pa
     memset(params, 0, sizeof *params);
     params->target_width = pass->params.pyramid.target_width;
     params->target_height = pass->params.pyramid.target_height;
-    const bool unit = pass->shader == &vkb_shader_pygfx_down_frag;
+    const bool unit = pass->shader != &vkb_shader_pyramid_down_frag;
     params->step_x = unit ? 1.0f : pass->params.pyramid.step_x;
     params->step_y = unit ? 1.0f : pass->params.pyramid.step_y;
 }
@@ -98,6 +111,7 @@ static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
         {&vkb_shader_kino_prefilter_frag, GROUPS_KINO},
         {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
         {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
+        {&vkb_shader_blender_prefilter_frag, GROUPS_HIGHLIGHTS},
     };
 
     for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i)
@@ -116,7 +130,10 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
     case GROUPS_URP:
     case GROUPS_UNREAL:
     case GROUPS_PYGFX:
+    case GROUPS_HIGHLIGHTS:
         return 1;
+    case GROUPS_BLENDER:
+        return 13;
     case GROUPS_KINO:
         return pass->constants.anti_flicker ? 5 : 1;
     default:

@@ -11,13 +11,28 @@ static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image
 
 // Whether the derivatives by images depend on the bloom. Otherwise it need not be rendered for
 // them.
-static bool depends_on_bloom(const struct vkb_pass_row *pass)
+static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
 {
-    const struct vkb_constants *constants = &pass->constants;
+    return constants->composite == COMPOSITE_SCREEN || constants->composite == COMPOSITE_SOFT_LIGHT
+        || constants->tonemap != TONEMAP_NONE || constants->encoding != ENCODING_NONE
+        || constants->alpha != ALPHA_KEEP || limit < (float)SINGLE_LIMIT;
+}
 
-    return constants->composite == COMPOSITE_SCREEN || constants->tonemap != TONEMAP_NONE
-        || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
-        || pass->params.composite.limit < (float)SINGLE_LIMIT;
+// By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
+static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                            struct vkb_pass_row *row, float limit, struct vkb_error *error)
+{
+    if (!depends_on_bloom(&pass->constants, limit))
+        row->reads[1] = row->reads[0];
+    for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
+        row->constants.by = by;
+        if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
+            || (by == BY_MASK && !pass->constants.masked))
+            continue;
+        if (!vkb_bring(adjoint, row, pass->reads[by], error))
+            return false;
+    }
+    return true;
 }
 
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -33,17 +48,21 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.params.composite = pass->params.composite;
     if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
         return false;
-    if (!depends_on_bloom(pass))
-        row.reads[1] = row.reads[0];
-    for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
-        row.constants.by = by;
-        if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
-            || (by == BY_MASK && !pass->constants.masked))
-            continue;
-        if (!vkb_bring(adjoint, &row, pass->reads[by], error))
-            return false;
-    }
-    return true;
+    return bring_composite(adjoint, pass, &row, row.params.composite.limit, error);
+}
+
+bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                   struct vkb_error *error)
+{
+    const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
+                              vkb_brought(adjoint, pass)};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_godot_final_frag, reads, 4);
+
+    row.constants = pass->constants;
+    row.constants.dither = 0;
+    row.block = VKB_BLOCK_godot_final;
+    row.params.godot_final = pass->params.godot_final;
+    return bring_composite(adjoint, pass, &row, row.params.godot_final.limit, error);
 }
 
 // Brings what is at the pixels of the target to an image that these sample linearly.
@@ -74,4 +93,16 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
         return false;
     row.constants.by = BY_MASK;
     return !pass->constants.masked || bring_sampled(adjoint, &row, pass->reads[1], target, error);
+}
+
+bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                               struct vkb_error *error)
+{
+    const uint32_t reads[] = {pass->reads[0], vkb_brought(adjoint, pass)};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_blender_end_frag, reads, 2);
+
+    row.constants = pass->constants;
+    row.block = VKB_BLOCK_blender_end;
+    row.params.blender_end = pass->params.blender_end;
+    return bring_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
 }

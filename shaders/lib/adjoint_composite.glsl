@@ -11,6 +11,14 @@ struct Pixel {
     vec2 by_curves;
 };
 
+// Through the encoding and the range of the picture's format.
+vec3 back_through_encoding(vec3 toned, vec3 brought)
+{
+    vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
+    vec3 kept = brought * inside(result, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
+    return kept * encoding_slope(toned, ENCODING, params.reference_white);
+}
+
 Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
 {
     Pixel p;
@@ -20,9 +28,7 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.brought = where_finite(cotangent, given);
     p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
     vec3 exposed = p.mixed * exp2(params.exposure), toned = apply_tonemap(exposed, TONEMAP);
-    vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
-    vec3 kept = p.brought.rgb * inside(result, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
-    vec3 by_toned = kept * encoding_slope(toned, ENCODING, params.reference_white);
+    vec3 by_toned = back_through_encoding(toned, p.brought.rgb);
     vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
     p.by_mixed = by_exposed * exp2(params.exposure);
     p.by_curves.x = log(2.0) * dot(by_exposed, exposed);
@@ -56,6 +62,16 @@ vec4 by_alpha_light(Pixel p)
     return vec4(p.brought.a * share * equal_shares(p.bloom.rgb, brightest), 0.0);
 }
 
+// Of the picture's alpha by that of the scene.
+float alpha_slope(Pixel p)
+{
+    if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
+        return 1.0;
+    float light = ALPHA == ALPHA_MAX ? max(p.bloom.r, max(p.bloom.g, p.bloom.b)) : p.bloom.a;
+    light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
+    return ALPHA == ALPHA_BLUR ? 1.0 - light : p.scene.a == light ? 0.5 : float(p.scene.a > light);
+}
+
 vec4 by_scene(Pixel p)
 {
     vec3 colour = p.by_mixed;
@@ -65,15 +81,7 @@ vec4 by_scene(Pixel p)
         colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
         colour *= vec3(greaterThan(p.scene.rgb, vec3(0.0)));
-    float alpha = 1.0;
-    if (ALPHA != ALPHA_KEEP && COMPOSITE != COMPOSITE_OFF) {
-        float light = ALPHA == ALPHA_MAX ? max(p.bloom.r, max(p.bloom.g, p.bloom.b)) : p.bloom.a;
-        light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
-        alpha = ALPHA == ALPHA_BLUR   ? 1.0 - light
-              : p.scene.a == light ? 0.5
-                                   : float(p.scene.a > light);
-    }
-    return vec4(colour, alpha * p.brought.a);
+    return vec4(colour, p.brought.a * alpha_slope(p));
 }
 
 vec4 by_bloom(Pixel p)

@@ -21,6 +21,8 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 #include "lib/kino.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/thirteen_taps.glsl"
+#include "lib/highlights.glsl"
+#include "lib/mean_of_texels.glsl"
 
 // Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
 int group_count()
@@ -32,6 +34,8 @@ int group_count()
     if (GROUPS == GROUPS_URP)
         return 1;
     if (GROUPS == GROUPS_UNREAL)
+        return 1;
+    if (GROUPS == GROUPS_HIGHLIGHTS)
         return 1;
     if (GROUPS == GROUPS_KINO)
         return ANTI_FLICKER != 0 ? 5 : 1;
@@ -71,8 +75,14 @@ vec4[5] means(Place place)
         return group_means(taps_of(place));
     FilamentTaps pairs = filament_taps(place.part);
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+    // Its groups share their taps.
+    if (GROUPS == GROUPS_BLENDER)
+        return found;
     for (int group = 0; group < group_count(); ++group)
         found[group] = sample_at(source, place, place_of(group, pairs), SAMPLING);
+    // Only Blender's highlights are of blocks of texels.
+    if (RADIUS > 1)
+        found[0] = mean_of_texels(source, PIXEL, params.target_height, RADIUS);
     return found;
 }
 
@@ -231,6 +241,56 @@ vec4 back_kino(vec4 found[5], vec4 brought)
     return vec4(brought.rgb * vec3(lessThan(found[LEVELS].rgb, vec3(65000.0))), brought.a);
 }
 
+// The derivative of what a smooth transition subtracts or adds (highlights.glsl).
+float rounding_slope(float distance_to_end, float width)
+{
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return -0.5 * h * sign(distance_to_end);
+}
+
+vec4 back_highlights(vec4 value, vec4 brought)
+{
+    if (THRESHOLDED == 0)
+        return brought;
+    float low = params.threshold, range = params.maximum, high = low + range;
+    float at_low = min(params.smoothness, min(low, range));
+    float at_high = min(params.smoothness, min(high, range));
+    float brightest = max(value.r, max(value.g, value.b)), above = brightest - low;
+    if (brightest <= 0.0)
+        return vec4(0.0);
+    float kept = max(above, 0.0) + rounding(above, at_low);
+    float slope = float(kept < range) - rounding_slope(kept - range, at_high);
+    slope *= float(above > 0.0) + rounding_slope(above, at_low);
+    float factor = highlight(brightest) / brightest;
+    float by_brightest = dot(brought, value) * (slope - factor) / brightest;
+    return factor * brought + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);
+}
+
+// Of one of Blender's 13 taps: of up to four groups, in each of which brighter taps weigh less.
+vec4 back_blender(Taps taps, vec4 brought)
+{
+    bool inner = LEVELS >= 9;
+    vec4 own = inner ? taps.inner[LEVELS - 9] : taps.outer[LEVELS];
+    float weight = weighted(own).weight;
+    vec4 slope = vec4(-weight * weight * shares_of_brightest(own.rgb), 0.0), total = vec4(0.0);
+    for (int group = 0; group < 5; ++group) {
+        vec4 sum = vec4(0.0);
+        float weights = 0.0;
+        bool belongs = false;
+        for (int i = 0; i < 4; ++i) {
+            int corner = (group - 1 & 1) + (i & 1) + 3 * ((group - 1 >> 1) + (i >> 1));
+            Weighted tap = weighted(group == 0 ? taps.inner[i] : taps.outer[corner]);
+            belongs = belongs || LEVELS == (group == 0 ? 9 + i : corner);
+            sum += tap.value;
+            weights += tap.weight;
+        }
+        if (belongs)
+            total += GROUP_SHARES[group]
+                   * (weight * brought + slope * dot(brought, own - sum / weights)) / weights;
+    }
+    return usual(total);
+}
+
 vec4 prefiltered(vec4 found[5], Place place)
 {
     vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
@@ -246,6 +306,8 @@ vec4 prefiltered(vec4 found[5], Place place)
         return filament_prefiltered(four, filament_taps(place.part).shares);
     if (GROUPS == GROUPS_HDRP)
         return hdrp_prefiltered(found);
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return highlights(found[0]);
     return GROUPS == GROUPS_URP ? urp_prefiltered(found[0]) : unreal_prefiltered(found[0]);
 }
 
@@ -262,6 +324,10 @@ vec4 back(vec4 found[5], vec4 brought, Place place)
         return back_unreal(found[0], brought);
     if (GROUPS == GROUPS_PYGFX)
         return brought * vec4(greaterThan(pygfx_groups(taps_of(place)), vec4(0.0)));
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return back_highlights(found[0], brought);
+    if (GROUPS == GROUPS_BLENDER)
+        return back_blender(taps_of(place), brought);
     // Without weights the reduction is linear, and this is no group but all of it.
     if (GROUPS == GROUPS_FILAMENT)
         return THRESHOLDED == 0 ? brought : back_weighted(found, brought, place);

@@ -15,13 +15,6 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #include "lib/mask.glsl"
 #include "lib/godot.glsl"
 
-// The position from which a sample is read: samples are clamped in pairs.
-int paired(int place, int length)
-{
-    int pair = clamp(place & ~1, 0, max(length - 2, 0));
-    return min(pair + (place & 1), length - 1);
-}
-
 vec4 read(ivec2 pixel, ivec2 size)
 {
     if (DIRECTION == DIRECTION_VERTICAL)
@@ -30,25 +23,9 @@ vec4 read(ivec2 pixel, ivec2 size)
     return dimmed(value);
 }
 
-// The part of a colour that glows.
-float feedback(vec4 value)
-{
-    float brightest = max(value.r, max(value.g, value.b));
-    // A scale of 0 means a step.
-    float t = clamp((brightest - params.threshold) / max(params.threshold_scale, 1e-6), 0.0, 1.0);
-    return max(t * t * (3.0 - 2.0 * t), params.glow_bloom);
-}
-
 vec4 end(vec4 sum)
 {
-    if (FIRST == 0)
-        return params.strength * sum;
-    vec4 value = sum / (1.0 - luminance(sum)) * params.strength;
-    // Exposure and cap do not apply to alpha.
-    value.rgb *= exp2(params.exposure);
-    if (THRESHOLDED != 0)
-        value *= feedback(value);
-    return mask_value() * vec4(min(value.rgb, vec3(params.luminance_cap)), value.a);
+    return FIRST == 0 ? params.strength * sum : mask_value() * glowing(sum);
 }
 
 vec4 shade()

@@ -15,32 +15,7 @@ layout(set = 0, binding = 3) uniform sampler2D mask;
 
 #define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
-
-vec3 soft_light(vec3 s, vec3 light)
-{
-    // Limited from below, since infinity times 0 is NaN.
-    vec3 low = max(s, -1e6);
-    vec3 dark = ((16.0 * low - 12.0) * low + 4.0) * low;
-    vec3 full = mix(sqrt(max(s, 0.0)), dark, lessThanEqual(s, vec3(0.25)));
-    return mix(s + clamp(light, 0.0, 1.0) * (full - s), s, greaterThan(s, vec3(1.0)));
-}
-
-vec3 blend(vec3 s, vec3 bloom_light, float share)
-{
-    vec3 light = light_of(bloom_light);
-    if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
-        return soft_light(apply_tonemap(s, TONEMAP), apply_tonemap(light, TONEMAP));
-    vec3 sum = s + light;
-    if (COMPOSITE == COMPOSITE_MIX)
-        sum = mixed(s, bloom_light, share);
-    if (COMPOSITE == COMPOSITE_REPLACE)
-        sum = light;
-    if (COMPOSITE == COMPOSITE_SCREEN) {
-        vec3 part = clamp(light / params.white, 0.0, 1.0);
-        sum = s + (params.white - s) * part;
-    }
-    return apply_tonemap(sum, TONEMAP);
-}
+#include "lib/godot_blend.glsl"
 
 vec4 shade()
 {

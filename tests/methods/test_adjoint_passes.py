@@ -12,8 +12,10 @@ from tests.exhaustive import witness
 from tests.methods.reference_cases import random_image
 from vkbloom import (
     BevyBloom,
+    BlenderGlare,
     DualKawase,
     FilamentBloom,
+    GodotBloom,
     HdrpBloom,
     KinoBloom,
     PygfxBloom,
@@ -31,7 +33,10 @@ from vkbloom.sources import Inputs
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those that are checked in all sizes, the first two with their fields.
 FIELDS = ("knee", "pyramid")
-COMPLETE = (*FIELDS, "pygfx karis", "filament", "filament threshold", "hdrp")
+COMPLETE = (
+    *FIELDS,
+    *("pygfx karis", "filament", "filament threshold", "hdrp", "godot threshold", "blender"),
+)
 #: Those whose weights count negative luminances.
 NEGATIVE = ("pygfx karis",)
 BEVY = BevyBloom(max_mip_dimension=16)
@@ -66,6 +71,20 @@ CASES: dict[str, Any] = {
     "filament threshold": FilamentBloom(resolution=16, levels=2, threshold=0.4, highlight=10.0),
     "filament alpha": FilamentBloom(resolution=16, threshold=0.4, alpha="blur"),
     "hdrp": HdrpBloom(anamorphism=0.3),
+    "godot": GodotBloom(
+        level_weights=(0.5, 0, 0.3, 0, 0, 0, 0), composite="screen", intensity=0.7, threshold=None
+    ),
+    "godot threshold": GodotBloom(
+        threshold=0.3, threshold_scale=0.4, luminance_cap=1.2, strength=1.3, exposure=0.4
+    ),
+    "godot soft light": GodotBloom(
+        composite="soft_light", tonemap="reinhard", bicubic=False, threshold=None
+    ),
+    "godot alpha": GodotBloom(composite="replace", alpha="blur", encoding="srgb", threshold=0.2),
+    "blender": BlenderGlare(threshold=0.4, smoothness=0.3, saturation=1.7, tint=(1, 0.5, 0.2)),
+    "blender small": BlenderGlare(
+        quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4
+    ),
 }
 
 
@@ -164,6 +183,8 @@ MASKED = (
     FilamentBloom(resolution=16, levels=1),
     FilamentBloom(resolution=16, levels=1, threshold=0.3),
     HdrpBloom(),
+    GodotBloom(threshold=0.3, threshold_scale=0.4, composite="mix", intensity=0.5),
+    BlenderGlare(threshold=0.3, size=0.3),
 )
 
 
