@@ -1,12 +1,9 @@
 #include "run/upload.h"
 
+#include "run/streams.h"
 #include "vulkan/parts.h"
 
 #include <string.h>
-
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 
 enum {
     // The device copies at least so many bytes while the host packs others. Each copy is a
@@ -212,33 +209,6 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
     return true;
 }
 
-// Copies without a place in the host's caches: the device reads the pixels from memory, and the
-// cache would have to read what is overwritten. Needs end_streaming in the same thread.
-static void stream(unsigned char *to, const unsigned char *from, size_t size)
-{
-#ifdef __SSE2__
-    const size_t step = sizeof(__m128i), head = -(uintptr_t)to % step;
-
-    if (size >= head + step) {
-        memcpy(to, from, head);
-        to += head;
-        from += head;
-        size -= head;
-        for (; size >= step; to += step, from += step, size -= step)
-            _mm_stream_si128((__m128i *)(void *)to,
-                             _mm_loadu_si128((const __m128i *)(const void *)from));
-    }
-#endif
-    memcpy(to, from, size);
-}
-
-static void end_streaming(void)
-{
-#ifdef __SSE2__
-    _mm_sfence();
-#endif
-}
-
 static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end)
 {
     const struct rows *rows = context;
@@ -255,9 +225,9 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
         upload->rows[rows->offset + y] = vkb_count_specials(
             upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
         if (streams)
-            stream(to, row, row_size(rows->input));
+            vkb_stream(to, row, row_size(rows->input));
     }
-    end_streaming();
+    vkb_end_streaming();
 }
 
 static void sum_specials(struct vkb_upload *upload)
