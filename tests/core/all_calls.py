@@ -1,39 +1,71 @@
 """Threads that make all calls of the core at once: ``python -m tests.core.all_calls [CALLS]``.
 
 Half of them use one renderer, the others many. Each result must equal what one thread gave before,
-bit by bit. Prints how many calls were made, and whether the GIL is off.
+bit by bit. Arrays on the device are those of the stand-in for CUDA, and one of the methods is an
+own one. Prints how many calls were made, and whether the GIL is off; fails if a function or method
+of the core was not among them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import random
 import sys
+import tempfile
 import threading
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import BuiltinFunctionType, MethodDescriptorType, ModuleType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+import vkbloom
+from tests.device import stand_in
+from tests.device.device_work import OnDevice
 from tests.images import picture
 from tests.planned import CAMERA, INDICES, MESH, SKY, VERTICES
 from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core, requests
+from vkbloom.device_arrays import placed
 
 THREADS: Final = 16
 #: Renderers of the threads that share none with all others.
 MANY: Final = 4
 # The arrays of the last one are in the renderer's pages.
 SIZES = ((24, 16), (17, 31), (300, 290))
+OWN: Final = """\
+//!PARAM gain
+//!TYPE float
+0.5
+
+//!HOOK MAIN
+//!BIND GLOW
+//!BIND NOISE
+//!SAVE BLOOM
+//!WIDTH MAIN.w 2 /
+//!HEIGHT MAIN.h 2 /
+vec4 hook() { return gain * GLOW_tex(GLOW_pos) * NOISE_tex(GLOW_pos); }
+
+//!TEXTURE NOISE
+//!SIZE 2 2
+//!FORMAT r8
+//!FILTER LINEAR
+00ff80ff
+"""
 SETTINGS: tuple[Settings, ...] = (
     Separable(),
     Pyramid(levels=3, exposure=0.5, format="rgba32float"),
     DualKawase(levels=2),
+    vkbloom.load_method(OWN, name="own")(),
 )
 IMAGES = [picture(*size) for size in SIZES]
 UFO = Scene.ufo()
+# Of arrays on the device: the oldest is freed by whichever thread adds one.
+CAPSULES: deque[Any] = deque(maxlen=8)
 HEADER = np.array([0x07230203, 0x10000, 0, 1, 0], np.uint32).tobytes()
 
 
@@ -78,6 +110,31 @@ def recycle(renderer: Renderer, which: int, size: int) -> Any:
     assert source.resident
     assert not spare.resident
     return run(core, source, core.plan(source, SETTINGS[which], ("final",)))
+
+
+def on_device(renderer: Renderer, which: int, size: int) -> Any:
+    """Hand arrays of CUDA on: to the renderer, to other consumers, and back."""
+    core = renderer._core
+    image: Any = OnDevice(IMAGES[size])
+    frames: Any = renderer.apply(image, SETTINGS[which])
+    final = frames["final"]
+    CAPSULES.append(final.__dlpack__(stream=1))
+    copied = _core.read_dlpack(final.__dlpack__(stream=1, copy=True))
+    assert copied[0] != final.__cuda_array_interface__["data"][0]
+    out = OnDevice(np.zeros(final.shape, final.dtype))
+    handle = renderer.upload(image)
+    renderer.apply(handle, SETTINGS[which], out={"final": out})
+    again: Any = renderer.apply(final, SETTINGS[which], attachments="final")["final"]
+    written = placed(IMAGES[size], "cuda", core)
+    found = [one.numpy() for one in (*frames.values(), again, written)]
+    return [*found, out.array, core.cuda(), core.cuda_name(0)]
+
+
+def load(renderer: Renderer, which: int, size: int) -> Any:
+    """Load a method while other threads load one of the same name."""
+    text = OWN.replace("0.5", f"0.{which + 1}")
+    settings = vkbloom.load_method(text, name=f"own_{which}")()
+    return host(renderer.apply(IMAGES[size], settings))
 
 
 def wait_twice(renderer: Renderer, which: int, size: int) -> Any:
@@ -198,6 +255,8 @@ CALLS: Final[dict[Call, int]] = {
     leave: 6,
     upload: 12,
     recycle: 12,
+    on_device: 12,
+    load: 1,
     wait_twice: 12,
     adjoint: 6,
     look: 24,
@@ -215,12 +274,49 @@ def same(got: Any, right: Any) -> bool:
     )
 
 
+def entry_points() -> set[str]:
+    """Return all functions and methods of the core."""
+    kinds = [one for one in vars(_core).values() if isinstance(one, type)]
+    owners: list[Any] = [_core, *(kind for kind in kinds if not issubclass(kind, Exception))]
+    return {
+        f"{owner.__name__}.{name}"
+        for owner in owners
+        for name, one in vars(owner).items()
+        if isinstance(one, BuiltinFunctionType | MethodDescriptorType) and name[0] != "_"
+    }
+
+
+@contextlib.contextmanager
+def recorded(called: set[str]) -> Iterator[None]:
+    """Add the functions and methods that this thread calls."""
+
+    def note(frame: object, event: str, called_now: Any) -> None:
+        del frame
+        if event == "c_call":
+            owner: Any = called_now.__self__
+            kind: Any = owner if isinstance(owner, ModuleType) else type(owner)
+            called.add(f"{kind.__name__}.{called_now.__name__}")
+
+    sys.setprofile(note)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
 def play(calls: int) -> Counter[str]:
     """Make so many calls; return how often each was made."""
     names = {call.__name__: call for call in CALLS}
-    keys = [(name, which, size) for name in names for which in range(3) for size in range(3)]
-    with Renderer() as single:
-        right = {key: names[key[0]](single, *key[1:]) for key in keys}
+    kinds = range(len(SETTINGS))
+    keys = [(name, which, size) for name in names for which in kinds for size in range(3)]
+    called: set[str] = set()
+    with Renderer() as single, tempfile.TemporaryDirectory() as folder:
+        stand_in.load(Path(folder), single.info)
+        with recorded(called):
+            right = {key: names[key[0]](single, *key[1:]) for key in keys}
+    missing = entry_points() - called
+    # Without VK_EXT_headless_surface, no screen is opened.
+    assert missing <= {"Renderer.show", "Renderer.close_screen"}, missing
     renderers = [Renderer() for _ in range(1 + MANY)]
     start = threading.Barrier(THREADS)
     share = -(-calls // THREADS)
@@ -233,7 +329,7 @@ def play(calls: int) -> Counter[str]:
             (name,) = dice.choices(list(names), list(CALLS.values()))
             if done == 0:
                 name = list(names)[thread % len(names)]  # so that each is made
-            key = (name, dice.randrange(3), dice.choices(range(3), (8, 8, 1))[0])
+            key = (name, dice.choice(kinds), dice.choices(range(3), (8, 8, 1))[0])
             renderer = renderers[0 if thread % 2 else dice.randrange(1, 1 + MANY)]
             apply(renderer, 0, 0)  # what `ask` asks for is there then
             assert same(names[name](renderer, *key[1:]), right[key]), key

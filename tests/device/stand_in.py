@@ -1,7 +1,8 @@
-"""Builds the stand-in for libcuda, and the environment of processes that use it."""
+"""Builds the stand-in for libcuda, for this process or for others."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import subprocess
 from pathlib import Path
@@ -18,12 +19,16 @@ def build(folder: Path) -> Path:
     """Build the library; return its folder."""
     if os.name == "nt":
         pytest.skip("memory is exported as descriptors of files")
-    options = ("-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
-    subprocess.run(
-        [*compiler(), *options, "-fvisibility=hidden", SOURCE, "-o", folder / "libcuda.so.1"],
-        check=True,
-    )
+    options = ["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    options += ["-fvisibility=hidden", "-Wl,-soname,libcuda.so.1"]
+    subprocess.run([*compiler(), *options, SOURCE, "-o", folder / "libcuda.so.1"], check=True)
     return folder
+
+
+def load(folder: Path, adapter: AdapterInfo) -> None:
+    """Build it into this process, which must not have opened CUDA yet."""
+    os.environ["STAND_IN_UUID"] = adapter.uuid
+    ctypes.CDLL(str(build(folder) / "libcuda.so.1"))
 
 
 def variables(folder: Path, adapter: AdapterInfo) -> dict[str, str]:
