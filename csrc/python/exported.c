@@ -62,9 +62,12 @@ static struct exported_object *exported_of(PyObject *object)
 static void dealloc(PyObject *object)
 {
     struct exported_object *self = exported_of(object);
+    struct vkb_error ignored;
 
     // A forked process returns nothing: the device belongs to its parent.
     if (self->run && self->process == vkb_current_process()) {
+        // After a failure. Other memory was filled before the device read it.
+        vkb_export_filled(self->run, &ignored);
         VKB_LOCK(vkb_memory);
         vkb_exports_give_back(self->exports, self->run);
         VKB_UNLOCK(vkb_memory);
@@ -168,10 +171,11 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
     const char *what;
     unsigned long long address, after;
     Py_ssize_t size;
+    int waits;
     struct vkb_error error = {0};
     bool done;
 
-    if (!PyArg_ParseTuple(arguments, "sKnK:snapshot", &what, &address, &size, &after))
+    if (!PyArg_ParseTuple(arguments, "sKnKp:snapshot", &what, &address, &size, &after, &waits))
         return NULL;
     struct exported_object *self = new_exported(renderer, size);
     if (!self)
@@ -180,8 +184,10 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
     done = vkb_cuda_check(cuda, what, address, &error);
     if (done) {
         Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_copy(cuda, self->run->memory.address, address, (size_t)size,
-                             (void *)(uintptr_t)after, &error);
+        done = vkb_cuda_begin_copy(cuda, &self->run->memory, address, (size_t)size,
+                                   (void *)(uintptr_t)after, &error);
+        self->run->filling = done;
+        done = done && (!waits || vkb_export_filled(self->run, &error));
         Py_END_ALLOW_THREADS
     }
     if (done)

@@ -300,8 +300,8 @@ static PyMethodDef methods[] = {
     {"export", vkb_renderer_export, METH_O,
      "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
     {"snapshot", vkb_renderer_snapshot, METH_VARARGS,
-     "snapshot(what, address, size, stream) -> Exported. A copy of CUDA's memory, after the "
-     "stream's work (0: the copy need not wait)."},
+     "snapshot(what, address, size, stream, waits) -> Exported. A copy of CUDA's memory, after the "
+     "stream's work (0: the copy need not wait). `waits`: until it is complete; else `run` does."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

@@ -95,6 +95,7 @@ struct uuid {
     NAME(cuEventDestroy, "cuEventDestroy_v2", (void *)) \
     NAME(cuEventRecord, "cuEventRecord", (void *, void *)) \
     NAME(cuEventQuery, "cuEventQuery", (void *)) \
+    NAME(cuEventSynchronize, "cuEventSynchronize", (void *)) \
     NAME(cuPointerGetAttribute, "cuPointerGetAttribute", (void *, int, vkb_cuda_address)) \
     NAME(cuImportExternalMemory, "cuImportExternalMemory", \
          (void **, const struct memory_handle *)) \
@@ -370,6 +371,22 @@ bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address 
         && leave(cuda, follow(cuda, after, error)
                            && CU(error, cuda->cuMemcpyDtoDAsync(to, from, size, cuda->stream))
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
+                         size_t size, void *after, struct vkb_error *error)
+{
+    return enter(cuda, error)
+        && leave(cuda,
+                 follow(cuda, after, error)
+                     && CU(error, cuda->cuMemcpyDtoDAsync(to->address, from, size, cuda->stream))
+                     && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
+}
+
+bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
+                       struct vkb_error *error)
+{
+    return enter(cuda, error) && leave(cuda, CU(error, cuda->cuEventSynchronize(to->event)));
 }
 
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,

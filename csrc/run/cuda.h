@@ -16,7 +16,7 @@ struct vkb_cuda;
 struct vkb_cuda_memory {
     void *handle;
     vkb_cuda_address address;
-    void *event;  // recorded by vkb_cuda_mark
+    void *event;  // recorded by vkb_cuda_begin_copy and vkb_cuda_mark
 };
 
 // Opens the context of the GPU with that UUID; `name` is the adapter's. A value error names the
@@ -46,6 +46,11 @@ bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address ad
 // waits. May overlap with other calls.
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    void *after, struct vkb_error *error);
+// The same to imported memory, without the wait, which follows. Both may overlap with other calls.
+bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
+                         size_t size, void *after, struct vkb_error *error);
+bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
+                       struct vkb_error *error);
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
 bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,

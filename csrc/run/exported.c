@@ -118,6 +118,16 @@ static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
                              run->submission->descriptors, &work, error);
 }
 
+// Whether each pixel can be read as words, without gaps.
+static bool is_aligned(const struct vkb_input *input)
+{
+    const ptrdiff_t layer_stride = input->layers ? input->layer_stride : 0;
+
+    return input->channels == 4 && input->channel_stride == (ptrdiff_t)element_size(input->format)
+        && input->offset % 4 == 0 && input->row_stride % 4 == 0 && input->pixel_stride % 4 == 0
+        && layer_stride % 4 == 0;
+}
+
 static bool gather_input(struct vkb_run *run, const struct vkb_staged_input *staged, bool stores,
                          struct vkb_error *error)
 {
@@ -148,6 +158,7 @@ static bool gather_input(struct vkb_run *run, const struct vkb_staged_input *sta
                 .stores = stores,
                 .is_float = is_float(input->format),
                 .layer_stride = (int32_t)input->layer_stride,
+                .aligned = is_aligned(input),
             },
         .from = {input->exported->buffer.handle, span.start, span.end - span.start},
         .to = {stores ? run->submission->readback.scratch.handle : VK_NULL_HANDLE, 0,
@@ -200,6 +211,14 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     copy_to_image(run, input, &staged->image->image, direct);
     if (stores)
         free_scratch(run, VKB_ACCESS_COPY_SOURCE);
+    return true;
+}
+
+bool vkb_exported_filled(const struct vkb_run *run, struct vkb_error *error)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].input && !vkb_export_filled(run->inputs[kind].input->exported, error))
+            return false;
     return true;
 }
 

@@ -22,6 +22,9 @@ bool vkb_exported_dispatches(const struct vkb_device *device, const struct vkb_o
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
+// Waits until CUDA has filled the memory of the inputs, before the device reads it.
+bool vkb_exported_filled(const struct vkb_run *run, struct vkb_error *error);
+
 // Records what follows the copy of an output by its sink: it is handed over to CUDA.
 bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
                                 const struct vkb_output *output, struct vkb_error *error);

@@ -45,6 +45,7 @@ static struct vkb_export *create_export(struct vkb_exports *exports, uint64_t si
     if (!one)
         return NULL;
     one->size = (size + GRANULE - 1) / GRANULE * GRANULE;
+    one->cuda = exports->cuda;
     const struct vkb_messages *before = vkb_messages_begin(&exports->device->messages);
     const bool done =
         vkb_buffer_export(exports->device, one->size, &one->buffer, &descriptor, error);
@@ -110,6 +111,12 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
     }
     push(&exports->taken, one);
     return one;
+}
+
+bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error)
+{
+    one->filling = one->filling && !vkb_cuda_end_copy(one->cuda, &one->memory, error);
+    return !one->filling;
 }
 
 // A closed object is freed with its last memory.

@@ -12,6 +12,8 @@ struct vkb_export {
     struct vkb_buffer buffer;
     struct vkb_cuda_memory memory;
     uint64_t size;
+    struct vkb_cuda *cuda;
+    bool filling;  // CUDA may still copy to it
 };
 
 struct vkb_exports {
@@ -30,8 +32,10 @@ void vkb_exports_close(struct vkb_exports *exports);
 // Takes at least `size` bytes, of undefined content.
 struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error);
-// The device must have finished all work on it. What CUDA's streams have got so far may still use
-// it.
+// Waits for a copy that vkb_cuda_begin_copy has begun. May overlap with calls for other memory.
+bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error);
+// The device must have finished all work on it, and CUDA a copy to it. What CUDA's streams have got
+// so far may still use it.
 void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one);
 
 #endif

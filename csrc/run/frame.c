@@ -94,8 +94,9 @@ static bool reserve_exported(struct vkb_run *run, const struct vkb_request *requ
             }
     if (!readback->counted)
         return true;
-    if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(), scratch,
-                            &readback->scratch, error)
+    // An invocation of gather.glsl writes 16 bytes.
+    if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(),
+                            (scratch + 15) / 16 * 16, &readback->scratch, error)
         || !vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                                counts_size, &readback->counts, error))
         return false;
@@ -309,7 +310,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
                             error))
             return false;
     vkb_barrier_record_host_read(device, commands);
-    return vkb_buffer_flush(device, &submission->uniforms, error)
+    // Not earlier: the host records while CUDA copies the inputs.
+    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_filled(run, error)
         && vkb_submission_submit(device, submission, rendered, error);
 }
 

@@ -4,7 +4,9 @@
 
 enum {
     BINDINGS = 3,
-    GROUP_SIZE = 128,      // of gather.comp
+    GROUP_SIZE = 128,  // of gather.glsl
+    TILE_WIDTH = 16,   // of the pixels of a group, if it writes to an image
+    TILE_HEIGHT = GROUP_SIZE / TILE_WIDTH,
     MOST_GROUPS = 0xffff,  // along x, which every device can do
 };
 
@@ -141,19 +143,29 @@ static void write_set(const struct vkb_device *device, VkDescriptorSet set,
     device->vk.vkUpdateDescriptorSets(device->handle, BINDINGS, writes, 0, NULL);
 }
 
+static VkExtent2D count_groups(const struct vkb_gather_work *work)
+{
+    const struct vkb_gather_layout *layout = &work->layout;
+
+    if (work->kind == VKB_GATHER_TO_IMAGE || work->kind == VKB_GATHER_TO_LAYERS)
+        return (VkExtent2D){
+            (layout->width + TILE_WIDTH - 1) / TILE_WIDTH,
+            (layout->height + TILE_HEIGHT - 1) / TILE_HEIGHT,
+        };
+    const uint64_t count = (uint64_t)layout->width * layout->height * layout->channels;
+    const uint32_t per_group = GROUP_SIZE * (16 / layout->size);
+    const uint32_t groups = (uint32_t)((count + per_group - 1) / per_group);
+    const uint32_t rows = (groups + MOST_GROUPS - 1) / MOST_GROUPS;
+    return (VkExtent2D){(groups + rows - 1) / rows, rows};
+}
+
 bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather *gather,
                        VkCommandBuffer commands, VkDescriptorPool pool,
                        const struct vkb_gather_work *work, struct vkb_error *error)
 {
-    const struct vkb_gather_layout *layout = &work->layout;
     const struct VolkDeviceTable *vk = &device->vk;
     const struct vkb_gather_pipeline *pipeline = &gather->pipelines[work->kind];
-    const bool by_pixel = work->kind == VKB_GATHER_TO_IMAGE || work->kind == VKB_GATHER_TO_LAYERS;
-    const uint32_t per_group = GROUP_SIZE * (by_pixel ? 1 : 4 / layout->size);
-    const uint64_t count =
-        (uint64_t)layout->width * layout->height * (by_pixel ? 1 : layout->channels);
-    const uint32_t groups = (uint32_t)((count + per_group - 1) / per_group);
-    const uint32_t rows = (groups + MOST_GROUPS - 1) / MOST_GROUPS;
+    const VkExtent2D groups = count_groups(work);
     VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -171,7 +183,7 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
     vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->layout, 0, 1,
                                 &set, 0, NULL);
     vk->vkCmdPushConstants(commands, pipeline->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                           sizeof *layout, layout);
-    vk->vkCmdDispatch(commands, (groups + rows - 1) / rows, rows, work->layers ? work->layers : 1);
+                           sizeof work->layout, &work->layout);
+    vk->vkCmdDispatch(commands, groups.width, groups.height, work->layers ? work->layers : 1);
     return true;
 }

@@ -33,7 +33,8 @@ struct vkb_gather_layout {
     int32_t offset, row_stride, pixel_stride, channel_stride;
     uint32_t width, height, channels, from_channels;
     uint32_t size, one, stores, is_float;
-    int32_t layer_stride;  // in the buffer
+    int32_t layer_stride;  // in the buffer; there, a multiple of 16
+    uint32_t aligned;      // pixels of four channels that begin with words, without gaps
 };
 
 // By its kind, `image` stands in place of `from` or `to`.

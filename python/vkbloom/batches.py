@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vkbloom import _core
 from vkbloom.device_arrays import DeviceArray
-from vkbloom.requests import Result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
     from vkbloom.device_arrays import Taken
+    from vkbloom.frames import Frames
     from vkbloom.settings import Settings
 
 __all__ = ["Batches"]
@@ -35,13 +33,22 @@ ALIGNMENT = 256
 
 
 class _Part(NamedTuple):
-    """Images from `first` on that were submitted together; those before `fresh` were yielded."""
+    """Images from `first` on that were submitted together.
+
+    `frames`: Of those that are not yielded yet, in reverse; complete after the submission.
+    """
 
     submission: _core.Submission
-    plan: _core.Plan
-    arrays: tuple[_core.Exported, ...]
     first: int
-    fresh: int
+    outputs: tuple[tuple[str, tuple[int, ...], str, int, _core.Exported], ...]
+    frames: list[Frames]
+
+    def arrays(self, layer: int) -> dict[str, Any]:
+        """Return the framebuffers of one image."""
+        return {
+            name: DeviceArray(memory, shape, dtype, layer * stride)
+            for name, shape, dtype, stride, memory in self.outputs
+        }
 
 
 class Batches:
@@ -61,10 +68,12 @@ class Batches:
         batch: Taken,
         settings: Settings,
         names: tuple[str, ...] | None,
-        rest: Callable[[int], Iterator[tuple[Settings, Result]]],
-    ) -> Iterator[tuple[Settings, Result]]:
-        """Yield the result of each image.
+        frames: Callable[[Settings, dict[str, Any]], Frames],
+        rest: Callable[[int], Iterator[Frames]],
+    ) -> Iterator[Frames]:
+        """Yield the Frames of each image.
 
+        `frames`: Makes them of their arrays.
         `rest`: Yields them one by one from an image on. It is called where images have no layers,
         or where the device has too little memory for many of them.
         """
@@ -78,12 +87,15 @@ class Batches:
                     # All parts have the same number of images, so that they use the same memory.
                     first = min(submitted, count - layers)
                     try:
-                        part = self._submit(batch, first, layers, submitted, settings, names)
+                        part = self._submit(batch, first, layers, settings, names)
                     except _core.ValidationError:
                         raise
                     except (_core.Error, ValueError):
                         layers = 0
                         break
+                    for layer in reversed(range(submitted - first, layers)):
+                        # While the device works.
+                        part.frames.append(frames(settings, part.arrays(layer)))
                     pending.append(part)
                     submitted = first + layers
                     del part
@@ -93,7 +105,13 @@ class Batches:
                 part = pending.popleft()
                 timings, counts = part.submission.wait()
                 done = part.first + len(counts) // 2
-                yield from _results(part, settings, timings[0], counts)
+                share = {name: 2 * took / len(counts) for name, took in timings[0].items()}
+                index = len(counts) - 2 * len(part.frames)
+                while part.frames:
+                    # Yielded frames are not kept, so that the caller is their only owner.
+                    part.frames[-1]._finish(share, counts[index], counts[index + 1])
+                    yield part.frames.pop()
+                    index += 2
                 del part
         finally:
             pending.clear()
@@ -110,12 +128,11 @@ class Batches:
         layers = math.ceil(count / parts)
         return layers if layers >= LEAST else 0
 
-    def _submit(  # noqa: PLR0917
+    def _submit(
         self,
         batch: Taken,
         first: int,
         layers: int,
-        fresh: int,
         settings: Settings,
         names: tuple[str, ...] | None,
     ) -> _Part:
@@ -127,36 +144,22 @@ class Batches:
         ):
             self._last = settings, names, self._core.plan(source, settings, names)
         plan = self._last[2]
-        arrays = tuple(
-            [self._core.export(layers * _stride(shape, dtype)) for _, shape, dtype in plan.outputs]
+        outputs = tuple(
+            [
+                (
+                    name,
+                    shape,
+                    dtype,
+                    _stride(shape, dtype),
+                    self._core.export(layers * _stride(shape, dtype)),
+                )
+                for name, shape, dtype in plan.outputs
+            ]
         )
-        return _Part(self._core.run(source, (plan,), (arrays,)), plan, arrays, first, fresh)
+        arrays = tuple([memory for *_, memory in outputs])
+        return _Part(self._core.run(source, (plan,), (arrays,)), first, outputs, [])
 
 
 def _stride(shape: tuple[int, ...], dtype: str) -> int:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     return -(-size // ALIGNMENT) * ALIGNMENT
-
-
-def _results(
-    part: _Part, settings: Settings, timings: dict[str, float], counts: tuple[int, ...]
-) -> Iterator[tuple[Settings, Result]]:
-    layers = len(counts) // 2
-    share = {name: seconds / layers for name, seconds in timings.items()}
-    outputs = [
-        (name, shape, dtype, _stride(shape, dtype), memory)
-        for (name, shape, dtype), memory in zip(part.plan.outputs, part.arrays, strict=True)
-    ]
-    for layer in range(part.fresh - part.first, layers):
-        arrays = {
-            name: DeviceArray(memory, shape, dtype, layer * stride)
-            for name, shape, dtype, stride, memory in outputs
-        }
-        yield (
-            settings,
-            Result(
-                cast("dict[str, NDArray[Any]]", arrays),
-                dict(share),
-                (counts[2 * layer], counts[2 * layer + 1]),
-            ),
-        )

@@ -39,7 +39,7 @@ Place = Literal["host", "viewed", "cuda"]
 _CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
 _UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
 _DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
-_CODES = {"uint8": _UINT, "float16": _FLOAT, "float32": _FLOAT}
+_CODES = {"u": _UINT, "f": _FLOAT}
 _FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
 # CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
 _LEGACY = 1
@@ -196,7 +196,7 @@ class DeviceArray:
         versioned_capsule = max_version is not None and max_version[0] >= 1
         return memory.capsule(
             self.shape,
-            _CODES[self.dtype.name],
+            _CODES[self.dtype.kind],
             8 * self.dtype.itemsize,
             versioned_capsule,
             offset,
@@ -426,10 +426,19 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
     made._memory.copy_to(array.address, made.nbytes, array.stream, made._offset)
 
 
-def take(image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (3,)) -> Taken:
+def take(
+    image: Any,
+    name: str,
+    core: _core.Renderer,
+    sides: tuple[int, ...] = (3,),
+    *,
+    waits: bool = True,
+) -> Taken:
     """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
 
     `sides`: The numbers of dimensions that it may have.
+    `waits`: Until the copy is complete. Otherwise the core's `run` does that, and the array must
+    not change before.
     """
     try:
         core.cuda()
@@ -453,5 +462,5 @@ def take(image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (
             )
         )
     low, high = _span(shape, array.strides, array.dtype)
-    memory = core.snapshot(name, array.address + low, high - low, array.stream)
+    memory = core.snapshot(name, array.address + low, high - low, array.stream, waits)
     return Taken(memory, -low, shape, array.strides, array.dtype)

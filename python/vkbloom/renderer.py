@@ -259,6 +259,8 @@ class Renderer:
         self._saved_pipelines = 0
         self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
         self._batches = Batches(self._core)
+        # What apply_each has checked last.
+        self._named: tuple[object, tuple[str, ...]] = None, ()
         self._kept: KeptArrays | None = shared()
 
     @property
@@ -533,7 +535,7 @@ class Renderer:
         (10.0, 0.0)
         """
         settings = check_settings(settings, of_image=True)
-        source = image_source(image, mask, emission, self._core)
+        source = image_source(image, mask, emission, self._core, waits=False)
         return self._run_one(source, settings, check_attachments(attachments), out, device)
 
     def vjp(
@@ -727,14 +729,14 @@ class Renderer:
         if self.closed:
             raise ValueError("the renderer is closed")
         chosen = settings or check_settings(None, of_image=True)
-        self._check_names(image_source(_ANY_IMAGE), chosen, names)
+        if names and not (self._named[0] is chosen and self._named[1] == names):
+            self._check_names(image_source(_ANY_IMAGE), chosen, names)
+            self._named = chosen, names
         place = self._placed(device)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
-            results = self._run_batch(images, chosen, names, place)
-        else:
-            work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-            results = requests.run(work, self._core, names, alone=True, place=place)
-        return (self._frames_of(one, result) for one, result in results)
+            return self._run_batch(images, chosen, names, place)
+        work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        return self._run_work(work, names, place, alone=True)
 
     @checked
     def upload(
@@ -1088,14 +1090,16 @@ class Renderer:
         settings: Settings,
         names: tuple[str, ...] | None,
         place: Callable[[_core.Source], requests.Place],
-    ) -> Iterator[tuple[Settings, requests.Result]]:
+    ) -> Iterator[Frames]:
         batch = take_batch(images, self._core)
 
-        def rest(first: int) -> Iterator[tuple[Settings, requests.Result]]:
+        def rest(first: int) -> Iterator[Frames]:
             work = _paired(batch_sources(batch, first), settings)
-            return requests.run(work, self._core, names, alone=True, place=place)
+            return self._run_work(work, names, place, alone=True)
 
-        yield from self._batches.run(batch, settings, names, rest)
+        for frames in self._batches.run(batch, settings, names, self._frames, rest):
+            self._save_pipelines()
+            yield frames
 
     def _placed(self, device: Device | None) -> Callable[[_core.Source], requests.Place]:
         """Return where the framebuffers of a source go."""
@@ -1174,8 +1178,10 @@ class Renderer:
         sequence: Iterable[requests.Work],
         names: tuple[str, ...] | None,
         place: Callable[[_core.Source], requests.Place] = lambda _: "host",
+        *,
+        alone: bool = False,
     ) -> Iterator[Frames]:
-        results = requests.run(sequence, self._core, names, place=place)
+        results = requests.run(sequence, self._core, names, alone=alone, place=place)
         return (self._frames_of(settings, result) for settings, result in results)
 
     def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:

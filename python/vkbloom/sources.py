@@ -76,14 +76,23 @@ def checked_inputs(
     emission: object | None = None,
     core: _core.Renderer | None = None,
     name: str = "image",
+    *,
+    waits: bool = True,
 ) -> Inputs:
-    """Check the arrays of an image, and copy those that are on the renderer's device."""
+    """Check the arrays of an image, and copy those that are on the renderer's device.
+
+    `waits`: As for `device_arrays.take`.
+    """
     if core is None or not any(map(on_cuda, (image, mask, emission))):
         core = None
-    pixels: Any = take(image, name, core) if core and on_cuda(image) else check_image(image, name)
+    pixels: Any
+    if core and on_cuda(image):
+        pixels = take(image, name, core, waits=waits)
+    else:
+        pixels = check_image(image, name)
     glowing: Any = emission
     if core and on_cuda(emission):
-        glowing = take(emission, "emission", core)
+        glowing = take(emission, "emission", core, waits=waits)
     elif emission is not None:
         glowing = check_emission(emission, pixels)
     if core and on_cuda(mask):
@@ -99,11 +108,13 @@ def image_source(
     emission: object | None = None,
     core: _core.Renderer | None = None,
     name: str = "image",
+    *,
+    waits: bool = True,
 ) -> _core.Source:
     """Return the core's Source of an image. Its arrays must not change while it is used.
 
     With a renderer, arrays may be on its device; these are copied. Errors of the image start with
-    `name`.
+    `name`. `waits`: As for `device_arrays.take`.
     """
     if isinstance(image, Image):
         for what, given in (("mask", mask), ("emission", emission)):
@@ -112,12 +123,12 @@ def image_source(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
         return image._source
-    return checked_inputs(image, mask, emission, core, name).source()
+    return checked_inputs(image, mask, emission, core, name, waits=waits).source()
 
 
 def take_batch(images: Any, core: _core.Renderer) -> Taken:
-    """Copy a batch on the device at once."""
-    return take(images, "images", core, (4,))
+    """Copy a batch on the device at once; `run` waits for the copy."""
+    return take(images, "images", core, (4,), waits=False)
 
 
 def batch_sources(batch: Taken, first: int = 0) -> Iterator[_core.Source]:

@@ -1,6 +1,8 @@
 // Elements from one layout to another, and how many of them are NaN or infinite. By default from a
-// buffer with any strides to a dense buffer; with TO_IMAGE to an image, with FROM_IMAGE from one. With
-// LAYERS for each image of a batch, whose number is that of the workgroup along z.
+// buffer with any strides to a dense buffer; with TO_IMAGE to an image, with FROM_IMAGE from one.
+// With LAYERS for each image of a batch, whose number is that of the group along z. An invocation
+// moves 16 bytes to a buffer, or a pixel to an image: those of a group are a tile, since drivers
+// keep the pixels of a tile together.
 
 layout(local_size_x = 128) in;
 
@@ -28,7 +30,7 @@ layout(binding = 1) uniform writeonly STORED to_image;
 #else
 layout(std430, binding = 1) writeonly buffer To
 {
-    uint to_words[];
+    uvec4 to_words[];
 };
 #endif
 
@@ -48,43 +50,19 @@ layout(push_constant) uniform Layout
     uint stores;    // 0: elements are only counted
     uint is_float;
     int layer_stride;
+    uint aligned;  // pixels of four channels that begin with words, and whose elements are adjacent
 } layout_;
 
 shared uint sums[2];
 
-#ifdef FROM_IMAGE
-uint element(uint pixel, uint channel)
-{
-    ivec2 place = ivec2(pixel % layout_.width, pixel / layout_.width);
-    float value = texelFetch(from_image, AT(place), 0)[channel];
-    return layout_.size == 4 ? floatBitsToUint(value)
-         : layout_.size == 2 ? packHalf2x16(vec2(value, 0))
-                             : uint(value * 255.0 + 0.5);
-}
-#else
-uint element(uint pixel, uint channel)
-{
-    if (channel >= layout_.from_channels)
-        return layout_.one;
-    int y = int(pixel / layout_.width), x = int(pixel % layout_.width);
-    uint place = uint(layout_.offset + int(gl_WorkGroupID.z) * layout_.layer_stride
-                      + y * layout_.row_stride + x * layout_.pixel_stride
-                      + int(channel) * layout_.channel_stride);
-    uint word = from_words[place >> 2];
-    return layout_.size == 4 ? word
-         : (word >> (8 * (place & 3))) & (layout_.size == 2 ? 0xffffu : 0xffu);
-}
-#endif
-
 const uint COUNTS_WORDS = 64;  // VKB_COUNTS_SIZE
 
-// What one invocation moves, and its number.
-uint invocation = gl_GlobalInvocationID.x
-                + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x;
 uint nan = 0, infinite = 0;
 
 void count(uint value)
 {
+    if (layout_.is_float == 0)
+        return;
     uint exponent = layout_.size == 4 ? 0x7f800000u : 0x7c00u;
     uint magnitude = value & (layout_.size == 4 ? 0x7fffffffu : 0x7fffu);
 
@@ -92,7 +70,40 @@ void count(uint value)
     infinite += uint(magnitude == exponent);
 }
 
+#ifndef FROM_IMAGE
+uint place_of(ivec2 at)
+{
+    return uint(layout_.offset + int(gl_WorkGroupID.z) * layout_.layer_stride
+                + at.y * layout_.row_stride + at.x * layout_.pixel_stride);
+}
+
+uint element(uint pixel_place, uint channel)
+{
+    if (channel >= layout_.from_channels)
+        return layout_.one;
+    uint place = pixel_place + channel * uint(layout_.channel_stride);
+    uint word = from_words[place >> 2];
+    return layout_.size == 4 ? word
+         : (word >> (8 * (place & 3))) & (layout_.size == 2 ? 0xffffu : 0xffu);
+}
+#endif
+
 #ifdef TO_IMAGE
+uvec4 elements(uint place)
+{
+    uint word = place >> 2;
+
+    if (layout_.aligned == 0)
+        return uvec4(element(place, 0), element(place, 1), element(place, 2), element(place, 3));
+    uint first = from_words[word];
+    if (layout_.size == 1)
+        return (uvec4(first) >> uvec4(0, 8, 16, 24)) & 0xffu;
+    uint second = from_words[word + 1];
+    if (layout_.size == 2)
+        return uvec4(first & 0xffffu, first >> 16, second & 0xffffu, second >> 16);
+    return uvec4(first, second, from_words[word + 2], from_words[word + 3]);
+}
+
 float number(uint value)
 {
     return layout_.size == 4 ? uintBitsToFloat(value)
@@ -100,37 +111,143 @@ float number(uint value)
                              : float(value) / 255.0;
 }
 
+const ivec2 TILE = ivec2(16, 8);  // as in gather.c
+
 void move()
 {
-    vec4 colour;
-
-    if (invocation >= layout_.width * layout_.height)
+    int index = int(gl_LocalInvocationIndex);
+    ivec2 at = TILE * ivec2(gl_WorkGroupID.xy) + ivec2(index % TILE.x, index / TILE.x);
+    if (at.x >= int(layout_.width) || at.y >= int(layout_.height))
         return;
-    for (uint channel = 0; channel < 4; ++channel) {
-        uint value = element(invocation, channel);
-        count(value);
-        colour[channel] = number(value);
-    }
+    uvec4 raw = elements(place_of(at));
+    for (int channel = 0; channel < 4; ++channel)
+        count(raw[channel]);
     if (layout_.stores != 0)
-        imageStore(to_image, AT(ivec2(invocation % layout_.width, invocation / layout_.width)),
-                   colour);
+        imageStore(to_image, AT(at),
+                   vec4(number(raw.x), number(raw.y), number(raw.z), number(raw.w)));
 }
 #else
+// The pixel and the channel of the next element.
+ivec2 at;
+uint channel;
+#ifdef FROM_IMAGE
+vec4 texel;
+#else
+uint pixel_place;
+#endif
+
+void enter_pixel()
+{
+#ifdef FROM_IMAGE
+    texel = texelFetch(from_image, AT(at), 0);
+#else
+    pixel_place = place_of(at);
+#endif
+}
+
+uint own_element()
+{
+#ifdef FROM_IMAGE
+    float value = channel == 0 ? texel.r
+                : channel == 1 ? texel.g
+                : channel == 2 ? texel.b
+                               : texel.a;
+    return layout_.size == 4 ? floatBitsToUint(value)
+         : layout_.size == 2 ? packHalf2x16(vec2(value, 0))
+                             : uint(value * 255.0 + 0.5);
+#else
+    return element(pixel_place, channel);
+#endif
+}
+
+void leave_pixel()
+{
+    channel = 0;
+    at = at.x + 1 < int(layout_.width) ? at + ivec2(1, 0) : ivec2(0, at.y + 1);
+    if (at.y < int(layout_.height))
+        enter_pixel();
+}
+
+// The next element; behind the last one, 0.
+uint next_element()
+{
+    if (channel == layout_.channels)
+        leave_pixel();
+    if (at.y >= int(layout_.height))
+        return 0;
+    uint value = own_element();
+    count(value);
+    ++channel;
+    return value;
+}
+
+uint next_word()
+{
+    uint word = next_element();
+
+    if (layout_.size == 4)
+        return word;
+    if (layout_.size == 2)
+        return word | next_element() << 16;
+    word |= next_element() << 8;
+    word |= next_element() << 16;
+    return word | next_element() << 24;
+}
+
+#ifdef FROM_IMAGE
+// Of pixels of four channels; their content behind the last one is of no account.
+uvec4 complete_pixels()
+{
+    uvec4 words;
+
+    if (layout_.size == 4)
+        return floatBitsToUint(texel);
+    if (layout_.size == 2) {
+        words.xy = uvec2(packHalf2x16(texel.xy), packHalf2x16(texel.zw));
+        leave_pixel();
+        words.zw = uvec2(packHalf2x16(texel.xy), packHalf2x16(texel.zw));
+        return words;
+    }
+    words.x = packUnorm4x8(texel);
+    leave_pixel();
+    words.y = packUnorm4x8(texel);
+    leave_pixel();
+    words.z = packUnorm4x8(texel);
+    leave_pixel();
+    words.w = packUnorm4x8(texel);
+    return words;
+}
+#endif
+
+uvec4 next_words()
+{
+    uvec4 words;
+
+    words.x = next_word();
+    words.y = next_word();
+    words.z = next_word();
+    words.w = next_word();
+    return words;
+}
+
 void move()
 {
-    uint per_word = 4 / layout_.size, packed = 0;
-    uint total = layout_.width * layout_.height * layout_.channels;
+    uint invocation = gl_GlobalInvocationID.x
+                    + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x;
+    uint index = invocation * (16 / layout_.size), pixel = index / layout_.channels;
 
-    for (uint i = 0; i < per_word; ++i) {
-        uint index = invocation * per_word + i;
-        if (index < total) {
-            uint value = element(index / layout_.channels, index % layout_.channels);
-            count(value);
-            packed |= value << (8 * layout_.size * i);
-        }
-    }
-    if (layout_.stores != 0 && invocation * per_word < total)
-        to_words[invocation + gl_WorkGroupID.z * (uint(layout_.layer_stride) >> 2)] = packed;
+    if (pixel >= layout_.width * layout_.height)
+        return;
+    at = ivec2(pixel % layout_.width, pixel / layout_.width);
+    channel = index % layout_.channels;
+    enter_pixel();
+#ifdef FROM_IMAGE
+    uvec4 words = layout_.channels == 4 ? complete_pixels() : next_words();
+#else
+    uvec4 words = next_words();
+#endif
+    if (layout_.stores != 0)
+        to_words[invocation + gl_WorkGroupID.z * (uint(layout_.layer_stride) >> 4)] = words;
 }
 #endif
 
@@ -142,7 +259,7 @@ void main()
     }
     barrier();
     move();
-    if (layout_.is_float != 0 && nan + infinite > 0) {
+    if (nan + infinite > 0) {
         atomicAdd(sums[0], nan);
         atomicAdd(sums[1], infinite);
     }

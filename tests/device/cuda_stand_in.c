@@ -1,6 +1,8 @@
 // A stand-in for libcuda.so.1: one GPU, whose UUID is STAND_IN_UUID and whose memory is the host's.
 // It imports the memory that lavapipe exports by mapping its descriptor. With STAND_IN_LOG, it
-// writes what is left at the end to that file. The work of a stream is done at once.
+// writes what is left at the end to that file. A copy within the device is done when something
+// waits for its stream, all other work at once.
+#include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,6 +34,30 @@ struct memory {
     size_t size;
     int descriptor;
 };
+
+// The copy that the stream has not done yet.
+static struct {
+    pthread_mutex_t mutex;
+    void *to;
+    const void *from;
+    size_t size;
+} last = {.mutex = PTHREAD_MUTEX_INITIALIZER};
+
+static void replace_copy(void *to, const void *from, size_t size)
+{
+    pthread_mutex_lock(&last.mutex);
+    if (last.size)
+        memcpy(last.to, last.from, last.size);
+    last.to = to;
+    last.from = from;
+    last.size = size;
+    pthread_mutex_unlock(&last.mutex);
+}
+
+static void do_copy(void)
+{
+    replace_copy(NULL, NULL, 0);
+}
 
 static void report(void)
 {
@@ -140,6 +166,7 @@ EXPORT int cuStreamDestroy_v2(void *stream)
 
 EXPORT int cuStreamSynchronize(void *stream)
 {
+    do_copy();
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
@@ -170,6 +197,12 @@ EXPORT int cuEventRecord(void *event, void *stream)
 
 EXPORT int cuEventQuery(void *event)
 {
+    return event ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuEventSynchronize(void *event)
+{
+    do_copy();
     return event ? SUCCESS : INVALID_VALUE;
 }
 
@@ -247,12 +280,13 @@ EXPORT int cuDestroyExternalMemory(void *handle)
 EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, size_t size,
                                 void *stream)
 {
-    memcpy((void *)(uintptr_t)to, (const void *)(uintptr_t)from, size);
+    replace_copy((void *)(uintptr_t)to, (const void *)(uintptr_t)from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
 {
+    do_copy();
     __atomic_add_fetch(&host_bytes, (long)size, __ATOMIC_SEQ_CST);
     memcpy(to, (const void *)(uintptr_t)from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
