@@ -17,7 +17,6 @@ const int KEPT = 5;
 #define LOAD load_smaller
 #define LOAD_IMAGE smaller
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
 #define LOAD_FROM -2
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"

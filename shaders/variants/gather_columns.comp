@@ -12,7 +12,7 @@ UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES);
+const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = FILTER_ROWS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, level_0);
@@ -27,9 +27,6 @@ WRITE_IMAGE(8);
 #define LOAD load_own
 #define LOAD_IMAGE level_0
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS
@@ -64,31 +61,25 @@ void add(usamplerBuffer image, int level, int first, int y)
         sums[i] += weight * filter_column(image, shape, axis, first + i);
 }
 
-void main()
+void write_row(int x, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, FILTER_ROWS));
-    int end = min(first.y + FILTER_ROWS, size.y);
     uvec4 raw[COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    for (int y = first.y; y < end; ++y) {
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            sums[i] = vec4(0.0);
-        if (ADD_OWN != 0)
-            add_own(first.x, y);
-        else
-            add(level_0, 0, first.x, y);
-        add(level_1, 1, first.x, y);
-        add(level_2, 2, first.x, y);
-        add(level_3, 3, first.x, y);
-        add(level_4, 4, first.x, y);
-        add(level_5, 5, first.x, y);
-        add(level_6, 6, first.x, y);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            raw[i] = buffer_of(sums[i]);
-        store(first.x, y, raw);
-    }
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        sums[i] = vec4(0.0);
+    if (ADD_OWN != 0)
+        add_own(x, y);
+    else
+        add(level_0, 0, x, y);
+    add(level_1, 1, x, y);
+    add(level_2, 2, x, y);
+    add(level_3, 3, x, y);
+    add(level_4, 4, x, y);
+    add(level_5, 5, x, y);
+    add(level_6, 6, x, y);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        raw[i] = buffer_of(sums[i]);
+    store(x, y, raw);
 }
+
+#include "variants/rows.glsl"

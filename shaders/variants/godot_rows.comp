@@ -10,8 +10,8 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/godot.glsl"
 #include "variants/pixels.glsl"
 
-const int RADIUS_OF_BLUR = 4;
-const int SAMPLES = GODOT_COLUMNS + 2 * RADIUS_OF_BLUR;
+const int COLUMNS = GODOT_COLUMNS, ROWS = FILTER_ROWS, RADIUS_OF_BLUR = 4;
+const int SAMPLES = COLUMNS + 2 * RADIUS_OF_BLUR;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
@@ -20,7 +20,6 @@ WRITE_IMAGE(2);
 #define LOAD load_run
 #define LOAD_IMAGE source
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
 #define LOAD_FROM (-2 * RADIUS_OF_BLUR)
 #define LOAD_COUNT (2 * SAMPLES)
 #include "variants/load.glsl"
@@ -49,23 +48,17 @@ void take_samples(int first, int y, out vec4 samples[SAMPLES])
         samples[i] = first - RADIUS_OF_BLUR + i >= target_shape.x ? samples[i - 2] : samples[i];
 }
 
-void main()
+void write_row(int x, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(GODOT_COLUMNS, FILTER_ROWS));
-    int end = min(first.y + FILTER_ROWS, size.y);
     vec4 samples[SAMPLES];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    for (int y = first.y; y < end; ++y) {
-        take_samples(first.x, y, samples);
-        [[unroll]] for (int i = 0; i < GODOT_COLUMNS; ++i) {
-            vec4 sum = vec4(0.0);
-            [[unroll]] for (int tap = -RADIUS_OF_BLUR; tap <= RADIUS_OF_BLUR; ++tap)
-                sum += GODOT_WEIGHTS[abs(tap)] * samples[i + RADIUS_OF_BLUR + tap];
-            store_float(first.x + i, y, stored(sum));
-        }
+    take_samples(x, y, samples);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 sum = vec4(0.0);
+        [[unroll]] for (int tap = -RADIUS_OF_BLUR; tap <= RADIUS_OF_BLUR; ++tap)
+            sum += GODOT_WEIGHTS[abs(tap)] * samples[i + RADIUS_OF_BLUR + tap];
+        store_float(x + i, y, stored(sum));
     }
 }
+
+#include "variants/rows.glsl"

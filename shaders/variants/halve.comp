@@ -19,7 +19,7 @@ const int COLUMNS = HALVE_COLUMNS, ROWS = HALVE_ROWS;
 #endif
 const int LOADED = 2 * COLUMNS + 4;
 
-#define LOADED_FROM -2
+#define LOAD_FROM -2
 #include "variants/runs.glsl"
 
 #include "variants/thresholded.glsl"

@@ -17,7 +17,7 @@ UNIFORM_BLOCK(KAWASE_BLOCK);
 
 const int COLUMNS = GRID_COLUMNS, LOADED = 2 * COLUMNS + 4, AXIS = 3;
 
-#define LOADED_FROM -2
+#define LOAD_FROM -2
 #include "variants/runs.glsl"
 
 #include "variants/thresholded.glsl"

@@ -16,7 +16,7 @@ const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
 const int LOADED = 2 * COLUMNS + 4;
 const int OUTER = COLUMNS + 2, INNER = COLUMNS + 1;
 
-#define LOADED_FROM -2
+#define LOAD_FROM -2
 #include "variants/runs.glsl"
 
 vec4 middle(vec4 a, vec4 b)

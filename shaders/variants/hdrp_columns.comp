@@ -14,7 +14,6 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = HDRP_OUTPUTS;  // COLUMNS: of a word
 const int LOADED = COLUMNS;
 
-#define LOADED_FROM 0
 #include "variants/runs.glsl"
 
 void take_sample(int x, int y, out vec4 taken[COLUMNS])

@@ -10,7 +10,7 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = HDRP_OUTPUTS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
+const int COLUMNS = HDRP_OUTPUTS, ROWS = FILTER_ROWS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
@@ -19,7 +19,6 @@ WRITE_IMAGE(2);
 #define LOAD load_same
 #define LOAD_IMAGE source
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
 #define LOAD_FROM (-HDRP_RADIUS)
 #define LOAD_COUNT SAMPLES
 #include "variants/load.glsl"
@@ -27,7 +26,6 @@ WRITE_IMAGE(2);
 #define LOAD load_double
 #define LOAD_IMAGE source
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
 #define LOAD_FROM (-2 * HDRP_RADIUS)
 #define LOAD_COUNT (2 * SAMPLES)
 #include "variants/load.glsl"
@@ -60,27 +58,21 @@ void take_means(int first, int y)
         samples[i] = first - HDRP_RADIUS + i >= target_shape.x ? samples[i - 1] : samples[i];
 }
 
-void main()
+void write_row(int x, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, FILTER_ROWS));
-    int end = min(first.y + FILTER_ROWS, size.y);
     uvec4 pixels[COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    for (int y = first.y; y < end; ++y) {
-        if (FIRST != 0)
-            take_first(first.x, y);
-        else
-            take_means(first.x, y);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            vec4 sum = vec4(0.0);
-            [[unroll]] for (int tap = 0; tap <= 2 * HDRP_RADIUS; ++tap)
-                sum += HDRP_WEIGHTS[tap] * samples[i + tap];
-            pixels[i] = buffer_of(sum);
-        }
-        store(first.x, y, pixels);
+    if (FIRST != 0)
+        take_first(x, y);
+    else
+        take_means(x, y);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 sum = vec4(0.0);
+        [[unroll]] for (int tap = 0; tap <= 2 * HDRP_RADIUS; ++tap)
+            sum += HDRP_WEIGHTS[tap] * samples[i + tap];
+        pixels[i] = buffer_of(sum);
     }
+    store(x, y, pixels);
 }
+
+#include "variants/rows.glsl"

@@ -2,11 +2,20 @@
 //
 //   LOAD           its name
 //   LOAD_IMAGE     the image, and LOAD_NUMBER its binding
-//   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4; storage images have 4
-//   LOAD_FROM      the offset of the run from `first` in pixels, 0 or less
-//   LOAD_COUNT     the number of pixels in the run
+//   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4 (default); storage images have 4
+//   LOAD_FROM      the offset of the run from `first` in pixels, 0 (default) or less
+//   LOAD_COUNT     the number of pixels in the run; default: COLUMNS
 //
 // `first` is at a multiple of 16 bytes. Outside of the image, the outermost pixels are repeated.
+#ifndef LOAD_CHANNELS
+#define LOAD_CHANNELS 4
+#endif
+#ifndef LOAD_FROM
+#define LOAD_FROM 0
+#endif
+#ifndef LOAD_COUNT
+#define LOAD_COUNT COLUMNS
+#endif
 
 void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
 {

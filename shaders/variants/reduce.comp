@@ -18,7 +18,7 @@ const int LOADED = 2 * COLUMNS + 2;
 // A pixel of the target has the texels BEFORE before twice its own position to 2 after it.
 const int BEFORE = 1, SIDE = 4;
 
-#define LOADED_FROM (-BEFORE)
+#define LOAD_FROM (-BEFORE)
 #include "variants/runs.glsl"
 
 vec4 texels[SIDE][LOADED];
@@ -58,21 +58,15 @@ vec4 prefiltered(int column)
     return GROUPS == GROUPS_URP ? urp_prefiltered(value) : unreal_prefiltered(value);
 }
 
-void main()
+void write_row(int x, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
-    int end = min(first.y + ROWS, size.y);
     uvec4 pixels[COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    for (int y = first.y; y < end; ++y) {
-        [[unroll]] for (int row = 0; row < SIDE; ++row)
-            load_row(first.x, 2 * y - BEFORE + row, row);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            pixels[i] = buffer_of(prefiltered(i));
-        store(first.x, y, pixels);
-    }
+    [[unroll]] for (int row = 0; row < SIDE; ++row)
+        load_row(x, 2 * y - BEFORE + row, row);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        pixels[i] = buffer_of(prefiltered(i));
+    store(x, y, pixels);
 }
+
+#include "variants/rows.glsl"

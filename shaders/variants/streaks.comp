@@ -24,17 +24,11 @@ WRITE_IMAGE(3);
 #define LOAD load_own
 #define LOAD_IMAGE source
 #define LOAD_NUMBER 1
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
 
 #define LOAD load_before
 #define LOAD_IMAGE before
 #define LOAD_NUMBER 2
-#define LOAD_CHANNELS 4
-#define LOAD_FROM 0
-#define LOAD_COUNT COLUMNS
 #include "variants/load.glsl"
 
 #define STORE_COUNT COLUMNS

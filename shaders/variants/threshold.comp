@@ -15,5 +15,5 @@ vec4 made(vec4 value)
     return apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
 }
 
-#define LOADED_CHANNELS SOURCE_CHANNELS
+#define LOAD_CHANNELS SOURCE_CHANNELS
 #include "variants/same_size.glsl"
