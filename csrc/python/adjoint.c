@@ -2,6 +2,7 @@
 #include "methods/adjoint.h"
 
 #include "python/module.h"
+#include "python/plan.h"
 
 PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
 {

@@ -1,5 +1,6 @@
 // Python's settings as the core's struct. All functions return false with an exception set.
-#include "python/module.h"
+#include "python/arguments.h"
+#include "python/values.h"
 
 #include <float.h>
 #include <math.h>

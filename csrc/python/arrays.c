@@ -2,6 +2,7 @@
 // it. The pages are returned when the last view is gone, which may be long after the renderer is
 // closed.
 #include "python/module.h"
+#include "python/renderer.h"
 
 struct pages_object {
     PyObject_HEAD

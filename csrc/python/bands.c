@@ -1,5 +1,7 @@
 // Plans of parts of a graph, for images that are taken by bands of rows.
 #include "python/module.h"
+#include "python/plan.h"
+#include "python/values.h"
 
 #include <stdio.h>
 

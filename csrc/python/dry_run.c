@@ -2,6 +2,8 @@
 #include "graph/dry_run.h"
 
 #include "python/module.h"
+#include "python/plan.h"
+#include "python/values.h"
 
 // The names that the passes are timed under, without those that come again.
 static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)

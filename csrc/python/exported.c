@@ -1,6 +1,8 @@
 // The Exported type: memory of a renderer's device that CUDA shares, as other libraries take it.
 // DLPack's structs: https://dmlc.github.io/dlpack/latest/c_api.html
+#include "python/arguments.h"
 #include "python/module.h"
+#include "python/renderer.h"
 
 enum { DEVICE_CUDA = 2 };  // kDLCUDA
 

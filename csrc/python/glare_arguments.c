@@ -1,5 +1,6 @@
 // The stages of glare of a settings object.
-#include "python/module.h"
+#include "python/arguments.h"
+#include "python/values.h"
 
 // A missing number has its default.
 static bool read_number(PyObject *object, const struct vkb_value_row *row,

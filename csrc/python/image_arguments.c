@@ -1,6 +1,8 @@
 // Python's images and masks as the core's structs. All functions return false with an exception
 // set.
-#include "python/module.h"
+#include "python/arguments.h"
+#include "python/guard.h"
+#include "python/values.h"
 
 #include <string.h>
 

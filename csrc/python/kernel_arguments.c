@@ -1,5 +1,6 @@
 // The kernels of convolutions, which are Python's arrays.
-#include "python/module.h"
+#include "python/arguments.h"
+#include "python/values.h"
 
 // (pixels, serial, whether it is grey, (min, max, factor))
 static bool read_kernel_tuple(PyObject *tuple, struct vkb_held_kernel *held,

@@ -1,5 +1,5 @@
 // The lock of a renderer, and the submissions that nobody waits for any more.
-#include "python/module.h"
+#include "python/plan.h"
 
 VKB_GUARD(vkb_memory)
 

@@ -1,5 +1,6 @@
 // The extension module: its state, its exceptions, the tables of the settings.
 #include "python/module.h"
+#include "python/arguments.h"
 
 #include "graph/params.h"
 

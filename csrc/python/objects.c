@@ -1,5 +1,5 @@
 // What all types share: objects, the state of the module, the exceptions of errors.
-#include "python/module.h"
+#include "python/objects.h"
 
 #include <string.h>
 

@@ -1,5 +1,7 @@
 // Shaders that are made at run time, and the passes of a settings object that run them.
+#include "python/arguments.h"
 #include "python/module.h"
+#include "python/values.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -97,14 +99,10 @@ static PyObject *get_name(PyObject *object, void *unused)
 
 static PyObject *get_hash(PyObject *object, void *unused)
 {
-    (void)unused;
-    return vkb_hash_text(&((struct shader_object *)object)->shader.hash);
-}
-
-PyObject *vkb_hash_text(const struct vkb_hash *hash)
-{
+    const struct vkb_hash *hash = &((struct shader_object *)object)->shader.hash;
     char text[2 * sizeof hash->bytes + 1];
 
+    (void)unused;
     for (size_t i = 0; i < sizeof hash->bytes; ++i)
         snprintf(text + 2 * i, 3, "%02x", hash->bytes[i]);
     return PyUnicode_FromString(text);

@@ -1,5 +1,7 @@
 // The Plan type: the graph of a source with some settings, made without a call to Vulkan.
+#include "python/plan.h"
 #include "python/module.h"
+#include "python/values.h"
 
 #include "graph/dry_run.h"
 #include "graph/layers.h"

@@ -1,4 +1,5 @@
 // The Renderer type: a device with everything on it.
+#include "python/renderer.h"
 #include "python/module.h"
 
 static struct vkb_module_state *state_of(PyObject *self)

@@ -1,5 +1,7 @@
 // Plans run on a renderer: the Submission type. The GIL is released around all device work.
 #include "python/module.h"
+#include "python/plan.h"
+#include "python/values.h"
 
 #include <string.h>
 

@@ -1,5 +1,7 @@
 // The Resource type: a texture or a buffer that a method brings along.
+#include "python/arguments.h"
 #include "python/module.h"
+#include "python/values.h"
 
 #include <string.h>
 

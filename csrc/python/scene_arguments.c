@@ -1,5 +1,6 @@
 // A scene's arrays as the core's structs. All functions return false with an exception set.
-#include "python/module.h"
+#include "python/arguments.h"
+#include "python/values.h"
 
 #include <string.h>
 

@@ -1,5 +1,6 @@
 // Screens of a renderer. Python knows them by their addresses, which are looked up.
 #include "python/module.h"
+#include "python/renderer.h"
 
 bool vkb_require_screen(const struct vkb_renderer *renderer, const struct vkb_screen *screen,
                         struct vkb_error *error)

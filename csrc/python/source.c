@@ -1,5 +1,7 @@
 // The Source type: an image or a scene, converted once from Python objects.
 #include "python/module.h"
+#include "python/plan.h"
+#include "python/values.h"
 
 #include <stdio.h>
 

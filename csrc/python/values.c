@@ -1,5 +1,5 @@
 // Single Python objects as numbers, names and tuples.
-#include "python/module.h"
+#include "python/values.h"
 
 bool vkb_require_tuple(PyObject *object, const char *what)
 {

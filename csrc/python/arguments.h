@@ -1,0 +1,89 @@
+// Settings, images, scenes and cameras as C structs.
+#ifndef VKB_PYTHON_ARGUMENTS_H
+#define VKB_PYTHON_ARGUMENTS_H
+
+#include "python/objects.h"
+
+#include "methods/source.h"
+#include "run/exports.h"
+#include "run/upload.h"
+
+// Creates the names that vkb_read_settings reads; false with an exception set.
+bool vkb_make_attributes(struct vkb_module_state *state);
+
+// Reads the attributes of a settings object; missing ones have their defaults. False with an
+// exception set.
+bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
+                       struct vkb_settings *settings);
+
+// Reads the stages of glare of a settings object; without the attribute there are none.
+bool vkb_read_glare(PyObject *object, struct vkb_settings *settings);
+
+// The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
+struct vkb_held_kernel {
+    Py_buffer view;
+    bool held;
+};
+
+// Asks a convolution's settings for the kernel of these sizes, or only for about its size.
+bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                          struct vkb_kernel_data *kernel);
+bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                     struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
+void vkb_release_kernel(struct vkb_held_kernel *held);
+
+// Asks the stage of dirt, if there is one, for its picture.
+bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_settings *settings);
+
+// (position, rotation, fov, near, far), the first two of three numbers each.
+bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
+
+// The arrays of a scene, held until vkb_release_scene. Releasing a zeroed or half-read one is safe.
+struct vkb_held_scene {
+    struct vkb_scene_data data;
+    Py_buffer *views;
+    size_t view_count;
+};
+
+// (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
+// None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
+// texture (levels, address mode along u, v, magnification, minification, mipmap filter).
+bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
+void vkb_release_scene(struct vkb_held_scene *scene);
+
+// The pixels of an image, held until vkb_release_image. Releasing a zeroed or half-read one is
+// safe.
+struct vkb_held_image {
+    struct vkb_input input;
+    Py_buffer view;
+    bool held;
+};
+
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; or (Exported, offset,
+// (H, W, C), strides, code of the element). `name` is the argument's.
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
+// An array (H, W) of float32, any strides.
+bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
+void vkb_release_image(struct vkb_held_image *image);
+
+// Whether the object is memory that CUDA shares; that memory, and to what it belongs.
+bool vkb_is_exported(PyObject *object);
+struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **exports);
+
+// The passes of a method that was given at run time, held until vkb_release_passes, which may be
+// called on a zeroed one. The tuple keeps their shaders, to which the rows of a graph refer.
+struct vkb_held_passes {
+    PyObject *tuple;
+    struct vkb_own_pass *rows;
+};
+
+// Asks the settings of such a method for its passes.
+bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uint32_t max_side,
+                     const struct vkb_source *source, struct vkb_held_passes *held,
+                     struct vkb_settings *settings);
+void vkb_release_passes(struct vkb_held_passes *held);
+
+// Of a Resource object, which keeps it.
+const struct vkb_resource *vkb_resource_of(PyObject *object);
+
+#endif

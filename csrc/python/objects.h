@@ -1,0 +1,37 @@
+// What all types share: the module's state, objects and exceptions. The only header of the core
+// that includes Python.h.
+#ifndef VKB_PYTHON_OBJECTS_H
+#define VKB_PYTHON_OBJECTS_H
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "vulkan/adapter.h"
+
+struct vkb_module_state {
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type,
+        *resource_type, *exported_type;
+    PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+    PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
+};
+
+struct vkb_module_state *vkb_module_state(PyObject *module);
+
+// Creates an object of a heap type with zeroed members. NULL with an exception set.
+void *vkb_new_object(PyObject *type);
+// Frees an object whose members have been released, and releases its type: the end of tp_dealloc.
+void vkb_free_object(PyObject *object);
+// tp_dealloc of the types whose tp_clear releases all members.
+void vkb_dealloc(PyObject *object);
+
+// Python cannot create objects of types with these flags.
+#define VKB_TYPE_FLAGS \
+    (Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE | Py_TPFLAGS_DISALLOW_INSTANTIATION)
+
+// Raises the exception class of the error; returns NULL.
+PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
+
+// (name, type, driver, driver_info, api_version, driver UUID as bytes, bundled, UUID, PCI address)
+PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter);
+
+#endif
