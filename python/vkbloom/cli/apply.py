@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from vkbloom.cli.image_files import (
     silenced,
     subimage_option,
 )
-from vkbloom.cli.overlapped import read_ahead, rendered, written_behind
+from vkbloom.cli.overlapped import read_ahead, rendered
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.program import given as was_given
 from vkbloom.cli.sequences import PIPE, check_targets, pairs
@@ -45,6 +45,7 @@ from vkbloom.io.array_files import premultiplied
 from vkbloom.io.displayed import PRIMARIES, Saved, check_saved
 from vkbloom.io.images import Colour, Picture, SavedColour
 from vkbloom.large_files import finished, is_large
+from vkbloom.written_behind import written_behind
 
 CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
@@ -290,14 +291,19 @@ class _Run:
         del first
         hidden = self._hidden if self._several else True
         bar = tqdm(results, total=len(files), unit="image", leave=False, disable=hidden)
-        with written_behind() as write_next, contextlib.closing(results):
-            for (picture, frames), (name, target) in zip(bar, files, strict=True):
-                for text in no_bloom.notes(frames, picture.pixels):
-                    note(f"{name}: {text}" if self._several else text)
-                seconds = sum(frames.timings.values())
-                detail(f"{name}: {1e3 * seconds:.2f} ms on the device")
-                kept = no_bloom.only(frames, options.names)
-                write_next(functools.partial(self._write, picture, kept, target))
+        with contextlib.closing(results):
+            for _ in written_behind(self._made(zip(bar, files, strict=True))):
+                pass
+
+    def _made(self, results: Iterable[Any]) -> Iterator[tuple[str, Callable[[], object]]]:
+        """Yield the name of each file, and the function that writes it."""
+        for (picture, frames), (name, target) in results:
+            for text in no_bloom.notes(frames, picture.pixels):
+                note(f"{name}: {text}" if self._several else text)
+            seconds = sum(frames.timings.values())
+            detail(f"{name}: {1e3 * seconds:.2f} ms on the device")
+            kept = no_bloom.only(frames, self._options.names)
+            yield target, functools.partial(self._write, picture, kept, target)
 
     def _read(self, source: str) -> Picture:
         options = self._options

@@ -1,11 +1,10 @@
-"""Sequences of images, which are read and written while the device works on another image."""
+"""Sequences of images, which are read while the device works on another image."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
 import click
@@ -13,11 +12,10 @@ import click
 import vkbloom
 from vkbloom.io.images import Picture
 
-__all__ = ["read_ahead", "rendered", "written_behind"]
+__all__ = ["read_ahead", "rendered"]
 
-# Number of images that are read ahead, and of results that wait to be written.
+# Number of images that are read ahead.
 _AHEAD: Final = 1
-_BEHIND: Final = 1
 
 Read = TypeVar("Read")
 
@@ -30,7 +28,8 @@ def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[
         with context.scope(cleanup=False):
             return read(source)
 
-    with _thread("vkbloom-read") as pool:
+    pool = ThreadPoolExecutor(1, "vkbloom-read")
+    try:
         ahead: deque[Future[Read]] = deque()
         for source in sources:
             ahead.append(pool.submit(read_in_context, source))
@@ -38,6 +37,8 @@ def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[
                 yield ahead.popleft().result()
         while ahead:
             yield ahead.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def rendered(
@@ -57,35 +58,3 @@ def rendered(
 
     for frames in renderer.apply_each(pixels(), settings, attachments=attachments):
         yield waiting.popleft(), frames
-
-
-@contextmanager
-def written_behind() -> Iterator[Callable[[Callable[[], object]], None]]:
-    """Yield a function that runs writes in their order in a thread.
-
-    The function and the exit raise the exceptions of earlier writes. If something else fails, the
-    writes that were added are completed.
-    """
-    with _thread("vkbloom-write") as pool:
-        behind: deque[Future[object]] = deque()
-
-        def add(write: Callable[[], object]) -> None:
-            behind.append(pool.submit(write))
-            while len(behind) > _BEHIND:
-                behind.popleft().result()
-
-        try:
-            yield add
-        finally:
-            # Also after a failure, whose exception goes on: images before it are complete.
-            while behind:
-                behind.popleft().result()
-
-
-@contextmanager
-def _thread(name: str) -> Iterator[ThreadPoolExecutor]:
-    pool = ThreadPoolExecutor(1, name)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)

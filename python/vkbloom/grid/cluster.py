@@ -24,7 +24,7 @@ from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.layout import Grid, Layout, lay_out, origin
 from vkbloom.grid.order import Block
 from vkbloom.grid.progress import Progress
-from vkbloom.grid.running import Sink, Writer, written_behind
+from vkbloom.grid.running import Sink, Writer, written
 from vkbloom.renderer import Renderer
 
 # Dask's own types are incomplete.
@@ -122,7 +122,7 @@ def _render(grid: Grid, run: _Run) -> Tally | str:
         total = Tally()
         try:
             filler = Filler(grid, run.layout, renderer)
-            blocks = written_behind(filler, run.writer, run.blocks, run.layout, total.add)
+            blocks = written(filler, run.writer, run.blocks, run.layout, total.add)
             run.writer.flush(list(blocks))
         except DeviceLostError:
             # Close it, so that the next attempt creates a new device.

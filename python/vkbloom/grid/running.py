@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
@@ -14,11 +14,12 @@ from vkbloom.grid.filling import Filler, Tally
 from vkbloom.grid.layout import Grid, Layout
 from vkbloom.grid.order import Block
 from vkbloom.grid.progress import Progress
+from vkbloom.written_behind import written_behind
 
 if TYPE_CHECKING:
     from vkbloom.renderer import Renderer
 
-__all__ = ["Sink", "Writer", "empty_arrays", "run_here", "written_behind"]
+__all__ = ["Sink", "Writer", "empty_arrays", "run_here", "written"]
 
 # Blocks are flushed and marked as done after this time, or this number of blocks.
 _COMMIT_SECONDS: Final = 2.0
@@ -92,7 +93,7 @@ def run_here(
             pending.clear()
 
     try:
-        for block in written_behind(filler, sink.writer, todo, layout, progress.add):
+        for block in written(filler, sink.writer, todo, layout, progress.add):
             pending.append(block)
             if len(pending) >= _COMMIT_BLOCKS or time.monotonic() - committed > _COMMIT_SECONDS:
                 commit()
@@ -103,7 +104,7 @@ def run_here(
         raise
 
 
-def written_behind(
+def written(
     filler: Filler,
     writer: Writer,
     todo: Iterable[Block],
@@ -111,25 +112,14 @@ def written_behind(
     on_point: Callable[[Tally], object],
 ) -> Iterator[Block]:
     """Render blocks, and write each while the next one is rendered."""
-    with ThreadPoolExecutor(1, "vkbloom-grid") as pool:
-        behind: tuple[Block, Future[None]] | None = None
-        failure: Exception | None = None
+
+    def made() -> Iterator[tuple[Block, Callable[[], None]]]:
         for block in todo:
             arrays = empty_arrays(layout, block)
-            try:
-                filler.fill(block, arrays, on_point)
-            except Exception as error:
-                failure = error
-                break
-            if behind is not None:
-                behind[1].result()
-                yield behind[0]
-            behind = block, pool.submit(writer.write, block, arrays)
-        if behind is not None:
-            behind[1].result()
-            yield behind[0]
-    if failure is not None:
-        raise failure
+            filler.fill(block, arrays, on_point)
+            yield block, functools.partial(writer.write, block, arrays)
+
+    return written_behind(made())
 
 
 def _commit_after(error: BaseException, commit: Callable[[], None]) -> None:
