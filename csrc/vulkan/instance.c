@@ -149,6 +149,13 @@ enum {
     MAX_EXTENSIONS = 128,
 };
 
+// Mesa without a window system lists VK_EXT_headless_surface, but not VK_KHR_surface, which it
+// needs.
+static bool lacks_surfaces(const struct vkb_instance *instance, const struct wish *wish)
+{
+    return wish > wishes && !instance->surfaces && strstr(wish->extension, "_surface");
+}
+
 // Adds to `names` those of the wished extensions that are there. Without a list there are none.
 static void add_wished(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr get,
                        const char **names, uint32_t *count)
@@ -165,7 +172,7 @@ static void add_wished(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr 
     for (const struct wish *wish = wishes; wish < wishes + WISH_COUNT; ++wish)
         for (uint32_t i = 0; i < found_count; ++i)
             if (strcmp(found[i].extensionName, wish->extension) == 0
-                && (!wish->variable || getenv(wish->variable))
+                && (!wish->variable || getenv(wish->variable)) && !lacks_surfaces(instance, wish)
                 && !(*count > 0 && strcmp(names[0], wish->extension) == 0)) {
                 names[(*count)++] = wish->extension;
                 instance->surfaces |= wish == wishes;

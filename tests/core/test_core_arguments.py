@@ -13,6 +13,7 @@ import pytest
 
 from tests.planned import scene_plan, scene_source
 from vkbloom import Renderer, Scene, Separable, _core
+from vkbloom.adapter import bundled_driver
 from vkbloom.sources import scene_arguments
 
 METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "unreal")
@@ -430,15 +431,16 @@ def test_more_indices_than_32_bits_count(scene: Scene, tmp_path: Path) -> None:
 
 def test_a_renderer_takes_no_keywords() -> None:
     make: Any = _core.Renderer
+    driver = bundled_driver()
     with pytest.raises(TypeError, match="keyword"):
         make("auto", validation=True)
     for seconds in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="frame_seconds: a number above 0 is needed"):
-            _core.Renderer("auto", "", True, "auto", seconds, _no_cache)
+            _core.Renderer("auto", driver, True, "auto", seconds, _no_cache)
     with pytest.raises(OSError, match="no cache"):
-        _core.Renderer("auto", "", True, "auto", 1.0, _no_cache)
+        _core.Renderer("auto", driver, True, "auto", 1.0, _no_cache)
     with pytest.raises(TypeError):
-        _core.Renderer("auto", "", True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
+        _core.Renderer("auto", driver, True, "auto", 1.0, lambda uuid: "text")  # type: ignore[arg-type,return-value]
 
 
 def _no_cache(uuid: bytes) -> bytes | None:
