@@ -76,7 +76,11 @@ WORDS_ALONE = {
     "godot_rows.comp",
     "hdrp_rows.comp",
     "hdrp_columns.comp",
+    "adjoint_blend.comp",
+    "adjoint_threshold.comp",
 }
+# Shaders whose images are always single floats.
+FLOATS_ALONE = {"adjoint_taps.comp", "adjoint_blend.comp", "adjoint_threshold.comp"}
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
@@ -103,6 +107,8 @@ def modules(shader: Path) -> list[Module]:
     if '#include "variants/pixels.glsl"' in text:
         found = []
         for ours, glsl in FORMATS.items():
+            if shader.name in FLOATS_ALONE and ours != "rgba32float":
+                continue
             if shader.name not in WORDS_ALONE:
                 options = (f"-DSOURCE_FORMAT={glsl}",)
                 found.append(Module(f"{name}_{ours}", shader, options))

@@ -1,9 +1,11 @@
 """Derivatives by the image on the device, beside the framebuffer that they are of.
 
-Times on the device: forward the passes of "final", backward those from its cotangents to the
-image's. Forward, backward and so on take turns with three images and cotangents, all RGB in single
-floats. Without a curve the backward passes need nothing of the forward ones. PyTorch's is the same
-`Pyramid` in convolutions, with autograd; its memory is the most that it had allocated, that of
+Forward are the passes of "final", backward those from its cotangents to the image's. They take
+turns with three images and cotangents, all RGB in single floats. Without a curve the backward
+passes need nothing of the forward ones. On a GPU the times are those of the passes on the device;
+on a CPU they are the processor time of the complete calls, which other work on the machine does
+not change much, at a smaller size. PyTorch's is the same `Pyramid` in convolutions, with autograd;
+its memory is the most that it had allocated, without the images that wait for their turn, that of
 vkbloom all of its images.
 """
 
@@ -28,15 +30,19 @@ from vkbloom.core_access import core_of
 __all__ = ["run"]
 
 SIZE: Final = (3840, 2160)
+SIZE_ON_CPU: Final = (960, 544)
 ROUNDS: Final = 15
 LEVELS: Final = 4
 PYRAMID: Final = vkbloom.Pyramid(levels=LEVELS, format="rgba32float")
 SETTINGS: Final[dict[str, vkbloom.Settings]] = {
-    "Separable": vkbloom.Separable(threshold=0.5, knee=0.5, tonemap="reinhard"),
+    "Separable": vkbloom.Separable(threshold=0.5, knee=0.5),
+    "Separable, Reinhard": vkbloom.Separable(threshold=0.5, knee=0.5, tonemap="reinhard"),
+    "Convolution": vkbloom.Convolution(),
     "Pyramid": PYRAMID,
     "Pyramid, threshold, ACES": PYRAMID.replace(threshold=0.5, tonemap="aces"),
     "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
     "BevyBloom": vkbloom.presets["bevy_natural"],
+    "KinoBloom": vkbloom.KinoBloom(),
     "UrpBloom": vkbloom.presets["unity_urp"],
     "UnrealBloom": vkbloom.presets["threejs_unreal"],
 }
@@ -49,7 +55,9 @@ FASTER, PART_OF_MEMORY = 5.0, 0.25
 def run(plan: Plan, section: Section) -> None:
     """Time methods alone, then the pyramid beside PyTorch's."""
     section.title = "Derivatives by the image"
-    size = plan.size(*SIZE)
+    with plan.renderer() as renderer:
+        on_cpu = renderer.info.type == "cpu"
+    size = plan.size(*(SIZE_ON_CPU if on_cpu else SIZE))
     images = [np.ascontiguousarray(one[..., :3]) for one in pictures(size, np.float32)]
     random = np.random.default_rng(0)
     cotangents = [random.standard_normal(one.shape, np.float32) for one in images]
@@ -64,7 +72,9 @@ def run(plan: Plan, section: Section) -> None:
             if ours is None:
                 section.missing.append(f"{name}: the reference computes its derivatives")
                 continue
-            times[name] = alternate_seconds(ours, plan.times(ROUNDS))
+            if on_cpu:
+                ours = {name: _processor_time(call) for name, call in ours.items()}
+            times[name] = alternate_seconds(ours, plan.times(ROUNDS), warm_up=3)
             memory = core_of(renderer).cached[2]
         backward = times[name]["backward"].over(times[name]["forward"]).value
         section.goals.append(Goal(f"{name}: backward / forward", backward, MOST, at_most=True))
@@ -93,6 +103,15 @@ def _calls(
     if core_of(renderer).adjoint(source, settings, ("final",), False) is None:
         return None
     return {"forward": forward, "backward": backward}
+
+
+def _processor_time(call: Callable[[int], float]) -> Callable[[int], float]:
+    def timed(turn: int) -> float:
+        start = time.process_time()
+        call(turn)
+        return time.process_time() - start
+
+    return timed
 
 
 def _pulled(
@@ -155,7 +174,9 @@ def _beside_torch(
     if device == "cuda":
         torch.cuda.reset_peak_memory_stats()
         pulled(1)
-        most = torch.cuda.max_memory_allocated()
+        # One image and its cotangents belong to the work, the others wait for their turn.
+        waiting = 2 * sum(kind[0].nbytes for kind in given)
+        most = torch.cuda.max_memory_allocated() - waiting
         rows[1] = (*rows[1][:2], f"{most / 2**20:.0f}")
         goals.append(
             Goal("Pyramid: memory of vkbloom / PyTorch", memory / most, PART_OF_MEMORY, True)

@@ -227,11 +227,14 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
-// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels.
+// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels; the
+// factor of the colours of what is added.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
-    INPUT(B, float, gain)
+    INPUT(B, float, gain) \
+    INPUT(B, float, share) \
+    INPUT(B, float, limit)
 
 // The composite of Godot.
 #define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
@@ -469,6 +472,10 @@
 // is added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
+// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of an
+// invocation that writes words.
+#define ADJOINT_SIDE 4
+#define ADJOINT_ROWS 16
 
 // Taps of published methods that their adjoints read, too: the distance of Filament's in texels and
 // the share of the outer ones along an axis; the distances of those of HDRP's prefilter; the kernel

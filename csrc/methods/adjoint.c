@@ -1,6 +1,7 @@
 #include "methods/adjoint.h"
 
 #include "passes/adjoint.h"
+#include "passes/threshold.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -136,7 +137,41 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
                       : transpose && !transpose(adjoint, &pass, error))
             return false;
     }
-    return true;
+    return !*possible || vkb_end_scene(adjoint, error);
+}
+
+// Finds a threshold pass that only removes NaN and infinity, if all cotangents are of the final
+// image: those of a bloom buffer have an alpha, which this pass would remove.
+static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *cotangents)
+{
+    const struct vkb_graph *graph = adjoint->graph;
+
+    if (cotangents->count != 1 || strcmp(cotangents->names[0], "final") != 0)
+        return;
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (vkb_is_threshold(&graph->passes[i])
+            && graph->passes[i].constants.threshold_mode == THRESHOLD_NONE) {
+            adjoint->glow = graph->passes[i].targets[0];
+            adjoint->image = graph->passes[i].reads[0];
+        }
+}
+
+// Of the passes that bring to an image, one after the other, only the last one removes NaN and
+// infinity.
+static void end_at_last(struct vkb_graph *graph, uint32_t first)
+{
+    for (uint32_t i = first; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *last = &graph->passes[i];
+        if (!last->constants.from_image || !last->constants.add_own)
+            continue;
+        for (uint32_t j = first; j < i; ++j) {
+            struct vkb_pass_row *row = &graph->passes[j];
+            if (row->targets[0] != last->reads[last->read_count - 2] || !row->constants.from_image)
+                continue;
+            row->constants.from_image = false;
+            row->reads[row->read_count - 1] = row->reads[0];
+        }
+    }
 }
 
 // Makes the cotangents of the source's images framebuffers.
@@ -165,11 +200,18 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
                        struct vkb_graph *graph, uint32_t *first, bool *possible,
                        struct vkb_error *error)
 {
-    struct vkb_adjoint adjoint = {.graph = graph, .sums = cotangents->sums};
+    struct vkb_adjoint adjoint = {
+        .graph = graph,
+        .sums = cotangents->sums,
+        .scene = VKB_NO_IMAGE,
+        .glow = VKB_NO_IMAGE,
+        .image = VKB_NO_IMAGE,
+    };
 
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
-    const uint32_t image_count = *first = graph->image_count;
+    find_glow(&adjoint, cotangents);
+    const uint32_t image_count = *first = graph->image_count, pass_count = graph->pass_count;
     adjoint.brought = vkb_alloc(error, image_count, sizeof *adjoint.brought);
     bool done = adjoint.brought && add_table(&adjoint, error);
     for (uint32_t i = 0; adjoint.brought && i < image_count; ++i)
@@ -178,6 +220,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
     done = done && add_passes(&adjoint, settings, possible, error) && end_table(&adjoint, error);
+    end_at_last(graph, pass_count);
     if (done && !cotangents->sums)
         show_results(&adjoint, image_count);
     vkb_free(adjoint.table.texels);

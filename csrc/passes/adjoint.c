@@ -43,14 +43,49 @@ static void read_nothing(struct vkb_pass_row *row)
     row->reads[row->read_count++] = row->reads[0];
 }
 
-bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given, uint32_t image,
+void vkb_bring_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
+                     uint32_t image)
+{
+    adjoint->scene = image;
+    adjoint->share = share;
+    adjoint->scene_row = *row;
+    adjoint->brought[image] = row->reads[3];
+}
+
+bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
+{
+    const uint32_t image = adjoint->scene;
+
+    if (image == VKB_NO_IMAGE)
+        return true;
+    adjoint->scene = VKB_NO_IMAGE;
+    adjoint->brought[image] = VKB_NO_IMAGE;
+    return vkb_bring(adjoint, &adjoint->scene_row, image, error);
+}
+
+// Has the row add what the composite has left to the next pass. Only filters have a factor for it.
+static bool take_scene(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                       struct vkb_error *error)
+{
+    if (row->block == VKB_BLOCK_adjoint_filter)
+        row->params.adjoint_filter.share = (float)adjoint->share;
+    else if (adjoint->share != 1.0)
+        return vkb_end_scene(adjoint, error);
+    adjoint->scene = VKB_NO_IMAGE;
+    return true;
+}
+
+bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given, uint32_t place,
                struct vkb_error *error)
 {
-    const struct vkb_image_row *forward = &adjoint->graph->images[image];
-    const struct vkb_size size = {forward->width, forward->height};
+    const uint32_t image = place == adjoint->glow ? adjoint->image : place;
     struct vkb_pass_row row = *given;
     uint32_t *brought = &adjoint->brought[image];
 
+    if (image == adjoint->scene && !take_scene(adjoint, &row, error))
+        return false;
+    const struct vkb_image_row *forward = &adjoint->graph->images[image];
+    const struct vkb_size size = {forward->width, forward->height};
     read_nothing(&row);
     row.constants.add_own = *brought != VKB_NO_IMAGE;
     if (row.constants.add_own)
@@ -66,12 +101,16 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
                                       const struct vkb_filter *filter, enum vkb_mode direction,
                                       uint32_t cotangents)
 {
-    const uint32_t reads[] = {cotangents, adjoint->table_image};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 2);
+    // In place of the scene of a composite, the cotangents again.
+    const uint32_t reads[] = {cotangents, adjoint->table_image, cotangents};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 3);
 
     row.constants.direction = direction;
+    // Of one axis, the weights are packed.
+    row.constants.levels = direction == DIRECTION_BOTH ? (int32_t)filter->kernels : 0;
     row.block = VKB_BLOCK_adjoint_filter;
     row.params.adjoint_filter.gain = (float)filter->gain;
+    row.params.adjoint_filter.share = 1.0f;
     return row;
 }
 

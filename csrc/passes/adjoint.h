@@ -14,6 +14,13 @@ struct vkb_adjoint {
     uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
     uint32_t added;     // images so far
     bool sums;          // the derivatives by fields are wanted, not those by images
+    // What a composite without a curve brings to its scene is `share` times the cotangents that it
+    // has, `brought` of the scene until another pass brings more. That pass adds them itself.
+    uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
+    double share;
+    struct vkb_pass_row scene_row;  // the composite's own pass, for the case that none adds them
+    // A bloom source that is the image but for NaN and infinity: its cotangents are the image's.
+    uint32_t glow, image;  // VKB_NO_IMAGE: there is none
 };
 
 // Adds the adjoint passes of a forward row, which is a copy: adding passes moves those of the
@@ -31,6 +38,12 @@ struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint3
 // Adds the row, whose result is added to the cotangents of a forward image.
 bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t image,
                struct vkb_error *error);
+
+// Brings what the row computes, which is `share` times its cotangents, when another pass brings
+// more, or by vkb_end_scene().
+void vkb_bring_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
+                     uint32_t image);
+bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 
 // Brings the transpose of a filter of an image.
 bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,

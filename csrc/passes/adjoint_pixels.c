@@ -2,6 +2,8 @@
 // the threshold pass, which reduces the image before.
 #include "passes/adjoint.h"
 
+#include <math.h>
+
 static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image)
 {
     const struct vkb_image_row *row = &adjoint->graph->images[image];
@@ -18,6 +20,24 @@ static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
         || constants->alpha != ALPHA_KEEP || limit < (float)SINGLE_LIMIT;
 }
 
+// Whether the derivatives by the scene are a factor of all colours.
+static bool scales_scene(const struct vkb_pass_row *pass)
+{
+    const int32_t composite = pass->constants.composite;
+
+    return pass->block == VKB_BLOCK_composite && !pass->constants.masked
+        && !depends_on_bloom(&pass->constants, pass->params.composite.limit)
+        && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
+}
+
+static double share_of_scene(const struct vkb_pass_row *pass)
+{
+    const struct vkb_composite_params *params = &pass->params.composite;
+
+    return exp2(params->exposure)
+         * (pass->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
+}
+
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
 static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             struct vkb_pass_row *row, float limit, struct vkb_error *error)
@@ -29,7 +49,10 @@ static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_r
         if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
             || (by == BY_MASK && !pass->constants.masked))
             continue;
-        if (!vkb_bring(adjoint, row, pass->reads[by], error))
+        if (by == BY_SCENE && scales_scene(pass)
+            && adjoint->brought[pass->reads[0]] == VKB_NO_IMAGE)
+            vkb_bring_scene(adjoint, row, share_of_scene(pass), pass->reads[0]);
+        else if (!vkb_bring(adjoint, row, pass->reads[by], error))
             return false;
     }
     return true;

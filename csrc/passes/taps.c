@@ -172,6 +172,10 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
             }
         }
     for (uint32_t texel = 0; texel < axis->from; ++texel) {
+        // One that no pixel reads has the pixels of the one before, without a share in them. So
+        // adjacent texels have adjacent readers.
+        if (!readers[texel].end)
+            readers[texel] = texel ? readers[texel - 1] : (struct readers){.end = 1};
         readers[texel].start = total;
         total += readers[texel].end - readers[texel].first;
     }

@@ -345,9 +345,15 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
 static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_specials *specials = &run->frame->specials;
+    const bool gains = (pass->block == VKB_BLOCK_fused_bloom && pass->reading == VKB_READING_WORDS)
+                    || pass->shader == &vkb_shader_adjoint_tile_comp
+                    || pass->shader == &vkb_shader_adjoint_taps_comp_rgba32float
+                    || pass->shader == &vkb_shader_adjoint_filter_dispatch
+                    || pass->shader == &vkb_shader_adjoint_taps_words_rgba32float
+                    || pass->shader == &vkb_shader_adjoint_blend_words_rgba32float
+                    || pass->shader == &vkb_shader_adjoint_threshold_words_rgba32float;
 
-    return pass->block == VKB_BLOCK_fused_bloom && !run->unknown_specials && specials->nan == 0
-        && specials->inf == 0;
+    return gains && !run->unknown_specials && specials->nan == 0 && specials->inf == 0;
 }
 
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,
@@ -367,6 +373,10 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
         if (output && !vkb_readback_is_complete(output))
             known.shader = known.shader->packed;
         known.constants.finite = reads_finite(run, pass);
+        pass = &known;
+    } else if (reads_finite(run, pass)) {
+        memcpy(&known, pass, sizeof known);
+        known.constants.finite = true;
         pass = &known;
     }
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,

@@ -324,23 +324,29 @@ bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct v
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The transposes of a chain, of which `pass` is the last one.
+// The transposes of a chain, of which `pass` is the last one: that of the threshold, or of the
+// vertical blur, if there is no threshold. What the composite brings to the scene is an image, or
+// left to the last pass.
 static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                                struct chain *chain, const struct vkb_pass_row **by_bloom)
 {
     const struct vkb_shader *filter = &vkb_shader_adjoint_filter_frag;
     const struct vkb_shader *composite = &vkb_shader_adjoint_composite_frag;
+    const bool thresholds = pass->shader == &vkb_shader_adjoint_threshold_frag
+                         && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
-    if (pass->shader != &vkb_shader_adjoint_threshold_frag || pass->constants.by != BY_SCENE
-        || pass->constants.masked || !pass->constants.add_own)
+    if (!(thresholds || (pass->shader == filter && pass->constants.from_image))
+        || !pass->constants.add_own || !find_any_chain(graph, chain))
         return false;
     const struct vkb_pass_row *first =
-        find_any_chain(graph, chain) ? sole_adjoint(graph, pass->reads[2], filter) : NULL;
+        thresholds ? sole_adjoint(graph, pass->reads[2], filter) : pass;
     const struct vkb_pass_row *second = first ? sole_adjoint(graph, first->reads[0], filter) : NULL;
-    const struct vkb_pass_row *by_scene = sole_adjoint(graph, pass->reads[3], composite);
+    const uint32_t added = pass->reads[3];
+    const struct vkb_pass_row *by_scene = sole_adjoint(graph, added, composite);
     *by_bloom = second ? sole_adjoint(graph, second->reads[0], composite) : NULL;
-    return *by_bloom && by_scene && (*by_bloom)->constants.by == BY_BLOOM
-        && by_scene->constants.by == BY_SCENE && chain->threshold->reads[0] == pass->reads[0];
+    return *by_bloom && (*by_bloom)->constants.by == BY_BLOOM
+        && (added == (*by_bloom)->reads[3] || (by_scene && by_scene->constants.by == BY_SCENE))
+        && chain->threshold->reads[0] == pass->reads[4];
 }
 
 // The derivatives by the image in tiles: one pass instead of the composite's two, the blurs' and

@@ -46,6 +46,9 @@ vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images as words.
 vkb_variant_add vkb_add_lines, vkb_add_transform;
+// Adjoint passes: of images as words; transposed filters, in blocks of texels or fused with the
+// composite's.
+vkb_variant_add vkb_add_adjoint_words, vkb_add_adjoint_filter;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;
 

@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // The transpose of a filter: each texel gathers the cotangents of the pixels that read it, with the
-// weights from a table (csrc/passes/taps.h).
+// weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a
+// curve, from which those of the bloom follow by a factor where the scene is finite.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 
@@ -10,14 +11,22 @@ UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D cotangents;
 layout(set = 0, binding = 2) uniform sampler2D table;
+layout(set = 0, binding = 3) uniform sampler2D scene;
 
-#define TARGET_BINDING 5
+#define TARGET_BINDING 6
+#define ADDED_SHARE params.share
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 
 vec4 entry(int place)
 {
     return texelFetch(table, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH), 0);
+}
+
+vec4 cotangent(ivec2 place)
+{
+    vec4 value = texelFetch(cotangents, place, 0);
+    return BY == BY_BLOOM ? vec4(where_finite(value, texelFetch(scene, place, 0)).rgb, 0.0) : value;
 }
 
 // The pixels that read a texel: the first one, their number, and where their weights are.
@@ -37,7 +46,7 @@ vec4 along(int start, ivec2 pixel, bool vertical)
         [[unroll]] for (int k = 0; k < 4; ++k) {
             int at = row.x + i + k;
             ivec2 place = vertical ? ivec2(pixel.x, at) : ivec2(at, pixel.y);
-            sum += weights[k] * texelFetch(cotangents, min(place, last), 0);
+            sum += weights[k] * cotangent(min(place, last));
         }
     }
     return sum;
@@ -52,7 +61,7 @@ vec4 across(ivec2 pixel)
         vec4 shares = entry(rows.z + y);
         for (int x = 0; x < columns.y; ++x)
             sum += dot(shares, entry(columns.z + x))
-                 * texelFetch(cotangents, ivec2(columns.x + x, rows.x + y), 0);
+                 * cotangent(ivec2(columns.x + x, rows.x + y));
     }
     return sum;
 }

@@ -60,8 +60,10 @@ void sum_vertically(ivec2 place, ivec2 last, int top, int column)
                 run[i] += vertical_weight(at - i) * value;
         if (place.y == 0)
             run[0] += vertical_beyond(y) * value;
+        if (!ends)
+            continue;
         for (int i = 0; i < RUN; ++i)
-            if (ends && place.y + i == last.y)
+            if (place.y + i == last.y)
                 run[i] += vertical_beyond(last.y - y) * value;
     }
     for (int i = 0; i < RUN; ++i)

@@ -188,6 +188,27 @@ MASKED = (
 )
 
 
+@pytest.mark.parametrize("variant", ["cpu", "gpu"])
+def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
+    """In blocks of texels; what a composite without a curve brings needs no image of its own."""
+    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
+    settings = Pyramid(levels=2, composite="mix", exposure=0.5, format="rgba32float")
+    image = random_image(35, 62, seed=1).astype(np.float32)[..., :3].copy()
+    cotangents = {"final": np.random.default_rng(1).standard_normal(image.shape).astype("f4")}
+    with Renderer("software") as renderer:
+        # A finite image has another pipeline.
+        for value in (0.5, np.nan):
+            image[3, 4, 1] = value
+            found = renderer.vjp(image, settings)[1](cotangents)
+            check(found, reference.vjp(image, settings)[1](cotangents), "image")
+        source = Inputs(image).source((cotangents["final"],))
+        plan = core_of(renderer).adjoint(source, settings, ("final",), False)
+    assert plan
+    words = {"adjoint_blend_words_rgba32float", "adjoint_taps_words_rgba32float"}
+    blocks = {"adjoint_filter_dispatch", "adjoint_taps_comp_rgba32float"}
+    assert {shader for _, shader, *_ in plan.passes} == (words if variant == "cpu" else blocks)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])
 def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
     random = np.random.default_rng(3)

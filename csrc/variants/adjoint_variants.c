@@ -1,0 +1,266 @@
+// Variants of adjoint passes: transposed filters in blocks of texels, and pixels as words.
+#include "variants/variant.h"
+
+#include <math.h>
+#include <string.h>
+
+// An axis in the table of weights (passes/taps.h): its entries, and the kernels of a texel of
+// weights, 0 for one whose weights are packed.
+struct axis {
+    const float (*texels)[4];
+    uint32_t start, size;
+    int32_t kernels;
+};
+
+static struct axis axis_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                           bool vertical)
+{
+    const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
+    const struct vkb_image_row *target = &graph->images[pass->targets[0]];
+
+    return (struct axis){
+        .texels = graph->images[pass->reads[1]].pixels,
+        .start = (uint32_t)(vertical ? params->start_y : params->start_x),
+        .size = vertical ? target->height : target->width,
+        .kernels = pass->constants.levels,
+    };
+}
+
+static const float *entry_of(const struct axis *axis, uint32_t texel)
+{
+    const uint32_t last = axis->size - 1;
+
+    return axis->texels[axis->start + (texel < last ? texel : last)];
+}
+
+static float weight_of(const struct axis *axis, uint32_t texel, uint32_t pixel, uint32_t kernel)
+{
+    const float *entry = entry_of(axis, texel);
+    const uint32_t first = (uint32_t)entry[0], place = (uint32_t)entry[2];
+    const uint32_t reader = pixel - first;
+
+    if (texel >= axis->size || pixel < first || reader >= (uint32_t)entry[1])
+        return 0.0f;
+    return axis->kernels ? axis->texels[place + reader][kernel]
+                         : axis->texels[place + reader / 4][reader % 4];
+}
+
+// The most pixels that read one of `side` adjacent texels, from multiples of `side` on.
+static uint32_t span_of(const struct axis *axis, uint32_t side)
+{
+    uint32_t most = 1;
+
+    for (uint32_t texel = 0; texel < axis->size; texel += side) {
+        const float *first = entry_of(axis, texel), *last = entry_of(axis, texel + side - 1);
+        const uint32_t span = (uint32_t)(last[0] + last[1] - first[0]);
+        most = span > most ? span : most;
+    }
+    return most;
+}
+
+// The weights of blocks of texels: one table more in the image.
+struct blocks {
+    float (*texels)[4];
+    size_t count, capacity;
+};
+
+// Adds the entries of an axis, and a list of weights for each that differs from the one before.
+static bool add_blocks(const struct axis *axis, uint32_t span, struct blocks *to, uint32_t *start,
+                       struct vkb_error *error)
+{
+    const uint32_t blocks = (axis->size + ADJOINT_SIDE - 1) / ADJOINT_SIDE;
+    const uint32_t kernels = axis->kernels ? (uint32_t)axis->kernels : 1, list = span * kernels;
+    size_t before = 0;
+
+    *start = (uint32_t)to->count;
+    if (!vkb_grow(error, &to->texels, &to->capacity, to->count + blocks, sizeof *to->texels))
+        return false;
+    to->count += blocks;
+    for (uint32_t block = 0; block < blocks; ++block) {
+        const uint32_t first = (uint32_t)entry_of(axis, block * ADJOINT_SIDE)[0];
+        if (!vkb_grow(error, &to->texels, &to->capacity, to->count + list, sizeof *to->texels))
+            return false;
+        for (uint32_t i = 0; i < list; ++i)
+            for (uint32_t k = 0; k < ADJOINT_SIDE; ++k)
+                to->texels[to->count + i][k] =
+                    weight_of(axis, block * ADJOINT_SIDE + k, first + i / kernels, i % kernels);
+        const bool same =
+            before
+            && memcmp(to->texels[before], to->texels[to->count], list * sizeof *to->texels) == 0;
+        before = same ? before : to->count;
+        to->count += same ? 0 : list;
+        const float entry[4] = {(float)first, 0.0f, (float)before, 0.0f};
+        memcpy(to->texels[*start + block], entry, sizeof entry);
+    }
+    return true;
+}
+
+// Replaces the table of the image by one that is longer.
+static void set_table(struct vkb_graph *graph, uint32_t image, struct blocks *table)
+{
+    struct vkb_image_row *row = &graph->images[image];
+
+    for (size_t i = (size_t)row->width * row->height; i < table->count; ++i)
+        for (size_t half = 0; half < 2; ++half) {
+            uint64_t word;
+            memcpy(&word, &table->texels[i][2 * half], sizeof word);
+            row->serial = vkb_hash_word(row->serial, word);
+        }
+    row->serial += row->serial == 0;
+    row->height = (uint32_t)(table->count / row->width);
+    vkb_free(graph->owned[0]);
+    row->pixels = graph->owned[0] = table->texels;
+}
+
+// Adds tables of blocks for the axes of a filter.
+static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       struct vkb_pass_row *row, struct vkb_error *error)
+{
+    struct vkb_graph *graph = choice->graph;
+    const struct vkb_image_row *image = &graph->images[pass->reads[1]];
+    const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
+    const size_t texels = (size_t)image->width * image->height;
+    const uint32_t width = image->width;
+    const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
+    struct blocks table = {0};
+    uint32_t start_x = 0, start_y = 0;
+
+    bool done = vkb_grow(error, &table.texels, &table.capacity, texels, sizeof *table.texels);
+    if (done)
+        memcpy(table.texels, image->pixels, texels * sizeof *table.texels);
+    table.count = texels;
+    if (done && direction != DIRECTION_VERTICAL) {
+        const uint32_t span = span_of(&x, ADJOINT_SIDE);
+        row->constants.radix_1 = (int32_t)span - 1;
+        done = add_blocks(&x, span, &table, &start_x, error);
+    }
+    if (done && direction != DIRECTION_HORIZONTAL) {
+        const uint32_t span = span_of(&y, ADJOINT_SIDE);
+        row->constants.radix_2 = (int32_t)span - 1;
+        done = add_blocks(&y, span, &table, &start_y, error);
+    }
+    const size_t rest = (width - table.count % width) % width;
+    done = done
+        && vkb_grow(error, &table.texels, &table.capacity, table.count + rest,
+                    sizeof *table.texels);
+    if (!done) {
+        vkb_free(table.texels);
+        return false;
+    }
+    memset(table.texels[table.count], 0, rest * sizeof *table.texels);
+    table.count += rest;
+    set_table(graph, pass->reads[1], &table);
+    row->params.adjoint_filter.start_x = (int32_t)start_x;
+    row->params.adjoint_filter.start_y = (int32_t)start_y;
+    return true;
+}
+
+// The most weights that an invocation keeps along an axis, in vec4s. More than GPUs have registers
+// for, or LLVM, would be slower than the plain pass.
+enum { MOST_WORDS = 24, MOST_REGISTERS = 16 };
+
+static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                       uint32_t most)
+{
+    const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
+    const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
+    const uint32_t kernels = x.kernels ? (uint32_t)x.kernels : 1;
+
+    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x, ADJOINT_SIDE) <= most)
+        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y, ADJOINT_SIDE) <= most);
+}
+
+static bool are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    bool fits = vkb_fits_words(choice, pass);
+
+    for (uint32_t i = 0; i < pass->read_count; ++i)
+        fits = fits && choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT;
+    return fits;
+}
+
+// Removes an image from those that the pass reads.
+static void drop_read(struct vkb_pass_row *row, uint32_t number)
+{
+    for (uint32_t i = number; i + 1 < row->read_count; ++i)
+        row->reads[i] = row->reads[i + 1];
+    vkb_drop_reads(row, row->read_count - 1);
+}
+
+bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           bool *fits, struct vkb_error *error)
+{
+    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
+    const bool blend = pass->shader == &vkb_shader_adjoint_composite_frag;
+    const bool threshold = pass->shader == &vkb_shader_adjoint_threshold_frag;
+    struct vkb_pass_row row;
+
+    *fits = (filter || blend || threshold) && are_floats(choice, pass)
+         && (filter ? fits_lists(choice->graph, pass, MOST_WORDS)
+                    : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
+         && (!threshold
+             || (pass->constants.alpha != ALPHA_BLUR
+                 && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0])));
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    // The mask, or the scene of a composite.
+    drop_read(&row, threshold ? 1 : 2);
+    if (blend) {
+        row.constants.levels = pass->reads[1] != pass->reads[0];
+        vkb_make_words(&row, &vkb_shader_adjoint_blend_words_rgba32float, ADJOINT_SIDE, TEXEL_ROWS);
+    } else if (threshold) {
+        row.constants.sampling = 0;
+        vkb_make_words(&row, &vkb_shader_adjoint_threshold_words_rgba32float, ADJOINT_SIDE,
+                       TEXEL_ROWS);
+    } else {
+        vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE,
+                       ADJOINT_ROWS);
+        if (!add_tables(choice, pass, &row, error))
+            return false;
+    }
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// Reads the cotangents of a composite without a curve in place of what it brings to the bloom.
+static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
+{
+    const uint32_t brought = row->reads[0];
+    const struct vkb_pass_row *pass = vkb_writer_of(graph, brought);
+
+    if (!pass || pass->shader != &vkb_shader_adjoint_composite_frag || pass->constants.masked
+        || pass->constants.by != BY_BLOOM || pass->constants.add_own || pass->constants.from_image
+        || pass->reads[0] != pass->reads[1]
+        || (pass->constants.composite != COMPOSITE_ADD
+            && pass->constants.composite != COMPOSITE_MIX))
+        return;
+    const struct vkb_composite_params *params = &pass->params.composite;
+    const float intensity = pass->constants.bloom == BLOOM_LIT ? 1.0f : params->intensity;
+    row->params.adjoint_filter.gain *= intensity * exp2f(params->exposure);
+    row->constants.by = BY_BLOOM;
+    // Also in place of images that the row does not read.
+    for (uint32_t i = 0; i < row->read_count; ++i)
+        row->reads[i] = row->reads[i] == brought ? pass->reads[3] : row->reads[i];
+    row->reads[2] = pass->reads[0];
+}
+
+// On a GPU, blocks are faster where a filter has several kernels, of which each texel needs all
+// pixels. With one, most texels are in a cache.
+bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == &vkb_shader_adjoint_filter_frag;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MOST_REGISTERS)) {
+        read_composite(&choice->plain, &row);
+        return vkb_add_fullscreen(choice, &row, error);
+    }
+    drop_read(&row, 2);
+    vkb_make_dispatch(&row, &vkb_shader_adjoint_taps_comp_rgba32float,
+                      ADJOINT_SIDE * PIXEL_INVOCATIONS, ADJOINT_SIDE * PIXEL_INVOCATIONS);
+    return add_tables(choice, pass, &row, error) && vkb_graph_add_pass(choice->graph, &row, error);
+}

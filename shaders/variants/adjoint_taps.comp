@@ -1,0 +1,141 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// The transpose of a filter (see adjoint_filter.frag) in blocks: an invocation loads each pixel once that
+// texels next to each other are read by. The table has an entry for
+// each block of four texels: the first column or row of pixels that read these, and where their weights
+// are, a texel for each, with those of the four. After the first there are RADIX_1 columns and RADIX_2
+// rows more. LEVELS is the number of kernels.
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
+#include "lib/storage.glsl"
+#include "variants/pixels.glsl"
+
+const int COLUMNS = ADJOINT_SIDE, SPAN_X = RADIX_1 + 1, SPAN_Y = RADIX_2 + 1;
+
+#ifdef WORDS
+const int ROWS = ADJOINT_ROWS;
+layout(local_size_x = ROW_INVOCATIONS) in;
+#else
+const int ROWS = ADJOINT_SIDE;
+layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
+layout(set = 0, binding = 5) uniform writeonly image2D target;
+#endif
+#define ADDED 3
+#define DIFFERENTIATED 4
+#include "variants/adjoint_runs.glsl"
+READ_FLOATS(1, cotangents);
+READ_FLOATS(2, table);
+
+vec4 entry(int place)
+{
+    return FETCH(table, 2, place % TABLE_WIDTH, place / TABLE_WIDTH);
+}
+
+vec4 cotangent(int x, int y)
+{
+#ifdef WORDS
+    return FETCH(cotangents, 1, min(x, read_shapes[0].x - 1), y);
+#else
+    ivec2 place = min(ivec2(x, y), textureSize(cotangents, 0) - 1);
+    return texelFetch(cotangents, place, 0);
+#endif
+}
+
+void along_rows(ivec2 first, int end, int start, float gain, float share)
+{
+    vec4 place = entry(start + first.x / ADJOINT_SIDE), weights[SPAN_X];
+
+    [[unroll]] for (int i = 0; i < SPAN_X; ++i)
+        weights[i] = gain * entry(int(place.z) + i);
+    for (int y = first.y; y < end; ++y) {
+        vec4 sums[COLUMNS];
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            sums[i] = vec4(0.0);
+        [[unroll]] for (int at = 0; at < SPAN_X; ++at) {
+            vec4 value = cotangent(int(place.x) + at, y);
+            [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                sums[i] += weights[at][i] * value;
+        }
+        store_gathered(first.x, y, share, sums);
+    }
+}
+
+void along_columns(ivec2 first, int end, int start, float gain, float share)
+{
+    for (int y = first.y; y < end; y += ADJOINT_SIDE) {
+        vec4 place = entry(start + y / ADJOINT_SIDE), sums[ADJOINT_SIDE * COLUMNS];
+        [[unroll]] for (int i = 0; i < ADJOINT_SIDE * COLUMNS; ++i)
+            sums[i] = vec4(0.0);
+        [[unroll]] for (int at = 0; at < SPAN_Y; ++at) {
+            vec4 weights = gain * entry(int(place.z) + at);
+            [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
+                vec4 value = cotangent(first.x + column, int(place.x) + at);
+                [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row)
+                    sums[row * COLUMNS + column] += weights[row] * value;
+            }
+        }
+        [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row) {
+            vec4 found[COLUMNS];
+            [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                found[i] = sums[row * COLUMNS + i];
+            if (y + row < end)
+                store_gathered(first.x, y + row, share, found);
+        }
+    }
+}
+
+void across(ivec2 first, int end, ivec2 start, float gain, float share)
+{
+    vec4 place_x = entry(start.x + first.x / ADJOINT_SIDE), weights[SPAN_X * (LEVELS + 1)];
+
+    [[unroll]] for (int i = 0; i < SPAN_X * LEVELS; ++i)
+        weights[i] = gain * entry(int(place_x.z) + i);
+    for (int y = first.y; y < end; y += ADJOINT_SIDE) {
+        vec4 place_y = entry(start.y + y / ADJOINT_SIDE), sums[ADJOINT_SIDE * COLUMNS];
+        [[unroll]] for (int i = 0; i < ADJOINT_SIDE * COLUMNS; ++i)
+            sums[i] = vec4(0.0);
+        for (int number = 0; number < SPAN_Y; ++number) {
+            vec4 values[SPAN_X];
+            [[unroll]] for (int i = 0; i < SPAN_X; ++i)
+                values[i] = cotangent(int(place_x.x) + i, int(place_y.x) + number);
+            [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel) {
+                vec4 shares = entry(int(place_y.z) + number * LEVELS + kernel);
+                [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
+                    vec4 sum = vec4(0.0);
+                    [[unroll]] for (int i = 0; i < SPAN_X; ++i)
+                        sum += weights[i * LEVELS + kernel][column] * values[i];
+                    [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row)
+                        sums[row * COLUMNS + column] += shares[row] * sum;
+                }
+            }
+        }
+        [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row) {
+            vec4 found[COLUMNS];
+            [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+                found[i] = sums[row * COLUMNS + i];
+            if (y + row < end)
+                store_gathered(first.x, y + row, share, found);
+        }
+    }
+}
+
+void main()
+{
+    read_words();
+    ivec2 size = TARGET_SIZE(), first = first_pixel(ivec2(COLUMNS, ROWS));
+    int end = min(first.y + ROWS, size.y);
+    ivec2 start = ivec2(params.start_x, params.start_y);
+    float gain = params.gain, share = params.share;
+
+    if (any(greaterThanEqual(first, size)))
+        return;
+    if (DIRECTION == DIRECTION_HORIZONTAL)
+        along_rows(first, end, start.x, gain, share);
+    else if (DIRECTION == DIRECTION_VERTICAL)
+        along_columns(first, end, start.y, gain, share);
+    else
+        across(first, end, start, gain, share);
+}
