@@ -38,7 +38,14 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_blender_prefilter_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_blender_down_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_blender_end_frag, vkb_transpose_blender_end, NULL},
+        {&vkb_shader_streaks_frag, vkb_transpose_streaks, NULL},
+        {&vkb_shader_ghosts_frag, vkb_transpose_ghosts, NULL},
+        {&vkb_shader_dirt_frag, vkb_transpose_dirt, NULL},
     };
+
+    // Which pixels read a texel at a distance along the radius is not known by axis.
+    if (pass->shader == &vkb_shader_ghosts_frag && pass->params.flare.aberration > 0.0f)
+        return NULL;
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)
             return pass->constants.firefly_filter ? families[i].weighted : families[i].transpose;
@@ -122,16 +129,12 @@ static bool end_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
 static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                        bool *possible, struct vkb_error *error)
 {
-    const float *prefilter = settings->kernel.prefilter;
-    const bool convolves =
-        settings->method == VKB_METHOD_CONVOLUTION && prefilter[0] > prefilter[1];
-
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
         vkb_transpose *transpose = find_transpose(&pass);
         if (pass.target_count != 1 || vkb_brought(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        const bool convolved = pass.block == VKB_BLOCK_fft && convolves;
+        const bool convolved = pass.block == VKB_BLOCK_fft;
         *possible = convolved || transpose;
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))

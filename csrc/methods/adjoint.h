@@ -25,7 +25,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
 
 struct vkb_adjoint;
 
-// The adjoint passes of a convolution without a prefilter, whose last pass this is.
+// The adjoint passes of a convolution, whose last pass this is.
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                                const struct vkb_pass_row *pass, struct vkb_error *error);
 

@@ -28,8 +28,19 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     mirrored->pixels = graph->owned[1] = pixels;
     mirrored->width = width;
     mirrored->height = height;
+    // The cotangents are not filtered.
+    mirrored->prefilter[0] = 1.0f;
+    mirrored->prefilter[1] = 0.0f;
     mirrored->serial = kernel->serial ^ UINT64_C(0x9e3779b97f4a7c15);
     return true;
+}
+
+// What is convolved: the glow, or in Blender's lower qualities the highlights before it.
+static uint32_t find_source(const struct vkb_graph *graph)
+{
+    const uint32_t highlights = vkb_graph_find(graph, "highlights");
+
+    return highlights != VKB_NO_IMAGE ? highlights : vkb_graph_find(graph, "glow");
 }
 
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
@@ -39,13 +50,14 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const int boundary = settings->choices[VKB_CHOICE_boundary];
     const bool edge_x = boundary == BOUNDARY_EDGE;
     const bool edge_y = edge_x || boundary == BOUNDARY_WRAP_X;
-    const uint32_t glow = vkb_graph_find(graph, "glow"), first = graph->pass_count;
+    const uint32_t glow = find_source(graph), first = graph->pass_count;
     const struct vkb_kernel_data *kernel = &settings->kernel;
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
     const struct vkb_size extended = {size.width + (edge_x ? kernel->width - 1 : 0),
                                       size.height + (edge_y ? kernel->height - 1 : 0)};
     const double left = edge_x ? kernel->width - 1 - kernel->width / 2 : 0;
     const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
+    const float *prefilter = settings->kernel.prefilter;
     struct vkb_settings mirrored = *settings;
     struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_brought(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
@@ -66,5 +78,9 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
         graph->passes[i].constants.alpha = pass->constants.alpha;
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
-    return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
+    if (prefilter[0] > prefilter[1])
+        return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
+    return vkb_filter_apart(adjoint, &filter, convolved, size, &convolved, error)
+        && vkb_transpose_bright(adjoint, prefilter, glow, convolved,
+                                (enum vkb_mode)pass->constants.alpha, error);
 }

@@ -80,5 +80,11 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_tran
     vkb_transpose_godot_blur;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
+// Glare. Ghosts without aberration.
+vkb_transpose vkb_transpose_streaks, vkb_transpose_ghosts, vkb_transpose_dirt;
+
+// Brings the cotangents of what a convolution's prefilter of bright colours makes of the glow.
+bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
+                          uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error);
 
 #endif

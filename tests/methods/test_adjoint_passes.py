@@ -31,15 +31,28 @@ from vkbloom.gradients.passes import DeviceGradients, Passes
 from vkbloom.sources import Inputs
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
-#: Those that are checked in all sizes, the first two with their fields.
-FIELDS = ("knee", "pyramid")
+#: Those that are checked in all sizes, the first ones with their fields.
+FIELDS = ("knee", "pyramid", "streaks")
 COMPLETE = (
     *FIELDS,
-    *("pygfx karis", "filament", "filament threshold", "hdrp", "godot threshold", "blender"),
+    *(
+        "pygfx karis",
+        "filament",
+        "filament threshold",
+        "hdrp",
+        "godot threshold",
+        "blender",
+        "ghosts",
+    ),
 )
 #: Those whose weights count negative luminances.
 NEGATIVE = ("pygfx karis",)
 BEVY = BevyBloom(max_mip_dimension=16)
+STREAKS = vkbloom.Streaks(
+    angle=10, directions=3, iterations=2, halvings=1, colour_shift=0.3, threshold=0.2
+)
+GHOSTS = vkbloom.Ghosts(threshold=0.3, maximum=0.4, vignette=0.3, halvings=0)
+KERNEL = np.random.default_rng(1).random((5, 5)) ** 8
 CASES: dict[str, Any] = {
     "separable": Separable(),
     "hard": Separable(threshold=0.5, bloom_scale=1.6),
@@ -85,6 +98,15 @@ CASES: dict[str, Any] = {
     "blender small": BlenderGlare(
         quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4
     ),
+    "blender streaks": BlenderGlare(type="streaks", threshold=0.3, streaks=3, streaks_angle=20),
+    "blender ghosts": BlenderGlare(type="ghosts", threshold=0.3, quality="medium"),
+    "blender fog": BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
+    "streaks": Separable(
+        threshold=0.3, knee=0.5, glare=(STREAKS, vkbloom.Dirt(seed=1, mode="lerp"))
+    ),
+    "ghosts": UrpBloom(threshold=0.3, glare=(GHOSTS, STREAKS)),
+    "glare alpha": Pyramid(levels=2, alpha="blur", glare=(GHOSTS, STREAKS)),
+    "psf": vkbloom.Convolution(psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5))),
 }
 
 

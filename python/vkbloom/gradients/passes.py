@@ -138,12 +138,15 @@ def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
     These are what only the composite and the threshold pass read. Published methods have
-    thresholds of their own, and some read the intensity or the exposure before the composite.
+    thresholds of their own, and some read the intensity or the exposure before the composite. With
+    glare, the intensity is that of the sum before the composite.
     """
     if settings.published or {settings.tonemap, settings.encoding} & _STEEP:
         return frozenset()
     known = frozenset(name for names in _SUMS.values() for name in names)
-    return known & frozenset(differentiable(settings))
+    return (known - {"intensity"} if settings.glare else known) & frozenset(
+        differentiable(settings)
+    )
 
 
 class DeviceGradients(Gradients):

@@ -197,7 +197,7 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
     for scale, tint in zip(stage.scales, tints, strict=True):
         distance = np.abs(scale) * np.hypot(x, y)
         weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
-        factors = np.concatenate([tint, [sum(tint) / 3] * (image.shape[2] - 3)])
+        factors = np.concatenate([tint, np.sum(tint, axis=0, keepdims=True) / 3])[: image.shape[2]]
         total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
     corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
     total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]

@@ -1,0 +1,122 @@
+// The adjoints of glare: rays of streaks, ghosts, dirt, and the prefilter of a convolution.
+#include "passes/adjoint.h"
+
+#include <stdio.h>
+
+// What is brought to an image are the cotangents of another one.
+static bool bring_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
+                      struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    if (adjoint->brought[image] == VKB_NO_IMAGE) {
+        adjoint->brought[image] = cotangents;
+        return true;
+    }
+    vkb_filter_begin(adjoint->graph, image, cotangents, &filter);
+    return vkb_bring_filter(adjoint, &filter, cotangents, image, error);
+}
+
+// Adds a row of a forward shader with a new image.
+static bool add_forward(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, uint32_t like,
+                        uint32_t *image, struct vkb_error *error)
+{
+    const struct vkb_image_row *forward = &adjoint->graph->images[like];
+    const struct vkb_size size = {forward->width, forward->height};
+
+    snprintf(row->name, sizeof row->name, "adjoint_%u", adjoint->added++);
+    if (!vkb_add_target(adjoint->graph, row->name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
+                        error))
+        return false;
+    row->targets[0] = *image;
+    return vkb_graph_add_pass(adjoint->graph, row, error);
+}
+
+// The taps are at the same distances everywhere, and there is nothing beyond the edges: the
+// transpose is the same pass with the opposite distances.
+bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                           struct vkb_error *error)
+{
+    const uint32_t source = pass->reads[0], cotangents = vkb_brought(adjoint, pass);
+    struct vkb_pass_row row = *pass;
+    uint32_t moved;
+
+    if (pass->constants.add_own && !bring_all(adjoint, cotangents, pass->reads[1], error))
+        return false;
+    row.reads[0] = row.reads[1] = cotangents;
+    row.constants.add_own = row.constants.first = 0;
+    row.params.streaks.threshold = 0.0f;
+    row.params.streaks.step_x = -pass->params.streaks.step_x;
+    row.params.streaks.step_y = -pass->params.streaks.step_y;
+    if (!add_forward(adjoint, &row, source, &moved, error))
+        return false;
+    if (!pass->constants.first)
+        return bring_all(adjoint, moved, source, error);
+    const uint32_t reads[] = {source, moved};
+    row = vkb_adjoint_row(&vkb_shader_adjoint_above_frag, reads, 2);
+    row.constants = pass->constants;
+    row.block = VKB_BLOCK_streaks;
+    row.params.streaks = pass->params.streaks;
+    return vkb_bring(adjoint, &row, source, error);
+}
+
+// Multiplies the cotangents, as it does the light.
+bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    struct vkb_pass_row row = *pass;
+    uint32_t image;
+
+    row.reads[0] = vkb_brought(adjoint, pass);
+    return add_forward(adjoint, &row, pass->reads[0], &image, error)
+        && bring_all(adjoint, image, pass->reads[0], error);
+}
+
+// An axis that is scaled about its centre.
+static void scale_axis(double scale, struct vkb_axis *axis)
+{
+    axis->step = scale;
+    axis->origin = scale * (0.5 - 0.5 * axis->to) + 0.5 * axis->from - 0.5;
+    axis->border = VKB_BORDER_ZERO;
+}
+
+bool vkb_transpose_ghosts(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                          struct vkb_error *error)
+{
+    const struct vkb_flare_params *params = &pass->params.flare;
+    const uint32_t source = pass->reads[0], target = pass->targets[0];
+    const uint32_t reads[] = {source, vkb_brought(adjoint, pass)};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_ghosts_frag, reads, 2);
+    struct vkb_filter filter;
+
+    if (pass->constants.add_own && !bring_all(adjoint, reads[1], pass->reads[1], error))
+        return false;
+    row.constants = pass->constants;
+    row.block = VKB_BLOCK_flare;
+    row.params.flare = *params;
+    for (int ghost = 0; ghost < params->count; ++ghost) {
+        row.constants.levels = ghost;
+        vkb_filter_begin(adjoint->graph, source, target, &filter);
+        scale_axis(params->ghosts[ghost][3], &filter.x);
+        scale_axis(params->ghosts[ghost][3], &filter.y);
+        if (!vkb_bring_through(adjoint, &row, &filter, source, target, error))
+            return false;
+    }
+    return true;
+}
+
+bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
+                          uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error)
+{
+    const uint32_t reads[] = {glow, cotangents};
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_bright_frag, reads, 2);
+
+    row.constants.alpha = alpha;
+    row.block = VKB_BLOCK_adjoint_bright;
+    row.params.adjoint_bright = (struct vkb_adjoint_bright_params){
+        .prefilter_min = prefilter[0],
+        .prefilter_max = prefilter[1],
+        .prefilter_factor = prefilter[2],
+    };
+    return vkb_bring(adjoint, &row, glow, error);
+}

@@ -1,0 +1,24 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The cotangents of what a stage of glare reads, from those of what is above the stage's threshold.
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+#include "lib/threshold_slope.glsl"
+
+UNIFORM_BLOCK(STREAKS_BLOCK);
+#include "lib/above_slope.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 2) uniform sampler2D cotangents;
+
+#define TARGET_BINDING 5
+#include "lib/fullscreen.glsl"
+#include "lib/adjoint.glsl"
+
+vec4 shade()
+{
+    vec4 brought = texelFetch(cotangents, PIXEL, 0);
+    if (ALPHA != ALPHA_BLUR)
+        brought.a = 0.0;
+    return gathered(back_above_threshold(texelFetch(source, PIXEL, 0), brought));
+}

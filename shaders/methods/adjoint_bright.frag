@@ -1,0 +1,35 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The cotangents of a convolution's glow, from those of what its filter of bright colours makes of it
+// (prefiltered() of padded.glsl).
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+UNIFORM_BLOCK(ADJOINT_BRIGHT_BLOCK);
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 2) uniform sampler2D cotangents;
+
+#define TARGET_BINDING 5
+#include "lib/fullscreen.glsl"
+#include "lib/adjoint.glsl"
+
+vec3 back_prefiltered(vec3 colour, vec3 brought)
+{
+    const vec3 weights = vec3(0.2126, 0.7152, 0.0722);
+    float luminance = dot(colour, weights);
+    if (luminance <= params.prefilter_min)
+        return brought;
+    float line =
+        params.prefilter_factor * (luminance - params.prefilter_min) + params.prefilter_min;
+    float ratio = min(line, params.prefilter_max) / luminance;
+    float slope = line < params.prefilter_max ? params.prefilter_factor : 0.0;
+    return ratio * brought + weights * (dot(brought, colour) * (slope - ratio) / luminance);
+}
+
+vec4 shade()
+{
+    vec4 brought = texelFetch(cotangents, PIXEL, 0);
+    brought.rgb = back_prefiltered(texelFetch(source, PIXEL, 0).rgb, brought.rgb);
+    return gathered(vec4(brought.rgb, ALPHA == ALPHA_BLUR ? brought.a : 0.0));
+}
