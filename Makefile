@@ -7,6 +7,7 @@
 # make wheels: builds the wheels of vkbloom, its driver and its compiler into dist/ (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
+# make try-core: builds the core's wheel with what this system has, and tries it in a fresh environment.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
@@ -22,14 +23,19 @@ PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) \
         $(wildcard python/vkbloom/own/glsl/*/*) python/vkbloom/own/spirv.py setup.py pyproject.toml
 
-# Test processes. All tests of a file run in one process, which makes its fixtures once.
-WORKERS := $(shell nproc 2>/dev/null || echo 2)
+# Test processes. All tests of a file run in one process, which makes its fixtures once. One process
+# more than there are cores, since some tests wait for a browser or another process.
+WORKERS := $(shell echo $$(($$(nproc 2>/dev/null || echo 2) + 1)))
+# What build/stamp/packages installs: "all", and "test", "docs" and "lint" where one call of pip is
+# to do it.
+GROUPS := all
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # One thread of lavapipe in each of them: with more they take a quarter more time from each other.
 test exhaustive check sanitize: export LP_NUM_THREADS := 1
 # Python keeps compiled modules, also where the environment says otherwise: each process would compile
-# the package again, and each run the tests' assertions.
-test exhaustive check sanitize: export PYTHONDONTWRITEBYTECODE :=
+# the package again, and each run the tests' assertions. So pip leaves to the first use what is used.
+export PYTHONDONTWRITEBYTECODE :=
+PIP_INSTALL = $(PYTHON) -m pip install --quiet --no-compile
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
@@ -38,7 +44,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
 .PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
-	freethreaded try-wheels format sanitize clean
+	freethreaded try-core try-wheels format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -71,6 +77,9 @@ wheels:
 # sanitizer.
 freethreaded: build/stamp/core
 	PYTHON=$(abspath $(PYTHON)) LP_NUM_THREADS=1 tools/free_threaded/run.sh $(CALLS)
+
+try-core: build/stamp/core
+	packaging/try_core.sh $(PYTHON)
 
 try-wheels:
 	packaging/try_bare.sh $(ROOTS)
@@ -140,29 +149,38 @@ build/stamp/system:
 
 $(PYTHON): | build/stamp/system
 	python3 -m venv $(VENV)
-	$(PYTHON) -m pip install --quiet --upgrade pip setuptools wheel
+	$(PIP_INSTALL) --upgrade pip setuptools wheel
 
 build/stamp/packages: pyproject.toml | $(PYTHON)
-	$(PYTHON) tools/requirements.py all | $(PYTHON) -m pip install --quiet -r /dev/stdin
+	$(PYTHON) tools/requirements.py $(GROUPS) | $(PIP_INSTALL) -r /dev/stdin
+	@mkdir -p $(@D) && touch $@ $(patsubst %,$(@D)/%,$(filter-out all,$(GROUPS)))
+
+# Needs no packages: make -j 2 compiles while pip installs them.
+build/stamp/compiled: $(CORE) | $(PYTHON)
+	$(PYTHON) setup.py --quiet build_ext --inplace
 	@mkdir -p $(@D) && touch $@
 
-build/stamp/core: $(CORE) build/stamp/packages
-	$(PYTHON) -m pip install --quiet --no-build-isolation --no-deps --editable .
+# Takes the objects that are compiled.
+build/stamp/core: build/stamp/compiled build/stamp/packages
+	$(PIP_INSTALL) --no-build-isolation --no-deps --editable .
 	@mkdir -p $(@D) && touch $@
 
 build/stamp/peers: benchmarks/peers.txt | $(PYTHON)
-	$(PYTHON) -m pip install --quiet -r benchmarks/peers.txt
+	$(PIP_INSTALL) -r benchmarks/peers.txt
 	@mkdir -p $(@D) && touch $@
 
-build/stamp/test: pyproject.toml | $(PYTHON)
+build/stamp/test-system: | build/stamp/system
 	tools/setup_system.sh test
-	$(PYTHON) tools/requirements.py test | $(PYTHON) -m pip install --quiet -r /dev/stdin
 	@mkdir -p $(@D) && touch $@
 
-build/stamp/docs: pyproject.toml | $(PYTHON)
-	$(PYTHON) tools/requirements.py docs | $(PYTHON) -m pip install --quiet -r /dev/stdin
+build/stamp/test: pyproject.toml | build/stamp/packages build/stamp/test-system
+	$(PYTHON) tools/requirements.py test | $(PIP_INSTALL) -r /dev/stdin
 	@mkdir -p $(@D) && touch $@
 
-build/stamp/lint: pyproject.toml | $(PYTHON)
-	$(PYTHON) tools/requirements.py lint | $(PYTHON) -m pip install --quiet -r /dev/stdin
+build/stamp/docs: pyproject.toml | build/stamp/packages
+	$(PYTHON) tools/requirements.py docs | $(PIP_INSTALL) -r /dev/stdin
+	@mkdir -p $(@D) && touch $@
+
+build/stamp/lint: pyproject.toml | build/stamp/packages
+	$(PYTHON) tools/requirements.py lint | $(PIP_INSTALL) -r /dev/stdin
 	@mkdir -p $(@D) && touch $@

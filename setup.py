@@ -8,6 +8,7 @@ import runpy
 import shutil
 import struct
 import subprocess
+import sys
 import sysconfig
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -238,13 +239,33 @@ def write_spirv() -> None:
     (SPIRV / "spirv.c").write_text(f'#include "spirv.h"\n\n{arrays}\n{objects}')
 
 
-def in_parallel(compile_all: Callable[..., list[str]]) -> Callable[..., list[str]]:
-    """Return a compiler's method that compiles each of its sources in a thread."""
+def compiled_once(compiler: Any) -> Callable[..., list[str]]:
+    """Return a compiler's method that compiles sources in threads, and keeps equal objects.
 
-    def compile_each(sources: list[str], *args: Any, **options: Any) -> list[str]:
+    An object is kept if the digest beside it is that of its source, all headers and the options.
+    """
+    compile_all = compiler.compile
+    volk = Path(volk_folder())
+    read = [*sorted(Path("csrc").rglob("*.h")), SPIRV / "spirv.h", volk / "volk.h", volk / "volk.c"]
+    headers = b"".join(path.read_bytes() for path in read)
+    program = (getattr(compiler, "compiler_so", ""), compiler.include_dirs, sys.version)
+
+    def compile_one(source: str, output_dir: str, options: dict[str, Any]) -> str:
+        (made,) = compiler.object_filenames([source], output_dir=output_dir)
+        note = Path(f"{made}.sha256")
+        # (The order of `depends` is that of the folder on the disk.)
+        asked = [(name, value) for name, value in options.items() if name != "depends"]
+        text = repr((program, asked)).encode() + headers + Path(source).read_bytes()
+        digest = hashlib.sha256(text).hexdigest()
+        if not (Path(made).exists() and note.exists() and note.read_text() == digest):
+            note.unlink(missing_ok=True)
+            compile_all([source], output_dir=output_dir, **options)
+            note.write_text(digest)
+        return str(made)
+
+    def compile_each(sources: list[str], output_dir: str, **options: Any) -> list[str]:
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            objects = threads.map(lambda one: compile_all([one], *args, **options), sources)
-            return [name for names in objects for name in names]
+            return list(threads.map(lambda one: compile_one(one, output_dir, options), sources))
 
     return compile_each
 
@@ -252,12 +273,18 @@ def in_parallel(compile_all: Callable[..., list[str]]) -> Callable[..., list[str
 class BuildCore(build_ext):
     """build_ext with the shaders compiled first and the compiler's options set."""
 
+    def initialize_options(self) -> None:
+        """Keep objects for the next build, in a folder that is the same for all ways to build."""
+        super().initialize_options()
+        self.build_temp = "build/objects"
+
     def build_extension(self, ext: Extension) -> None:
         """Build one extension, with the embedded shaders as one more source."""
         check_vulkan_headers()
         write_spirv()
         ext.include_dirs.append(str(SPIRV))
-        ext.sources.append(str(SPIRV / "spirv.c"))
+        # First, since it takes longest.
+        ext.sources.insert(0, str(SPIRV / "spirv.c"))
         if self.compiler.compiler_type == "msvc":
             ext.extra_compile_args += ["/std:c11"]
         else:
@@ -265,7 +292,7 @@ class BuildCore(build_ext):
         # Warnings are errors in CI only: a newer compiler must not stop a user's build.
         ext.extra_compile_args += os.environ.get("VKBLOOM_CFLAGS", "").split()
         ext.extra_link_args += os.environ.get("VKBLOOM_LDFLAGS", "").split()
-        self.compiler.compile = in_parallel(self.compiler.compile)
+        self.compiler.compile = compiled_once(self.compiler)
         super().build_extension(ext)
 
 

@@ -48,7 +48,7 @@ platform=manylinux_$(echo "${glibc#GLIBC_}" | tr . _)_aarch64
 "$python" -m wheel tags --remove --platform-tag "$platform" dist/*.whl
 headers=$work/sdk/include
 NM=aarch64-linux-gnu-nm "$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so \
-    build/core.map --symbols build/temp*/csrc/*/*.o --source volk - "$headers/volk.h" \
+    build/core.map --symbols build/objects/csrc/*/*.o --source volk - "$headers/volk.h" \
     "$headers/volk.c" --source Vulkan-Headers - "$headers/vulkan/vulkan_core.h"
 cd - >/dev/null
 cp "$work"/source/dist/*.whl dist/

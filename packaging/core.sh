@@ -17,6 +17,6 @@ VULKAN_SDK=/build/vulkan/usr "$python" -m pip --quiet wheel \
     --no-deps --no-build-isolation --no-index --wheel-dir dist .
 "$python" -m wheel tags --remove --platform-tag "manylinux_${CORE_GLIBC}_x86_64" dist/*.whl
 "$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so build/core.map \
-    --symbols build/temp*/csrc/*/*.o --source volk - "$headers/volk.h" "$headers/volk.c" \
+    --symbols build/objects/csrc/*/*.o --source volk - "$headers/volk.h" "$headers/volk.c" \
     --source Vulkan-Headers - "$headers/vulkan/vulkan_core.h"
 mv dist/*.whl "$wheels"

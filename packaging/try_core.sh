@@ -11,18 +11,22 @@ trap 'rm -rf "$work"' EXIT
 built() {
     mkdir "$work/$1"
     git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$work/$1"
-    # Two builds that are compared compile their shaders; for one, those that are there do.
-    if test -d build/spirv && test -z "${2:-}"; then
+    options="-ffile-prefix-map=$work/$1=."
+    # Two builds that are compared compile everything; for one, the shaders' modules and the objects
+    # that are there do.
+    if test -z "${2:-}"; then
         mkdir -p "$work/$1/build"
-        cp -rp build/spirv "$work/$1/build/"
+        for made in spirv objects; do
+            test ! -d "build/$made" || cp -rp "build/$made" "$work/$1/build/"
+        done
+        options=${VKBLOOM_CFLAGS:-}
     fi
     cd "$work/$1"
-    VKBLOOM_CFLAGS="-ffile-prefix-map=$work/$1=." \
-        VKBLOOM_LDFLAGS="-Wl,--strip-all,-Map=build/core.map" \
+    VKBLOOM_CFLAGS=$options VKBLOOM_LDFLAGS="-Wl,--strip-all,-Map=build/core.map" \
         "$python" -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
     test -z "$(command -v dpkg-query)" ||
         "$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so build/core.map \
-            --symbols build/temp*/csrc/*/*.o --source volk - /usr/include/volk.h \
+            --symbols build/objects/csrc/*/*.o --source volk - /usr/include/volk.h \
             --source Vulkan-Headers - /usr/include/vulkan/vulkan_core.h
     cd - >/dev/null
 }

@@ -1,4 +1,4 @@
-"""Print the requirements of an extra of pyproject.toml, with the package's own extras resolved.
+"""Print the requirements of extras of pyproject.toml, with the package's own extras resolved.
 
 The Makefile uses it to install packages once for each change of pyproject.toml, not for each build.
 """
@@ -13,8 +13,8 @@ from pathlib import Path
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
 
-def requirements(extra: str) -> list[str]:
-    """List the requirements of the package with this extra."""
+def requirements(*extras: str) -> list[str]:
+    """List the requirements of the package with these extras."""
     project = tomllib.loads(PROJECT.read_text())["project"]
     found: dict[str, None] = dict.fromkeys(project["dependencies"])
 
@@ -27,9 +27,10 @@ def requirements(extra: str) -> list[str]:
             for other in own[1].split(","):
                 add(other.strip())
 
-    add(extra)
+    for extra in extras:
+        add(extra)
     return list(found)
 
 
 if __name__ == "__main__":
-    print("\n".join(requirements(sys.argv[1])))
+    print("\n".join(requirements(*sys.argv[1:])))

@@ -58,3 +58,46 @@ def test_headers_that_are_there(build: ModuleType, tmp_path: Path) -> None:
         file.touch()
     build.check_vulkan_headers()
     assert build.volk_folder() == str(tmp_path / "include" / "volk")
+
+
+class Compiler:
+    """Makes empty objects, and counts them."""
+
+    include_dirs = ()
+
+    def __init__(self) -> None:
+        self.compiled: list[str] = []
+
+    def object_filenames(self, sources: list[str], output_dir: str) -> list[str]:
+        return [f"{output_dir}/{Path(source).stem}.o" for source in sources]
+
+    def compile(self, sources: list[str], output_dir: str, **_: Any) -> None:
+        self.compiled += sources
+        for made in self.object_filenames(sources, output_dir):
+            Path(made).touch()
+
+
+def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed(
+    build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "SPIRV", tmp_path)
+    monkeypatch.setattr(build, "volk_folder", lambda: str(tmp_path))
+    one, other = sources = [str(tmp_path / name) for name in ("one.c", "other.c")]
+    for name in (*sources, "spirv.h", "volk.h", "volk.c"):
+        (tmp_path / name).touch()
+
+    def compiled(*options: str) -> list[str]:
+        compiler = Compiler()
+        objects = build.compiled_once(compiler)(sources, str(tmp_path), extra_postargs=options)
+        assert objects == [str(tmp_path / name) for name in ("one.o", "other.o")]
+        return sorted(compiler.compiled)
+
+    assert compiled() == [one, other]
+    assert compiled() == []
+    Path(other).write_text("changed")
+    assert compiled() == [other]
+    (tmp_path / "spirv.h").write_text("changed")
+    assert compiled() == [one, other]
+    assert compiled("-O0") == [one, other]
+    (tmp_path / "one.o").unlink()
+    assert compiled("-O0") == [one]

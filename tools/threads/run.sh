@@ -17,8 +17,9 @@ print(setup.volk_folder())
 END
 )
 sources=$(ls csrc/*/*.c | grep -v '^csrc/python/')
+# Not optimized: the compiler takes most of the time.
 # shellcheck disable=SC2086  # file names of this repository
-${CC:-cc} -std=gnu11 -g -O1 -fno-omit-frame-pointer -Wall -Wextra -Werror -DVK_NO_PROTOTYPES \
+${CC:-cc} -std=gnu11 -g -O0 -fno-omit-frame-pointer -Wall -Wextra -Werror -DVK_NO_PROTOTYPES \
     -fsanitize=thread -Icsrc -I. -Ibuild/spirv -I"$volk" \
     $sources build/spirv/spirv.c tools/threads/threads.c -o "$folder/threads" -lm -ldl -lpthread
 exec env TSAN_OPTIONS="suppressions=$PWD/tools/threads/threads.supp:exitcode=66" \
