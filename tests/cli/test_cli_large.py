@@ -65,17 +65,19 @@ def by_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    "case",
-    [
-        ("a.png", "b.png", 3, "uint8", 0),
-        ("a.png", "b.exr", 4, "uint8", 0),
-        ("a.png", "b.jpg", 1, "uint16", 0),
-        ("a.png", "b.png", 2, "uint8", 0),
-        ("a.exr", "b.exr", 3, "float16", 16),
-        ("a.exr", "b.tif", 4, "float32", 0),
-    ],
+    ("case", "preset"),
+    by_turns(
+        [
+            ("a.png", "b.png", 3, "uint8", 0),
+            ("a.png", "b.exr", 4, "uint8", 0),
+            ("a.png", "b.jpg", 1, "uint16", 0),
+            ("a.png", "b.png", 2, "uint8", 0),
+            ("a.exr", "b.exr", 3, "float16", 16),
+            ("a.exr", "b.tif", 4, "float32", 0),
+        ],
+        turns=["bevy_natural", "kino", "jimenez2014", "tutorial"],
+    ),
 )
-@pytest.mark.parametrize("preset", ["bevy_natural", "kino", "jimenez2014", "tutorial"])
 def test_the_same_as_a_whole(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

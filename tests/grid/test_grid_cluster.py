@@ -24,7 +24,7 @@ distributed = pytest.importorskip("distributed")
 xr = pytest.importorskip("xarray")
 
 AXES: dict[str, Any] = {
-    "exposure": np.linspace(-1, 1, 8),
+    "exposure": np.linspace(-1, 1, 4),
     "blur_scale": np.linspace(0.5, 2, 6),
     "threshold": [None, 0.2],
 }
@@ -43,7 +43,7 @@ def source() -> Any:
 
 def make(store: Path, client: Any = None, **changes: Any) -> Any:
     arguments: dict[str, Any] = {
-        "chunks": {"exposure": 8},
+        "chunks": {"exposure": 4},
         "reduce": REDUCE,
         "progress": False,
         **changes,
@@ -129,7 +129,7 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(client, "submit", counting)
     made = make(tmp_path / "a.zarr", client)
     assert made["done"].values.all()
-    # Of 96 points, two for each worker. As many that are done may not have left the scheduler yet,
+    # Of 48 points, two for each worker. As many that are done may not have left the scheduler yet,
     # and there are the grid itself and the layout's two.
     assert most <= 2 * (2 * 2) + 3
 

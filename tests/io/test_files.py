@@ -23,6 +23,7 @@ import OpenImageIO as oiio
 import pytest
 
 import vkbloom.io.files
+from tests.exhaustive import by_turns
 from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, noise, read
 from vkbloom import Separable
 from vkbloom.frames import Frames
@@ -98,10 +99,15 @@ class TestExr:
         assert list(read(tmp_path / "out.EXR")) == list(frames)
 
 
-@pytest.mark.parametrize("extension", ["exr", "png", "tif"])
-@pytest.mark.parametrize("channels", [3, 4])
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (17, 1), (13, 31)])
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize(
+    ("extension", "dtype", "size", "channels"),
+    by_turns(
+        ["exr", "png", "tif"],
+        ["uint8", "float16", "float32"],
+        [(1, 1), (1, 9), (17, 1), (13, 31)],
+        turns=[3, 4],
+    ),
+)
 def test_every_size_and_dtype_comes_back(
     extension: str, channels: int, size: tuple[int, int], dtype: str, tmp_path: Path
 ) -> None:

@@ -83,8 +83,7 @@ VIEWS: dict[str, Callable[[Image], Image]] = {
 }
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize(("view", "dtype"), by_turns(VIEWS, turns=DTYPES))
 def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
     image = VIEWS[view](picture(22, 15, 4, dtype))
     before = image.copy()
@@ -165,9 +164,9 @@ def with_specials(dtype: str, channels: int, size: tuple[int, int] = (23, 17)) -
     return image
 
 
-@pytest.mark.parametrize("channels", [3, 4])
-@pytest.mark.parametrize("dtype", ["float16", "float32"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "dtype", "channels"), by_turns(METHODS, ["float16", "float32"], turns=[3, 4])
+)
 def test_nan_and_infinity_are_not_spread(
     renderer: Renderer, method: str, dtype: str, channels: int
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import vkbloom
+from tests.exhaustive import by_turns
 from tests.methods.cases import METHODS, presets_of_low_levels
 from tests.methods.reference_cases import random_image
 from vkbloom import reference
@@ -64,8 +65,7 @@ def product(one: Any, other: Any) -> float:
     return float((np.asarray(one) * np.asarray(other)).sum())
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", LINEAR)
+@pytest.mark.parametrize(("name", "size"), by_turns(LINEAR, turns=SIZES))
 def test_image_derivative_is_the_exact_transpose_of_a_linear_bloom(
     name: str, size: tuple[int, int]
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.exhaustive import by_turns
 from tests.images import hdr_picture
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
@@ -46,12 +47,14 @@ def real(array: Array) -> Array:
 # --- Godot ---
 
 
-@pytest.mark.parametrize("tonemap", CURVES)
-@pytest.mark.parametrize("composite", COMPOSITES)
-@pytest.mark.parametrize(("dtype", "channels"), [("float32", 3), ("float16", 4), ("uint8", 4)])
+@pytest.mark.parametrize(
+    ("tonemap", "composite", "stored"),
+    by_turns(CURVES, COMPOSITES, turns=[("float32", 3), ("float16", 4), ("uint8", 4)]),
+)
 def test_godots_composites(
-    renderer: Renderer, composite: Any, tonemap: Any, dtype: str, channels: int
+    renderer: Renderer, composite: Any, tonemap: Any, stored: tuple[str, int]
 ) -> None:
+    dtype, channels = stored
     settings = GodotBloom(
         composite=composite,
         tonemap=tonemap,
@@ -225,9 +228,10 @@ def test_blenders_bloom_in_buffers_of_another_size(renderer: Renderer) -> None:
 # --- pygfx ---
 
 
-@pytest.mark.parametrize("karis_average", [True, False])
-@pytest.mark.parametrize("size", [(1, 1), (2, 9), (97, 61), (128, 64)])
-@pytest.mark.parametrize("radius", [0.0, 0.005, 0.2])
+@pytest.mark.parametrize(
+    ("size", "radius", "karis_average"),
+    by_turns([(1, 1), (2, 9), (97, 61), (128, 64)], [0.0, 0.005, 0.2], turns=[True, False]),
+)
 def test_pygfx_is_its_reference(
     renderer: Renderer, size: tuple[int, int], karis_average: bool, radius: float
 ) -> None:

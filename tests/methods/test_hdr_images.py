@@ -63,7 +63,7 @@ def apply(renderer: Renderer, image: Image, settings: Settings) -> dict[str, Arr
 def test_reference(renderer: Renderer, photo: Image, method: str, dtype: str) -> None:
     settings = METHODS[method]
     # The part around its brightest pixel, so that the reference is quick.
-    image = crop(photo, 3).astype(dtype)
+    image = crop(photo, 5).astype(dtype)
     frames = renderer.apply(image, settings)
     # The files hold neither NaN nor infinity, and none comes in.
     assert (frames.info["nan"], frames.info["inf"]) == (0, 0)
@@ -75,7 +75,7 @@ def test_reference_tone_mapped(renderer: Renderer, photo: Image, tonemap: Any) -
     settings = Pyramid(
         threshold=1.0, composite="mix", intensity=0.2, tonemap=tonemap, encoding="srgb"
     )
-    image = crop(photo, 2)
+    image = crop(photo, 4)
     frames = renderer.apply(image, settings, attachments=("bloom", "final"))
     expected = reference.composite(image, frames["bloom"], settings)
     assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
@@ -124,7 +124,7 @@ def far_from(lit: NDArray[np.bool_], distance: int) -> NDArray[np.bool_]:
     return far
 
 
-@pytest.mark.parametrize("levels", [4, 5, 6])
+@pytest.mark.parametrize("levels", [4, 6])
 @pytest.mark.parametrize("method", [Pyramid, DualKawase])
 def test_no_blocks(renderer: Renderer, photo: Image, method: Any, levels: int) -> None:
     """Away from what glows, the bloom comes from the small levels alone, and must be smooth.

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.exhaustive import by_turns
 from tests.tolerance import assert_matches_reference
 from vkbloom import Pyramid, Renderer, Separable, reference
 
@@ -21,9 +22,10 @@ def image(size: tuple[int, int], dtype: str) -> NDArray[Any]:
     return (values * 255).astype(np.uint8) if dtype == "uint8" else values.astype(dtype)
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-@pytest.mark.parametrize("size", [(1, 1), (3, 2), (64, 48), (101, 67)])
+@pytest.mark.parametrize(
+    ("weights", "size", "dtype"),
+    by_turns(WEIGHTS, [(1, 1), (3, 2), (64, 48), (101, 67)], turns=["uint8", "float16", "float32"]),
+)
 def test_the_device_is_the_reference(
     renderer: Renderer, size: tuple[int, int], dtype: str, weights: tuple[float, ...]
 ) -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from tests.exhaustive import by_turns
+from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.methods.cases import presets_of_low_levels
 from tests.tolerance import real
 from vkbloom import (
@@ -87,13 +87,13 @@ def check(renderer: Renderer, image: Array, settings: Settings) -> None:
         assert_allclose(actual, values, rtol=0, atol=largest, err_msg=name)
 
 
-# Each preset in every format, at every second size: the first, or the second one.
+# Each preset in two formats, of one size each. (test_apply.py has each in one more.)
 @pytest.mark.parametrize(
     ("name", "size", "dtype"),
     [
-        row
-        for row in by_turns(PUBLISHED, SIZES, turns=FORMATS)
-        if PUBLISHED.index(row[0]) % 2 == SIZES.index(row[1]) % 2
+        (name, size, dtype)
+        for number, (name, size, dtype) in enumerate(by_turns(PUBLISHED, SIZES, turns=FORMATS))
+        if EXHAUSTIVE or number % 6 in (number // 6 % 3, 3 + (number // 6 + 1) % 3)
     ],
 )
 def test_a_preset_is_its_reference(
@@ -136,14 +136,6 @@ def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_negative_colours(renderer: Renderer, name: str) -> None:
-    image = lights((41, 29), "float32") * 4 - 3
-    # Where 1 + luminance is 0.
-    image[:12, :16] = -1
-    check(renderer, image, LOW[name].replace(format="rgba32float"))
-
-
-@pytest.mark.parametrize("name", PUBLISHED)
 def test_nan_and_infinity_are_not_spread(renderer: Renderer, name: str) -> None:
     image = lights((33, 21), "float32")
     image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
@@ -176,10 +168,11 @@ def test_a_scene_is_blurred_as_an_image_is(renderer: Renderer, name: str) -> Non
 # Not those of a preset, by the size of the image.
 OTHER_SETTINGS: dict[tuple[int, int], list[Settings]] = {
     (91, 53): [
-        # Bloom::OLD_SCHOOL and Bloom::SCREEN_BLUR
-        BevyBloom(intensity=0.05, threshold=0.6, knee=0.2, composite="add"),
+        # Bloom::OLD_SCHOOL and Bloom::SCREEN_BLUR, of fewer levels
+        BevyBloom(intensity=0.05, threshold=0.6, knee=0.2, composite="add", max_mip_dimension=64),
         BevyBloom(
             intensity=1.0,
+            max_mip_dimension=64,
             low_frequency_boost=0.0,
             low_frequency_boost_curvature=0.0,
             high_pass_frequency=1 / 3,
@@ -450,8 +443,9 @@ def test_an_anamorphic_bloom_is_stretched(
 @pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
 def test_hdrps_cubic_filter_is_for_larger_frames(renderer: Renderer, size: tuple[int, int]) -> None:
     settings = HdrpBloom(format="rgba32float")
-    image = lights(size, "float32")
-    last = renderer.apply(image, settings, attachments="up_0")["up_0"][..., :3]
+    # The reference of one channel takes a third of the time.
+    image = lights(size, "float32")[..., :1]
+    last = renderer.apply(image.repeat(3, axis=2), settings, attachments="up_0")["up_0"][..., :1]
     smooth, linear = (
         reference.passes(image, settings.replace(high_quality_filtering=high))["up_0"]
         for high in (True, False)

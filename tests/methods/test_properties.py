@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from tests.exhaustive import examples
+from tests.exhaustive import by_turns, examples
 from tests.tolerance import tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference, testing
 from vkbloom.testing import Probe
@@ -51,7 +51,7 @@ FLOATS = ("float16", "float32")
 ERRORS = {"float16": 2e-3, "float32": 1e-5, "float64": 1e-12}
 BOTH = pytest.mark.parametrize("dtype", ["float32", "float64"], ids=["device", "reference"])
 
-few = hypothesis.settings(max_examples=examples(4), deadline=None)
+few = hypothesis.settings(max_examples=examples(2), deadline=None)
 
 
 def bloom_of(renderer: Renderer, image: Image, settings: Settings) -> Array:
@@ -142,8 +142,7 @@ def test_point_stays_in_place_and_keeps_its_energy(
 # --- Exact laws ---
 
 
-@pytest.mark.parametrize("dtype", FLOATS)
-@pytest.mark.parametrize("method", [*LINEAR, "threshold"])
+@pytest.mark.parametrize(("method", "dtype"), by_turns([*LINEAR, "threshold"], turns=FLOATS))
 @few
 @hypothesis.given(picture=pictures, power=st.integers(-3, 8))
 def test_powers_of_two_scale_the_bloom_exactly(
@@ -261,8 +260,7 @@ def test_ramp_stays_in_place(
 # --- Bounds ---
 
 
-@pytest.mark.parametrize("dtype", ["uint8", *FLOATS])
-@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize(("method", "dtype"), by_turns(ALL, turns=["uint8", *FLOATS]))
 @few
 @hypothesis.given(picture=pictures, seed=seeds)
 def test_nothing_is_negative(

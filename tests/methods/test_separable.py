@@ -127,23 +127,25 @@ def test_bloom_buffers_of_1280_x_720(renderer: Renderer, blur_scale: float, form
     assert_is_the_references(frames, settings, format)
 
 
-@pytest.mark.parametrize("format", FORMATS)
-@pytest.mark.parametrize("direct", [False, True])
 @pytest.mark.parametrize(
-    ("buffers", "frame"),
-    [
-        ((64, 64), (128, 72)),
-        ((64, 64), (32, 32)),
-        ((31, 17), (100, 50)),
-        ((120, 40), (50, 61)),
-        ((1, 1), (20, 10)),
-        ((20, 10), (1, 1)),
-    ],
-    ids=str,
+    ("sizes", "direct", "format"),
+    by_turns(
+        [
+            ((64, 64), (128, 72)),
+            ((64, 64), (32, 32)),
+            ((31, 17), (100, 50)),
+            ((120, 40), (50, 61)),
+            ((1, 1), (20, 10)),
+            ((20, 10), (1, 1)),
+        ],
+        [False, True],
+        turns=FORMATS,
+    ),
 )
 def test_buffers_of_another_size_than_the_frame(
-    renderer: Renderer, buffers: Size, frame: Size, direct: bool, format: Format
+    renderer: Renderer, sizes: tuple[Size, Size], direct: bool, format: Format
 ) -> None:
+    buffers, frame = sizes
     settings = Separable(blur_scale=1.2, texel="x", direct=direct, format=format)
     image = noise(buffers, brightest(format))
     assert_is_the_references(render(renderer, image, settings, frame), settings, format)
@@ -264,9 +266,10 @@ def kernel_variance(settings: Separable, texel: float) -> float:
     return moment / total
 
 
-@pytest.mark.parametrize("format", FLOATS)
-@pytest.mark.parametrize("texel", ["own", "x"])
-@pytest.mark.parametrize("blur_scale", [0.0, 0.35, 0.5, 1.0, 1.37, 2.0, 3.0, 4.0])
+@pytest.mark.parametrize(
+    ("blur_scale", "texel", "format"),
+    by_turns([0.0, 0.35, 0.5, 1.0, 1.37, 2.0, 3.0, 4.0], ["own", "x"], turns=FLOATS),
+)
 def test_the_spread_of_a_point(
     renderer: Renderer, blur_scale: float, texel: Literal["own", "x"], format: Format
 ) -> None:

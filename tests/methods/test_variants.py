@@ -122,6 +122,8 @@ def varied(variant: str, unfused: Renderer) -> Iterator[Renderer]:
         yield renderer
 
 
+# The variant of the fixture `renderer` has the same comparison in test_apply.py.
+@pytest.mark.parametrize("variant", ["fragment", "gpu"], indirect=True, scope="module")
 @pytest.mark.parametrize(
     ("method", "other"), by_turns(TWO_PASSES, turns=itertools.product(DTYPES, SIZES))
 )

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tests.exhaustive import by_turns
 from tests.plugin.broken_laws import fails
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, gaussian_weights, reference, testing
 from vkbloom.testing import Probe
@@ -65,22 +66,29 @@ PLUS = kernel([[0, 0.125, 0], [0.125, 0.5, 0.125], [0, 0.125, 0]])
 SEEING_BLACK = kernel([[1 / 9] * 3] * 3, mode="constant")
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4])
-@pytest.mark.parametrize("blur", [GAUSSIAN, BOX, IDENTITY], ids=["gaussian", "box", "identity"])
-def test_blurs_that_keep_all_laws(blur: Bloom, channels: int | None, dtype: str) -> None:
+# With their spreads.
+BLURS = {"gaussian": (GAUSSIAN, 1.5), "box": (BOX, (2 / 3) ** 0.5), "identity": (IDENTITY, 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype", "channels"), by_turns(BLURS, DTYPES, turns=[None, 1, 2, 3, 4])
+)
+def test_blurs_that_keep_all_laws(name: str, dtype: str, channels: int | None) -> None:
+    blur, sigma = BLURS[name]
     probe = Probe(size=(41, 33), channels=channels, dtype=dtype)
     testing.assert_superposition(blur, probe)
     testing.assert_gain(blur, 1.0, probe)
     testing.assert_symmetric(blur, probe, axes=("x", "y", "xy"))
     testing.assert_centroid_kept(blur, probe)
     testing.assert_separable(blur, probe)
-    testing.assert_spread(blur, {GAUSSIAN: 1.5, BOX: (2 / 3) ** 0.5, IDENTITY: 0.0}[blur], probe)
+    testing.assert_spread(blur, sigma, probe)
     testing.assert_no_ringing(blur, probe)
 
 
-@pytest.mark.parametrize("format", ["rgba8unorm", "rgba16float", "rgba32float"])
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize(
+    ("dtype", "format"),
+    by_turns(["uint8", "float16", "float32"], turns=["rgba8unorm", "rgba16float", "rgba32float"]),
+)
 def test_separable_on_the_device(renderer: Renderer, dtype: str, format: Any) -> None:
     settings = Separable(weights=gaussian_weights(1.5, 6), blur_strength=1.0, format=format)
     probe = Probe(size=(41, 33), dtype=dtype)

@@ -302,19 +302,21 @@ def test_the_soft_threshold(renderer: Renderer) -> None:
 # The composite
 
 
-@pytest.mark.parametrize("turns", [0.0, 0.37, 0.81])
 @pytest.mark.parametrize(
-    "settings",
-    [
-        Separable(),
-        Separable(blur_scale=0.6, blur_strength=0.7),
-        Separable(blur_strength=8.0),
-        Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))),
-        Separable(first_tap=0, texel="x", bloom_size=(200, 50)),
-        Separable(direct=True, bloom_scale=0.25),
-        Separable(format="rgba16float", bloom_scale=0.5),
-        Separable(format="rgba32float"),
-    ],
+    ("settings", "turns"),
+    by_turns(
+        [
+            Separable(),
+            Separable(blur_scale=0.6, blur_strength=0.7),
+            Separable(blur_strength=8.0),
+            Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))),
+            Separable(first_tap=0, texel="x", bloom_size=(200, 50)),
+            Separable(direct=True, bloom_scale=0.25),
+            Separable(format="rgba16float", bloom_scale=0.5),
+            Separable(format="rgba32float"),
+        ],
+        turns=[0.0, 0.37, 0.81],
+    ),
 )
 def test_final_is_scene_plus_bloom(
     renderer: Renderer, scene: Scene, settings: Separable, turns: float
