@@ -74,8 +74,9 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
             && !vkb_filter_apart(adjoint, &filter, source.glow, extended, &source.glow, error))
         || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
         return false;
+    // The alpha is one of a cotangent, not 1.
     for (uint32_t i = first; i < graph->pass_count; ++i)
-        graph->passes[i].constants.alpha = pass->constants.alpha;
+        graph->passes[i].constants.alpha = ALPHA_BLUR;
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
     if (prefilter[0] > prefilter[1])

@@ -17,7 +17,7 @@ static bool bring_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t
     return vkb_bring_filter(adjoint, &filter, cotangents, image, error);
 }
 
-// Adds a row of a forward shader with a new image.
+// Adds a row of a forward shader with a new image. Its alpha is one of a cotangent, not 1.
 static bool add_forward(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, uint32_t like,
                         uint32_t *image, struct vkb_error *error)
 {
@@ -29,6 +29,7 @@ static bool add_forward(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, u
                         error))
         return false;
     row->targets[0] = *image;
+    row->constants.alpha = ALPHA_BLUR;
     return vkb_graph_add_pass(adjoint->graph, row, error);
 }
 

@@ -45,14 +45,28 @@ static float weight_of(const struct axis *axis, uint32_t texel, uint32_t pixel, 
                          : axis->texels[place + reader / 4][reader % 4];
 }
 
-// The most pixels that read one of `side` adjacent texels, from multiples of `side` on.
-static uint32_t span_of(const struct axis *axis, uint32_t side)
+// The number of pixels that read the texels of a block, of which *first is the first one. Those of
+// an axis that is mirrored come in the opposite order.
+static uint32_t readers_of(const struct axis *axis, uint32_t texel, uint32_t *first)
 {
-    uint32_t most = 1;
+    float low = entry_of(axis, texel)[0], high = 0.0f;
 
-    for (uint32_t texel = 0; texel < axis->size; texel += side) {
-        const float *first = entry_of(axis, texel), *last = entry_of(axis, texel + side - 1);
-        const uint32_t span = (uint32_t)(last[0] + last[1] - first[0]);
+    for (uint32_t i = 0; i < ADJOINT_SIDE; ++i) {
+        const float *entry = entry_of(axis, texel + i);
+        low = fminf(low, entry[0]);
+        high = fmaxf(high, entry[0] + entry[1]);
+    }
+    *first = (uint32_t)low;
+    return (uint32_t)(high - low);
+}
+
+// The most pixels that read a block of texels.
+static uint32_t span_of(const struct axis *axis)
+{
+    uint32_t most = 1, first;
+
+    for (uint32_t texel = 0; texel < axis->size; texel += ADJOINT_SIDE) {
+        const uint32_t span = readers_of(axis, texel, &first);
         most = span > most ? span : most;
     }
     return most;
@@ -77,7 +91,8 @@ static bool add_blocks(const struct axis *axis, uint32_t span, struct blocks *to
         return false;
     to->count += blocks;
     for (uint32_t block = 0; block < blocks; ++block) {
-        const uint32_t first = (uint32_t)entry_of(axis, block * ADJOINT_SIDE)[0];
+        uint32_t first;
+        readers_of(axis, block * ADJOINT_SIDE, &first);
         if (!vkb_grow(error, &to->texels, &to->capacity, to->count + list, sizeof *to->texels))
             return false;
         for (uint32_t i = 0; i < list; ++i)
@@ -130,12 +145,12 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
         memcpy(table.texels, image->pixels, texels * sizeof *table.texels);
     table.count = texels;
     if (done && direction != DIRECTION_VERTICAL) {
-        const uint32_t span = span_of(&x, ADJOINT_SIDE);
+        const uint32_t span = span_of(&x);
         row->constants.radix_1 = (int32_t)span - 1;
         done = add_blocks(&x, span, &table, &start_x, error);
     }
     if (done && direction != DIRECTION_HORIZONTAL) {
-        const uint32_t span = span_of(&y, ADJOINT_SIDE);
+        const uint32_t span = span_of(&y);
         row->constants.radix_2 = (int32_t)span - 1;
         done = add_blocks(&y, span, &table, &start_y, error);
     }
@@ -166,8 +181,8 @@ static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row 
     const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
     const uint32_t kernels = x.kernels ? (uint32_t)x.kernels : 1;
 
-    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x, ADJOINT_SIDE) <= most)
-        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y, ADJOINT_SIDE) <= most);
+    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x) <= most)
+        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y) <= most);
 }
 
 static bool are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

@@ -198,6 +198,21 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             assert np.array_equal(again["image"], found["image"])
 
 
+def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
+    """Also where the image itself is the source, and cotangents of the bloom go to it directly."""
+    image = random_image(9, 14, channels=4, seed=1).astype(np.float32)
+    cotangents = {"final": random_image(9, 14, channels=4, seed=2).astype(np.float32)}
+    streaks = vkbloom.Streaks(halvings=0, iterations=1)
+    for settings in (
+        Separable(glare=(streaks, streaks, vkbloom.Dirt(seed=1))),
+        Separable(glare=(vkbloom.Streaks(halvings=1, iterations=1),)),
+        vkbloom.Convolution(psf=KERNEL),
+    ):
+        found = renderer.vjp(image, settings)[1](cotangents)
+        assert isinstance(found, DeviceGradients)
+        check(found, reference.vjp(image, settings)[1](cotangents), "image")
+
+
 #: Methods whose first passes read the mask.
 MASKED = (
     BEVY,
