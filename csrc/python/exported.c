@@ -166,6 +166,45 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
     return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
+// A producer that knows no versions of DLPack raises TypeError for `max_version`.
+static PyObject *call_dlpack(PyObject *image, void *stream)
+{
+    PyObject *method = PyObject_GetAttrString(image, "__dlpack__");
+    PyObject *nothing = PyTuple_New(0);
+    PyObject *options =
+        Py_BuildValue("{sNs(ii)}", "stream", PyLong_FromVoidPtr(stream), "max_version", 1, 0);
+    PyObject *capsule = NULL;
+
+    if (method && nothing && options) {
+        capsule = PyObject_Call(method, nothing, options);
+        if (!capsule && PyErr_ExceptionMatches(PyExc_TypeError)) {
+            PyErr_Clear();
+            if (PyDict_DelItemString(options, "max_version") == 0)
+                capsule = PyObject_Call(method, nothing, options);
+        }
+    }
+    Py_XDECREF(method);
+    Py_XDECREF(nothing);
+    Py_XDECREF(options);
+    return capsule;
+}
+
+PyObject *vkb_renderer_dlpack(PyObject *object, PyObject *image)
+{
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+    struct vkb_error error = {0};
+
+    VKB_LOCK(vkb_memory);
+    struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    VKB_UNLOCK(vkb_memory);
+    // PyTorch exports only tensors of the current device.
+    if (!exports || !vkb_cuda_enter(exports->cuda, &error))
+        return vkb_raise(state, &error);
+    PyObject *capsule = call_dlpack(image, vkb_cuda_stream(exports->cuda));
+    vkb_cuda_leave(exports->cuda);
+    return capsule;
+}
+
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));

@@ -298,6 +298,8 @@ static PyMethodDef methods[] = {
     {"cuda", vkb_renderer_cuda, METH_NOARGS,
      "cuda() -> (ordinal, stream). Opens CUDA for the renderer's GPU, if it is one of its."},
     {"cuda_name", vkb_renderer_cuda_name, METH_O, "cuda_name(ordinal) -> name and UUID."},
+    {"dlpack", vkb_renderer_dlpack, METH_O,
+     "dlpack(array) -> a capsule of DLPack, ordered for the renderer's stream."},
     {"export", vkb_renderer_export, METH_O,
      "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
     {"snapshot", vkb_renderer_snapshot, METH_VARARGS,

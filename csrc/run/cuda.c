@@ -261,6 +261,16 @@ void vkb_cuda_close(struct vkb_cuda *cuda)
     vkb_free(cuda);
 }
 
+bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    return enter(cuda, error);
+}
+
+void vkb_cuda_leave(struct vkb_cuda *cuda)
+{
+    leave(cuda, true);
+}
+
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda)
 {
     return cuda->ordinal;

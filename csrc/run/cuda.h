@@ -24,6 +24,10 @@ struct vkb_cuda_memory {
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error);
 void vkb_cuda_close(struct vkb_cuda *cuda);
 
+// Makes the context the current one of this thread until vkb_cuda_leave.
+bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error);
+void vkb_cuda_leave(struct vkb_cuda *cuda);
+
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
 // As other libraries get it.
 void *vkb_cuda_stream(const struct vkb_cuda *cuda);

@@ -359,18 +359,14 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
         raise ValueError(
             f"{name}: it is in managed (unified) memory; copy it to the device's own memory"
         )
-    ours, stream = core.cuda()
+    ours, _ = core.cuda()
     if ordinal != ours:
         raise ValueError(
             f"{name}: it is on {core.cuda_name(ordinal)}, and the renderer is on "
             f"{core.cuda_name(ours)}; open a renderer with the array's GPU as adapter, or move the "
             "array"
         )
-    try:
-        capsule = image.__dlpack__(stream=stream, max_version=(1, 0))
-    except TypeError:
-        # Of a producer that knows no versions.
-        capsule = image.__dlpack__(stream=stream)
+    capsule = core.dlpack(image)
     address, (kind, _), (code, bits, lanes), shape, strides = _core.read_dlpack(capsule)
     if kind != _CUDA:
         raise ValueError(f"{name}: its DLPack capsule is of device type {kind}, not 2 (CUDA)")

@@ -44,6 +44,8 @@ class OnDevice:
         return self.device
 
     def __dlpack__(self, *, stream: int | None = None) -> Any:
+        # PyTorch refuses to export tensors of another device than the current one.
+        assert ctypes.CDLL("libcuda.so.1").stand_in_current() == 1
         self.streams.append(stream)
         capsule = self.array.__dlpack__()
         tensor = _get(capsule, b"dltensor")
