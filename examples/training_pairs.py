@@ -20,6 +20,7 @@ As a program, it writes pairs into a folder::
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ LENSES = 16
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
+@functools.lru_cache(LENSES)
 def lens(seed: int, number: int) -> Any:
     """Return the point spread of an iris: `number` of the lenses of a seed."""
     rng = np.random.default_rng((seed, number))
@@ -79,6 +81,14 @@ def random_settings(seed: int, index: int) -> vkbloom.Settings:
     )
 
 
+@functools.lru_cache
+def weights_like(dtype: Any, device: Any) -> Any:
+    """Return the weights of the luminance as a tensor; to make one waits for the GPU."""
+    import torch  # noqa: PLC0415  only for tensors
+
+    return torch.tensor(LUMINANCE, dtype=dtype, device=device)
+
+
 def make_pair(renderer: vkbloom.Renderer, image: Any, settings: vkbloom.Settings) -> dict[str, Any]:
     """Return the pair of an image: arrays of NumPy, or tensors of its GPU."""
     made = renderer.apply(image, settings, attachments="final")["final"]
@@ -86,7 +96,7 @@ def make_pair(renderer: vkbloom.Renderer, image: Any, settings: vkbloom.Settings
         import torch  # noqa: PLC0415  only for tensors
 
         glared: Any = torch.from_dlpack(made)
-        weights: Any = torch.tensor(LUMINANCE, dtype=glared.dtype, device=glared.device)
+        weights: Any = weights_like(glared.dtype, glared.device)
     else:
         glared, weights = made, np.array(LUMINANCE, made.dtype)
     glare = glared - image
