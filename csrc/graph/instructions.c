@@ -48,12 +48,32 @@ static bool set(uint32_t *value, uint32_t number)
     return true;
 }
 
+static bool compare(uint32_t opcode, uint32_t x, uint32_t y, uint32_t *value)
+{
+    // Comparisons of signed integers have odd opcodes.
+    const uint32_t sign = (opcode & 1) << 31;
+
+    switch (opcode) {
+    case SPV_U_GREATER:
+    case SPV_S_GREATER:
+        return set(value, (x ^ sign) > (y ^ sign));
+    case SPV_U_GREATER_EQUAL:
+    case SPV_S_GREATER_EQUAL:
+        return set(value, (x ^ sign) >= (y ^ sign));
+    case SPV_U_LESS:
+    case SPV_S_LESS:
+        return set(value, (x ^ sign) < (y ^ sign));
+    case SPV_U_LESS_EQUAL:
+    case SPV_S_LESS_EQUAL:
+        return set(value, (x ^ sign) <= (y ^ sign));
+    }
+    return false;
+}
+
 bool vkb_arithmetic(uint32_t opcode, uint32_t x, uint32_t y, uint32_t *value)
 {
     // Where signs make no difference.
     const bool divides = y != 0 && !((x | y) >> 31);
-    // Comparisons of signed integers have odd opcodes.
-    const uint32_t sign = (opcode & 1) << 31;
 
     switch (opcode) {
     case SPV_S_NEGATE:
@@ -87,18 +107,6 @@ bool vkb_arithmetic(uint32_t opcode, uint32_t x, uint32_t y, uint32_t *value)
         return set(value, x || y);
     case SPV_LOGICAL_AND:
         return set(value, x && y);
-    case SPV_U_GREATER:
-    case SPV_S_GREATER:
-        return set(value, (x ^ sign) > (y ^ sign));
-    case SPV_U_GREATER_EQUAL:
-    case SPV_S_GREATER_EQUAL:
-        return set(value, (x ^ sign) >= (y ^ sign));
-    case SPV_U_LESS:
-    case SPV_S_LESS:
-        return set(value, (x ^ sign) < (y ^ sign));
-    case SPV_U_LESS_EQUAL:
-    case SPV_S_LESS_EQUAL:
-        return set(value, (x ^ sign) <= (y ^ sign));
     case SPV_SHIFT_RIGHT_LOGICAL:
         return y < 32 && set(value, x >> y);
     case SPV_SHIFT_RIGHT_ARITHMETIC:
@@ -112,5 +120,5 @@ bool vkb_arithmetic(uint32_t opcode, uint32_t x, uint32_t y, uint32_t *value)
     case SPV_BITWISE_AND:
         return set(value, x & y);
     }
-    return false;
+    return compare(opcode, x, y, value);
 }

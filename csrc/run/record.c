@@ -80,13 +80,31 @@ static void write_resource(const struct vkb_run *run, const struct vkb_resource 
     };
 }
 
+// Fills in the descriptor of the image that the pass reads as number `i`.
+static bool write_read(struct vkb_run *run, const struct binding *binding, uint32_t i,
+                       VkDescriptorImageInfo *info, VkWriteDescriptorSet *write,
+                       struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = binding->pass;
+
+    *write = (VkWriteDescriptorSet){
+        .dstBinding = i + 1,
+        .descriptorType = vkb_pass_binding_types(pass).read,
+        .pImageInfo = info,
+    };
+    if (pass->reading != VKB_READING_WORDS)
+        return read_image(run, pass, binding->surface, i, info, error);
+    struct vkb_image *image = &run->images[pass->reads[i]]->image;
+    write->pTexelBufferView = &image->words;
+    return vkb_image_words(run->device, image, error);
+}
+
 // Fills the set with the parameters, the images read, the resources and the target of a dispatch.
 static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
                               VkDescriptorSet set, struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
-    const struct vkb_binding_types types = vkb_pass_binding_types(pass);
     VkDescriptorImageInfo images[VKB_MAX_DESCRIPTORS];
     VkDescriptorBufferInfo buffers[VKB_MAX_RESOURCES];
     VkWriteDescriptorSet writes[VKB_MAX_DESCRIPTORS + 1];
@@ -101,22 +119,9 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .pBufferInfo = &params,
         };
-    for (uint32_t i = 0; i < image_count; ++i) {
-        writes[write_count] = (VkWriteDescriptorSet){
-            .dstBinding = i + 1,
-            .descriptorType = types.read,
-            .pImageInfo = &images[i],
-        };
-        if (pass->reading == VKB_READING_WORDS) {
-            struct vkb_image *image = &run->images[pass->reads[i]]->image;
-            if (!vkb_image_words(run->device, image, error))
-                return false;
-            writes[write_count].pTexelBufferView = &image->words;
-        } else if (!read_image(run, pass, binding->surface, i, &images[i], error)) {
+    for (uint32_t i = 0; i < image_count; ++i)
+        if (!write_read(run, binding, i, &images[i], &writes[write_count++], error))
             return false;
-        }
-        ++write_count;
-    }
     for (uint32_t i = 0; i < pass->resource_count; ++i) {
         write_resource(run, pass->resources[i], &images[image_count + i], &buffers[i],
                        &writes[write_count]);
@@ -131,7 +136,7 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         };
         writes[write_count++] = (VkWriteDescriptorSet){
             .dstBinding = last + 1,
-            .descriptorType = types.target,
+            .descriptorType = vkb_pass_binding_types(pass).target,
             .pImageInfo = &images[last],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };

@@ -93,18 +93,13 @@ static bool has_scalar_layout(const struct vkb_device *device)
     return layout.scalarBlockLayout;
 }
 
-static bool create_logical(struct vkb_device *device, struct vkb_error *error)
+// Finds the optional extensions that the device can use, and what they are for.
+static bool choose_extensions(struct vkb_device *device, const char *extensions[4], uint32_t *count,
+                              struct vkb_error *error)
 {
-    const struct vkb_instance_table *vk = &device->instance->vk;
-    const VkPhysicalDeviceFeatures available = available_features(device);
-    const char *extensions[4];
-    uint32_t extension_count = 0;
-    VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
-        .scalarBlockLayout = VK_TRUE,
-    };
     bool has_import;
 
+    *count = 0;
     if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
         || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
         || !has_extension(device, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME, &device->exports, error)
@@ -113,21 +108,37 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
         return false;
     if (has_import && imports_buffers(device)) {
         device->import_alignment = import_alignment(device);
-        extensions[extension_count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+        extensions[(*count)++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
     }
     device->exports = device->exports
                    && (external_features(device, vkb_device_export_usage(),
                                          VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT)
                        & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT);
     if (device->exports)
-        extensions[extension_count++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
+        extensions[(*count)++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
     // It depends on the instance's extension.
     device->presents = device->presents && device->instance->surfaces;
     if (device->presents)
-        extensions[extension_count++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+        extensions[(*count)++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
     device->scalar_layout = device->scalar_layout && has_scalar_layout(device);
     if (device->scalar_layout)
-        extensions[extension_count++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
+        extensions[(*count)++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
+    return true;
+}
+
+static bool create_logical(struct vkb_device *device, struct vkb_error *error)
+{
+    const struct vkb_instance_table *vk = &device->instance->vk;
+    const VkPhysicalDeviceFeatures available = available_features(device);
+    const char *extensions[4];
+    uint32_t extension_count;
+    VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
+        .scalarBlockLayout = VK_TRUE,
+    };
+
+    if (!choose_extensions(device, extensions, &extension_count, error))
+        return false;
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
     return VK(error,
               vk->vkCreateDevice(

@@ -1,4 +1,4 @@
-"""The C core's folders include each other in one direction."""
+"""The C core's folders include each other in one direction; functions are short."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 CORE = Path(__file__).parents[2] / "csrc"
+SHADERS = CORE.parent / "shaders"
 ORDER = ("vulkan", "graph", "scene", "passes", "methods", "variants", "run", "python")
 
 
@@ -49,6 +50,17 @@ def test_files_do_not_use_each_other_in_a_circle() -> None:
             for file, text in texts.items()
         }
     )
+
+
+def test_functions_have_at_most_60_lines_of_code() -> None:
+    longest = {}
+    for file in [*CORE.glob("*/*.[ch]"), *SHADERS.glob("*/*.*")]:
+        text = re.sub(r"//.*|/\*(?s:.*?)\*/", "", file.read_text("utf-8"))
+        functions = re.findall(r"^\w[^{};]*\n\{\n(?s:.*?)^\}$", text, re.MULTILINE)
+        lines = (sum(bool(line.strip()) for line in one.split("\n")) for one in functions)
+        longest[file.name] = max(lines, default=0)
+    assert longest["record.c"] > 20
+    assert {name: lines for name, lines in longest.items() if lines > 60} == {}
 
 
 def order_of(users: dict[str, set[str]]) -> list[str]:
