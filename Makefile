@@ -4,12 +4,14 @@
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
-# make wheels: builds the wheels of vkbloom, its driver and its compiler into dist/ (docs/releasing.md); as root.
+# make wheels: builds the wheels of vkbloom, its driver and its compiler for x86-64 and aarch64 into dist/
+#   (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
 # make try-core: builds the core's wheel with what this system has, and tries it in a fresh environment.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
+# make test-aarch64: runs the fast part of the tests with the aarch64 wheels of dist/ under QEMU; as root.
 # make engines: compares with Blender and pygfx as they run; needs Python 3.11 and 2 GB of disk.
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
@@ -44,7 +46,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
 .PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
-	freethreaded try-core try-wheels format sanitize clean
+	freethreaded try-core try-wheels test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -75,7 +77,7 @@ wheels:
 
 # Both Pythons are built once, in build/free_threaded. CALLS: how many, and how many of them under the
 # sanitizer.
-freethreaded: build/stamp/core
+freethreaded: build/stamp/core build/stamp/test
 	PYTHON=$(abspath $(PYTHON)) LP_NUM_THREADS=1 tools/free_threaded/run.sh $(CALLS)
 
 try-core: build/stamp/core
@@ -83,6 +85,9 @@ try-core: build/stamp/core
 
 try-wheels:
 	packaging/try_bare.sh $(ROOTS)
+
+test-aarch64:
+	packaging/aarch64.sh $(FAST)
 
 # BENCH: options for python -m benchmarks.
 bench: build/stamp/core build/stamp/peers

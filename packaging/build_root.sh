@@ -1,7 +1,8 @@
 #!/bin/sh
 # Makes the root that the wheels are built in: Debian 11 with glibc 2.31, GCC 10 and a static
-# LLVM 16; Python 3.11 from Debian 12's source; glslang's source as Debian 12 has it, Mesa's as
-# Debian 13 has it; volk and the Vulkan headers of Debian 12. As root, with mmdebstrap.
+# LLVM 16, both also for aarch64; Python 3.11 from Debian 12's source; glslang's source as Debian 12
+# has it, Mesa's as Debian 13 has it; volk and the Vulkan headers of Debian 12. As root, with
+# mmdebstrap.
 # DEBIAN_MIRROR, DEBIAN_SECURITY_MIRROR: by default what this system's apt uses.
 # Argument: the folder to make.
 set -eu
@@ -14,7 +15,7 @@ mkdir -p "$(dirname "$root")"
 mmdebstrap --mode=root --variant=minbase --quiet \
     --aptopt='Acquire::Check-Valid-Until "false"' \
     --include=ca-certificates,g++,make,ninja-build,bison,flex,patch,pkg-config,glslang-tools,xz-utils \
-    --include="llvm-$LLVM-dev,zlib1g-dev,libzstd-dev,libffi-dev,libssl-dev" \
+    --include="llvm-$LLVM-dev,zlib1g-dev,libzstd-dev,libffi-dev,libssl-dev,g++-aarch64-linux-gnu" \
     --customize-hook='upload /usr/share/keyrings/debian-archive-keyring.gpg /etc/apt/sources.gpg' \
     --customize-hook="cat >\"\$1/etc/apt/sources.list.d/sources.list\" <<-END
 		deb-src [signed-by=/etc/apt/sources.gpg] $mirror bookworm main

@@ -6,6 +6,7 @@ mkdir -p /build/fetched
 cd /build/fetched
 # apt's sandbox user must be able to write here.
 chmod 777 .
+dpkg --add-architecture arm64
 apt-get update -qq
 source_version() {
     apt-cache showsrc "$1" | sed -n 's/^Version: //p' | grep "^$2-" | sort | tail -n 1
@@ -22,6 +23,19 @@ tar -xf "python3.11_$PYTHON".orig.tar.?z -C /build
 for package in *.deb; do
     dpkg -x "$package" /build/vulkan
 done
+
+# Of arm64, only what is linked, in the versions that are installed for this machine. dpkg records it
+# in a database of its own, for the SBOM.
+sysroot=/opt/aarch64
+mkdir -p "$sysroot/var/lib/dpkg/updates" "$sysroot/var/lib/dpkg/info" arm64
+touch "$sysroot/var/lib/dpkg/status"
+cd arm64
+chmod 777 .
+# shellcheck disable=SC2046  # three packages
+apt-get download -qq $(dpkg-query -W -f '${binary:Package} ${Version}\n' \
+    "llvm-$LLVM-dev" zlib1g-dev libzstd-dev | sed 's/\(:amd64\)\? /:arm64=/')
+dpkg --root="$sysroot" --force-architecture --force-depends --unpack ./*.deb
+dpkg --remove-architecture arm64
 
 cd "/build/Python-$PYTHON"
 ./configure --quiet --prefix=/opt/python >/dev/null

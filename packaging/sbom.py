@@ -133,16 +133,24 @@ def used_files(linker_map: str) -> list[Path]:
     return sorted({Path(os.path.realpath(file)) for file in (*members, *objects)})
 
 
-def of_packages(files: Iterable[Path], own: Path) -> list[Component]:
-    """Return the Debian packages of files, except those in the folder `own`."""
-    foreign = [str(file) for file in files if not file.is_relative_to(own)]
-    owners = _output("dpkg-query", "--search", *foreign) if foreign else ""
+def of_packages(files: Iterable[Path], own: Path, sysroot: Path) -> list[Component]:
+    """Return the Debian packages of files, except those in the folder `own`.
+
+    The files of a sysroot are in dpkg's database there.
+    """
     found: dict[tuple[str, ...], dict[str, str]] = {}
-    for line in owners.splitlines():
-        package, _, file = line.partition(": ")
-        form = "${source:Package} ${source:Version} ${Version}"
-        names = tuple(_output("dpkg-query", "-W", f"-f={form}", package).split())
-        found.setdefault(names, {})[Path(file).name] = _digest(Path(file).read_bytes())
+    foreign = {file for file in files if not file.is_relative_to(own)}
+    inside = {file for file in foreign if sysroot != Path("/") and file.is_relative_to(sysroot)}
+    for root, those in ((Path("/"), foreign - inside), (sysroot, inside)):
+        query = ("dpkg-query", f"--admindir={root / 'var/lib/dpkg'}")
+        names = sorted(str("/" / file.relative_to(root)) for file in those)
+        owners = _output(*query, "--search", *names) if names else ""
+        for line in owners.splitlines():
+            package, _, name = line.partition(": ")
+            form = "${source:Package} ${source:Version} ${Version}"
+            about = tuple(_output(*query, "-W", f"-f={form}", package).split())
+            content = (root / name.lstrip("/")).read_bytes()
+            found.setdefault(about, {})[Path(name).name] = _digest(content)
     components = []
     for (source, of_source, version), digests in sorted(found.items()):
         key = re.sub(r"-\d+(-cross)?$", "", _SOURCES.get(source, source))
@@ -238,7 +246,7 @@ def add(wheel: Path, options: argparse.Namespace) -> None:
     """Add the SBOM to a wheel."""
     used = used_files(options.map.read_text(errors="replace"))
     components = [from_source(key, version, files) for key, version, *files in options.source]
-    components += of_packages(used, options.own.resolve())
+    components += of_packages(used, options.own.resolve(), options.sysroot.resolve())
     found = libraries_in(options.symbols)
     if left_out := found - {one.key for one in components}:
         raise SystemExit(f"{wheel}: nm finds {', '.join(sorted(left_out))}, not in the SBOM")
@@ -279,6 +287,7 @@ def main() -> None:
     adding.add_argument("member", help="the binary in it")
     adding.add_argument("map", type=Path, help="the linker's map of it")
     adding.add_argument("--own", type=Path, default=Path(), help="the build's folder")
+    adding.add_argument("--sysroot", type=Path, default=Path("/"), help="another system's packages")
     adding.add_argument("--symbols", type=Path, nargs="+", required=True)
     adding.add_argument("--source", nargs="+", action="append", default=[])
     adding.set_defaults(run=lambda options: add(options.wheel, options))

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs the wheels of dist/ with pip in bare roots, and makes an image with three lines of Python in
 # each: Debian 12 and 13, Ubuntu 24.04 where UBUNTU_MIRROR has its packages, and Debian 12 for arm64
-# under QEMU, with Debian's lavapipe where dist/ has no driver for it. As root, with mmdebstrap.
+# under QEMU. As root, with mmdebstrap, and qemu-user-static for arm64.
 # Arguments: the roots, by default all. They are made once, in build/bare.
 set -eu
 cd "$(dirname "$0")/.."
@@ -17,20 +17,20 @@ END_OF_LINES
 cat >"$work/check.py" <<'END_OF_CHECK'
 import sys, vkbloom
 info = vkbloom.Renderer().info
+assert info.bundled, info.driver_info
 image = vkbloom.read("bloom.png")
 assert image.shape == (256, 256, 3) and 0 < image[10, 14].max() < image[10, 10].max(), image.shape
 print(f"Python {sys.version.split()[0]}, {info.driver_info}, bundled {info.bundled}: an image of {image.shape}")
 END_OF_CHECK
 
-# download VERSION MACHINE FOLDER [REQUIREMENT...]: the wheels that pip needs there.
+# download VERSION MACHINE FOLDER: the wheels that pip needs there.
 download() {
     version=$1 machine=$2 folder=$3
-    shift 3
     rm -rf "$folder"
     python3 -m pip download --quiet --only-binary=:all: --python-version "$version" \
         --implementation cp --platform "manylinux2014_$machine" --platform "manylinux_2_28_$machine" \
-        --platform "manylinux_2_31_$machine" --platform "manylinux_2_35_$machine" \
-        --dest "$folder" --find-links dist "$@" pip
+        --platform "manylinux_2_31_$machine" --dest "$folder" --find-links dist \
+        "vkbloom[software,images]==$package" pip
 }
 
 # A root of this machine's processor: try_native RELEASE MIRROR [COMPONENTS [KEYRING]]
@@ -39,7 +39,7 @@ try_native() {
     test -d "$root" || mmdebstrap --mode=root --variant=minbase --quiet \
         ${4:+--keyring="$4"} --include=python3-venv --components="${3:-main}" "$1" "$root" "$2"
     version=$(chroot "$root" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-    download "$version" x86_64 "$root/srv/wheels" "vkbloom[software,images]==$package"
+    download "$version" x86_64 "$root/srv/wheels"
     cp "$work/lines.py" "$work/check.py" "$root/srv/"
     chroot "$root" sh -ec 'rm -rf /srv/venv && cd /srv && python3 -m venv venv
         venv/bin/pip install --quiet --no-index --find-links wheels "vkbloom[software,images]"
@@ -49,20 +49,19 @@ try_native() {
 # Packages are unpacked, and QEMU is given the program: the kernel needs no foreign binary format.
 try_arm64() {
     root=$work/bookworm-arm64
-    driver=$(ls dist/vkbloom_lavapipe-*_aarch64.whl 2>/dev/null || true)
     test -d "$root" || mmdebstrap --mode=root --arch=arm64 --variant=extract --quiet --skip=check/qemu \
-        --include="python3$(test -n "$driver" || echo ,mesa-vulkan-drivers,libvulkan1)" bookworm "$root" \
-        "deb $mirror bookworm main"
-    download 3.11 aarch64 "$root/srv/wheels" "vkbloom[images]==$package" ${driver:+vkbloom-lavapipe}
+        --include=python3,libstdc++6 bookworm "$root" "deb $mirror bookworm main"
+    download 3.11 aarch64 "$root/srv/wheels"
     rm -rf "$root/srv/site"
     cd "$root/srv"
     set -- wheels/pip-*.whl
-    export VK_DRIVER_FILES="$root/usr/share/vulkan/icd.d/lvp_icd.aarch64.json"
-    export VKBLOOM_CACHE_DIR="$work/cache"
+    # As in aarch64.sh.
+    export VKBLOOM_CACHE_DIR="$work/cache" QEMU_CPU="${QEMU_CPU:-neoverse-n1}"
     arm() { PYTHONPATH="$root/srv/site" qemu-aarch64-static -L "$root" "$root/usr/bin/python3.11" "$@"; }
-    arm "$1/pip" install --quiet --root-user-action=ignore --no-index --find-links wheels --target site "vkbloom[images]" \
-        ${driver:+vkbloom-lavapipe}
-    arm "$work/lines.py" && arm "$work/check.py"
+    arm "$1/pip" install --quiet --root-user-action=ignore --no-index --find-links wheels \
+        --target site "vkbloom[software,images]"
+    arm "$work/lines.py"
+    arm "$work/check.py"
     cd - >/dev/null
 }
 

@@ -1,13 +1,15 @@
 #!/bin/sh
-# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang into dist/, each twice in two
-# folders, which must give equal files; as root on a system with mmdebstrap. The root that they are
-# built in is made once, in build/wheels; so are Mesa and glslang, in both folders.
-# STEPS: the scripts to run, by default all.
+# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64 into dist/,
+# each twice in two folders, which must give equal files; as root on a system with mmdebstrap. The root
+# that they are built in is made once, in build/wheels; so are Mesa and glslang, in all folders.
+# STEPS: the scripts to run, MACHINES: which ones to build for; by default all.
 set -eu
 cd "$(dirname "$0")/.."
 work=build/wheels
 root=$work/root
 . packaging/versions.sh
+machines=${MACHINES:-x86_64 aarch64}
+steps=${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}
 
 missing=
 needs() {
@@ -22,8 +24,10 @@ needs "dpkg's keys (apt install debian-archive-keyring)" \
     "$(ls /usr/share/keyrings/debian-archive-keyring.gpg 2>/dev/null)"
 needs "pip and venv (apt install python3-pip python3-venv)" \
     "$(python3 -c 'import ensurepip, pip' 2>/dev/null && echo yes)"
-needs "5 GB of free disk in $PWD" \
-    "$(test "$(df -P -k . | awk 'END { print $4 }')" -lt 5000000 || echo yes)"
+needs "7 GB of free disk in $PWD" \
+    "$(test "$(df -P -k . | awk 'END { print $4 }')" -lt 7000000 || echo yes)"
+needs "a new root, with arm64's packages (rm -r $work)" \
+    "$(test -d "$root" && test ! -d "$root/opt/aarch64" || echo yes)"
 test -z "$missing" || { echo "make wheels needs:$missing" >&2; exit 2; }
 
 test -d "$root" || packaging/build_root.sh "$root"
@@ -40,46 +44,55 @@ chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
     /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
         --root-user-action=ignore --upgrade /srv/pypi/*.whl'
 
-# Builds in a folder of the root.
+# Builds for a machine in a folder of the root.
 build_in() {
     rm -rf "$root$1/vkbloom" "$root$1/wheels"
-    mkdir -p "$root$1/vkbloom" "$root$1/wheels" dist
+    mkdir -p "$root$1/vkbloom" "$root$1/wheels"
     for source in "mesa-$MESA" "glslang-$GLSLANG"; do
         test -d "$root$1/$source" || cp -r "$root/build/$source" "$root$1/"
     done
     tar -x -f "$work/source.tar" -C "$root$1/vkbloom"
-    for step in ${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}; do
+    for step in $steps; do
         folder=$1/vkbloom
         test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
         chroot "$root" /usr/bin/env -i PATH=/usr/bin:/bin LANG=C.UTF-8 JOBS="${JOBS:-2}" BUILD="$1" \
-            sh "$1/vkbloom/packaging/$step" "$folder" "$1/wheels"
+            MACHINE="$2" sh "$1/vkbloom/packaging/$step" "$folder" "$1/wheels"
     done
 }
 # Both from the same files, which may change meanwhile.
 git ls-files -z --cached --others --exclude-standard | tar -c --null -T - -f "$work/source.tar"
-build_in /build
-build_in /again
-for wheel in "$root"/build/wheels/*.whl; do
-    cmp "$wheel" "$root/again/wheels/$(basename "$wheel")"
-    echo "two builds are equal: $(sha256sum "$wheel" | cut -d ' ' -f 1) $(basename "$wheel")"
+for machine in $machines; do
+    build_in "/build/$machine" "$machine"
+    build_in "/again/$machine" "$machine"
+    for wheel in "$root/build/$machine"/wheels/*.whl; do
+        cmp "$wheel" "$root/again/$machine/wheels/$(basename "$wheel")"
+        echo "two builds are equal: $(sha256sum "$wheel" | cut -d ' ' -f 1) $(basename "$wheel")"
+    done
 done
 test -d "$work/check" || python3 -m venv "$work/check"
 "$work/check/bin/pip" install --quiet "cyclonedx-python-lib[json-validation]==$CYCLONEDX"
-"$work/check/bin/python" packaging/sbom.py check "$root"/build/wheels/*.whl
+"$work/check/bin/python" packaging/sbom.py check "$root"/build/*/wheels/*.whl
 
 # Names that promise more than the files keep must not leave here.
 check_glibc() {
-    newest=$(chroot "$root" sh -c "objdump -T $2" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
+    newest=$(chroot "$root" sh -c "${cross}objdump -T $2" | grep -o 'GLIBC_[0-9.]*' | sort -uV | tail -n 1)
     most=GLIBC_$(echo "$1" | tr _ .)
     echo "$2 needs $newest; at most $most"
     test "$(printf '%s\n' "$newest" "$most" | sort -V | tail -n 1)" = "$most"
 }
-for step in ${STEPS:-core.sh lavapipe/build.sh glslang/build.sh}; do
-    case $step in
-    core.sh) check_glibc "$CORE_GLIBC" '/build/vkbloom/build/lib*/vkbloom/_core.abi3.so' ;;
-    lavapipe/*) check_glibc "$DRIVER_GLIBC" /build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so ;;
-    glslang/*) check_glibc "$DRIVER_GLIBC" /build/vkbloom-glslang/vkbloom_glslang/glslangValidator ;;
-    esac
+mkdir -p dist
+for MACHINE in $machines; do
+    . packaging/machine.sh
+    build=/build/$MACHINE
+    for step in $steps; do
+        case $step in
+        core.sh) check_glibc "$CORE_GLIBC" "$build/vkbloom/build/lib*/vkbloom/_core.abi3.so" ;;
+        lavapipe/*)
+            check_glibc "$DRIVER_GLIBC" "$build/vkbloom-lavapipe/vkbloom_lavapipe/libvulkan_lvp.so" ;;
+        glslang/*)
+            check_glibc "$DRIVER_GLIBC" "$build/vkbloom-glslang/vkbloom_glslang/glslangValidator" ;;
+        esac
+    done
+    cp "$root$build"/wheels/*.whl dist/
 done
-cp "$root"/build/wheels/*.whl dist/
 ls -l dist

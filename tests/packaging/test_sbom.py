@@ -98,6 +98,24 @@ def test_what_the_linker_used_is_listed(sbom: Any, build: Path, tmp_path: Path) 
     assert added(sbom, build, tmp_path / "again", *volk).read_bytes() == wheel.read_bytes()
 
 
+def test_another_systems_packages(sbom: Any, tmp_path: Path) -> None:
+    """Of a sysroot, which has a database of dpkg."""
+    database, archive = tmp_path / "var/lib/dpkg", tmp_path / "usr/lib/libz.a"
+    for folder in (database / "info", database / "updates", archive.parent):
+        folder.mkdir(parents=True)
+    archive.write_bytes(b"archive")
+    (database / "status").write_text(
+        "Package: zlib1g-dev\nStatus: install ok unpacked\nMaintainer: nobody\nMulti-Arch: same\n"
+        "Architecture: arm64\nSource: zlib (7)\nVersion: 7+b1\nDescription: zlib\n"
+    )
+    (database / "info/format").write_text("1\n")
+    (database / "info/zlib1g-dev:arm64.list").write_text("/usr/lib/libz.a\n")
+    (found,) = sbom.of_packages([archive], Path("/none"), tmp_path)
+    digest = hashlib.sha256(b"archive").hexdigest()
+    purl = "pkg:deb/debian/zlib@7?arch=source"
+    assert found == sbom.Component("zlib", "7+b1", {"libz.a": digest}, purl)
+
+
 def test_it_is_valid(sbom: Any, build: Path, tmp_path: Path) -> None:
     """By CycloneDX' own schema; a changed binary is found."""
     pytest.importorskip("cyclonedx.validation.json")

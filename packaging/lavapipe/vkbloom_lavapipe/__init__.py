@@ -1,4 +1,4 @@
-"""Mesa's lavapipe, a Vulkan driver for any x86-64 CPU, as one library."""
+"""Mesa's lavapipe, a Vulkan driver for any CPU, as one library."""
 
 from __future__ import annotations
 
