@@ -220,21 +220,20 @@ class DeviceArray:
 
 def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
     """Return images as batches: those that follow one another in the same memory are one."""
-    batches: list[DeviceArray] = []
+    batches: list[tuple[DeviceArray, int]] = []
     for image in images:
         if batches:
-            last = batches[-1]
-            after = last._offset + last.nbytes
-            same = last._memory is image._memory and last.shape[1:] == image.shape
-            if same and after == image._offset and last.dtype == image.dtype:
-                batches[-1] = DeviceArray(
-                    last._memory, (len(last) + 1, *image.shape), last.dtype.name, last._offset
-                )
+            first, count = batches[-1]
+            same = first._memory is image._memory and first.shape == image.shape
+            after = first._offset + count * first.nbytes
+            if same and first.dtype == image.dtype and after == image._offset:
+                batches[-1] = first, count + 1
                 continue
-        batches.append(
-            DeviceArray(image._memory, (1, *image.shape), image.dtype.name, image._offset)
-        )
-    return batches
+        batches.append((image, 1))
+    return [
+        DeviceArray(first._memory, (count, *first.shape), first.dtype.name, first._offset)
+        for first, count in batches
+    ]
 
 
 def on_host(array: Any) -> NDArray[Any]:

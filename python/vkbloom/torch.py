@@ -265,6 +265,12 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
+@functools.lru_cache(64)
+def _in_floats(text: str) -> Settings:
+    """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
+    return _settings(text).replace(format="rgba32float")
+
+
 def _replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
     return settings.replace(
@@ -414,8 +420,9 @@ def _on_device(  # noqa: PLR0917
     number: int,
 ) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings = _replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
-    settings = settings.replace(format="rgba32float")
+    settings = _in_floats(text)
+    if names:
+        settings = _replaced(settings, dict(zip(_split(names), values, strict=True)))
     renderer = _renderer(number, image)
     images = _batch(image)
     if mask is None and emission is None:
