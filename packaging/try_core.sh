@@ -5,34 +5,22 @@
 set -eu
 python=$(realpath -s "$1")
 cd "$(dirname "$0")/.."
-. packaging/versions.sh
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-built() {
-    mkdir "$work/$1"
-    git ls-files -z --cached --others --exclude-standard | tar -c --null -T - | tar -x -C "$work/$1"
-    options="-ffile-prefix-map=$work/$1=."
-    # Two builds that are compared compile everything; for one, the shaders' modules and the objects
-    # that are there do.
-    if test -z "${2:-}"; then
-        mkdir -p "$work/$1/build"
-        for made in spirv objects; do
-            test ! -d "build/$made" || cp -rp "build/$made" "$work/$1/build/"
-        done
-        options=${VKBLOOM_CFLAGS:-}
-    fi
-    cd "$work/$1"
-    VKBLOOM_CFLAGS=$options VKBLOOM_LDFLAGS="-Wl,--strip-all,-Map=build/core.map" \
-        "$python" -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
-    test -z "$(command -v dpkg-query)" ||
-        "$python" packaging/sbom.py add dist/*.whl vkbloom/_core.abi3.so build/core.map \
-            --symbols build/objects/csrc/*/*.o --source volk - /usr/include/volk.h \
-            --source Vulkan-Headers - /usr/include/vulkan/vulkan_core.h
-    cd - >/dev/null
-}
-built one "${2:-}"
+mkdir -p "$work/one/build" "$work/another/build"
+# Two builds that are compared compile everything; for one, the shaders' modules and the objects that
+# are there do.
 if test "${2:-}" = twice; then
-    built another twice
+    unset VKBLOOM_CFLAGS
+else
+    export VKBLOOM_CFLAGS="${VKBLOOM_CFLAGS:-}"
+    for made in spirv objects; do
+        test ! -d "build/$made" || cp -rp "build/$made" "$work/one/build/"
+    done
+fi
+packaging/core_wheel.sh "$work/one" "$python"
+if test "${2:-}" = twice; then
+    packaging/core_wheel.sh "$work/another" "$python"
     cmp "$work"/one/dist/*.whl "$work"/another/dist/*.whl
     echo "two builds are equal: $(sha256sum "$work"/one/dist/*.whl | cut -d ' ' -f 1)"
 fi

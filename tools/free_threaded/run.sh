@@ -14,12 +14,13 @@ test -x "$folder/plain/bin/python3.13t" || tools/free_threaded/python.sh "$folde
 test -d "$folder/venv" || "$folder/plain/bin/python3.13t" -m venv --without-pip "$folder/venv"
 "$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --only-binary=:all: \
     "numpy >= 2.2, < 2.5" pytest hypothesis "setuptools >= 77" wheel
-rm -rf "$folder/dist"
-"$PYTHON" -m pip --python "$folder/venv/bin/python" wheel --quiet --no-deps \
-    --no-build-isolation --wheel-dir "$folder/dist" .
-ls "$folder/dist"
+rm -rf "$folder/package"
+mkdir -p "$folder/package/build"
+test ! -d build/spirv || cp -rp build/spirv "$folder/package/build/"
+packaging/core_wheel.sh "$folder/package" "$PYTHON" "$folder/venv/bin/python"
+"$PYTHON" packaging/sbom.py check "$folder"/package/dist/*.whl
 "$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --no-deps --force-reinstall \
-    "$folder"/dist/vkbloom-*.whl
+    "$folder"/package/dist/*.whl
 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_free_threaded.py
 "$folder/venv/bin/python" -m tests.core.all_calls "$calls"
 test "$tsan_calls" != 0 || exit 0
