@@ -202,41 +202,6 @@ static void drop_read(struct vkb_pass_row *row, uint32_t number)
     vkb_drop_reads(row, row->read_count - 1);
 }
 
-bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           bool *fits, struct vkb_error *error)
-{
-    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
-    const bool blend = pass->shader == &vkb_shader_adjoint_composite_frag;
-    const bool threshold = pass->shader == &vkb_shader_adjoint_threshold_frag;
-    struct vkb_pass_row row;
-
-    *fits = (filter || blend || threshold) && are_floats(choice, pass)
-         && (filter ? fits_lists(choice->graph, pass, MOST_WORDS)
-                    : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
-         && (!threshold
-             || (pass->constants.alpha != ALPHA_BLUR
-                 && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0])));
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    // The mask, or the scene of a composite.
-    drop_read(&row, threshold ? 1 : 2);
-    if (blend) {
-        row.constants.levels = pass->reads[1] != pass->reads[0];
-        vkb_make_words(&row, &vkb_shader_adjoint_blend_words_rgba32float, ADJOINT_SIDE, TEXEL_ROWS);
-    } else if (threshold) {
-        row.constants.sampling = 0;
-        vkb_make_words(&row, &vkb_shader_adjoint_threshold_words_rgba32float, ADJOINT_SIDE,
-                       TEXEL_ROWS);
-    } else {
-        vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE,
-                       ADJOINT_ROWS);
-        if (!add_tables(choice, pass, &row, error))
-            return false;
-    }
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 // Reads the cotangents of a composite without a curve in place of what it brings to the bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
@@ -259,6 +224,54 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     row->reads[2] = pass->reads[0];
 }
 
+// The same, if its images are words, too.
+static void read_words_of_composite(const struct vkb_variant_choice *choice,
+                                    struct vkb_pass_row *row)
+{
+    struct vkb_pass_row fused;
+
+    memcpy(&fused, row, sizeof fused);
+    read_composite(&choice->plain, &fused);
+    if (are_floats(choice, &fused))
+        memcpy(row, &fused, sizeof fused);
+}
+
+bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           bool *fits, struct vkb_error *error)
+{
+    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
+    const bool blend = pass->shader == &vkb_shader_adjoint_composite_frag;
+    const bool threshold = pass->shader == &vkb_shader_adjoint_threshold_frag;
+    struct vkb_pass_row row;
+
+    *fits = (filter || blend || threshold) && are_floats(choice, pass)
+         && (filter ? fits_lists(choice->graph, pass, MOST_WORDS)
+                    : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
+         && (!threshold
+             || (pass->constants.alpha != ALPHA_BLUR
+                 && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0])));
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    if (!filter)
+        drop_read(&row, threshold ? 1 : 2);  // the mask
+    if (blend) {
+        row.constants.levels = pass->reads[1] != pass->reads[0];
+        vkb_make_words(&row, &vkb_shader_adjoint_blend_words_rgba32float, ADJOINT_SIDE, TEXEL_ROWS);
+    } else if (threshold) {
+        row.constants.sampling = 0;
+        vkb_make_words(&row, &vkb_shader_adjoint_threshold_words_rgba32float, ADJOINT_SIDE,
+                       TEXEL_ROWS);
+    } else {
+        read_words_of_composite(choice, &row);
+        vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE,
+                       ADJOINT_ROWS);
+        if (!add_tables(choice, pass, &row, error))
+            return false;
+    }
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // On a GPU, blocks are faster where a filter has several kernels, of which each texel needs all
 // pixels. With one, most texels are in a cache.
 bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
@@ -270,11 +283,9 @@ bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MOST_REGISTERS)) {
-        read_composite(&choice->plain, &row);
+    read_composite(&choice->plain, &row);
+    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MOST_REGISTERS))
         return vkb_add_fullscreen(choice, &row, error);
-    }
-    drop_read(&row, 2);
     vkb_make_dispatch(&row, &vkb_shader_adjoint_taps_comp_rgba32float,
                       ADJOINT_SIDE * PIXEL_INVOCATIONS, ADJOINT_SIDE * PIXEL_INVOCATIONS);
     return add_tables(choice, pass, &row, error) && vkb_graph_add_pass(choice->graph, &row, error);

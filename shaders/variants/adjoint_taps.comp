@@ -5,7 +5,7 @@
 // texels next to each other are read by. The table has an entry for
 // each block of four texels: the first column or row of pixels that read these, and where their weights
 // are, a texel for each, with those of the four. After the first there are RADIX_1 columns and RADIX_2
-// rows more. LEVELS is the number of kernels.
+// rows more. LEVELS is the number of kernels. BY is as there.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 
@@ -21,13 +21,14 @@ layout(local_size_x = ROW_INVOCATIONS) in;
 #else
 const int ROWS = ADJOINT_SIDE;
 layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
-layout(set = 0, binding = 5) uniform writeonly image2D target;
+layout(set = 0, binding = 6) uniform writeonly image2D target;
 #endif
-#define ADDED 3
-#define DIFFERENTIATED 4
+#define ADDED 4
+#define DIFFERENTIATED 5
 #include "variants/adjoint_runs.glsl"
 READ_FLOATS(1, cotangents);
 READ_FLOATS(2, table);
+READ_FLOATS(3, scene);
 
 vec4 entry(int place)
 {
@@ -37,11 +38,13 @@ vec4 entry(int place)
 vec4 cotangent(int x, int y)
 {
 #ifdef WORDS
-    return FETCH(cotangents, 1, min(x, read_shapes[0].x - 1), y);
+    int column = min(x, read_shapes[0].x - 1), row = min(y, read_shapes[0].y - 1);
 #else
-    ivec2 place = min(ivec2(x, y), textureSize(cotangents, 0) - 1);
-    return texelFetch(cotangents, place, 0);
+    ivec2 last = textureSize(cotangents, 0) - 1;
+    int column = min(x, last.x), row = min(y, last.y);
 #endif
+    vec4 value = FETCH(cotangents, 1, column, row);
+    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, column, row)).rgb, 0.0) : value;
 }
 
 void along_rows(ivec2 first, int end, int start, float gain, float share)

@@ -243,7 +243,7 @@ def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) ->
         source = Inputs(image).source((cotangents["final"],))
         plan = core_of(renderer).adjoint(source, settings, ("final",), False)
     assert plan
-    words = {"adjoint_blend_words_rgba32float", "adjoint_taps_words_rgba32float"}
+    words = {"adjoint_taps_words_rgba32float"}
     blocks = {"adjoint_filter_dispatch", "adjoint_taps_comp_rgba32float"}
     assert {shader for _, shader, *_ in plan.passes} == (words if variant == "cpu" else blocks)
 
