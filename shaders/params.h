@@ -262,7 +262,6 @@
     INPUT(B, int, padded) \
     INPUT(B, int, extent) \
     INPUT(B, int, turn) \
-    INPUT(B, int, boundary) \
     INPUT(B, int, row_length) \
     INPUT(B, int, row_a) \
     INPUT(B, int, row_b) \
@@ -464,10 +463,13 @@
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
-// butterfly. Values above FFT_LIMIT are clamped, since their sums would overflow.
+// butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
+// clamped, since their sums would overflow.
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
 #define FFT_MOST_RADIX  64
+#define FFT_SMALL_RADIX 16
+#define FFT_SMALL_PIXELS 131072
 // With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups run
 // at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
 // FFT_MOST_GROUP_RADIX.
@@ -506,10 +508,12 @@
 // is known to have no NaN and no infinity. With NEXT_PIXEL the outer taps of halve_grid.comp are between
 // the texels of the next pixel. With FROM_IMAGE, a downsampling to half the size reads
 // the image itself and applies the threshold, and an adjoint pass writes the cotangents of a source's
-// image. BY is what these are of. STORED is the format of the target (STORED_*). FIRST
+// image. BY is what these are of. With ENLARGED the target of shrink.comp has more rows than the
+// source. STORED is the format of the target (STORED_*). FIRST
 // marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
 // a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
-// workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. Of complete lines (fft_lines.comp)
+// workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a
+// first stage that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp)
 // RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for
 // each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
@@ -552,7 +556,10 @@
     CONSTANT(36, ROLLED, rolled) \
     CONSTANT(37, FINITE, finite) \
     CONSTANT(38, NEXT_PIXEL, next_pixel) \
-    CONSTANT(39, BY, by)
+    CONSTANT(39, BY, by) \
+    CONSTANT(40, BOUNDARY, boundary) \
+    CONSTANT(41, PREFILTERED, prefiltered) \
+    CONSTANT(42, ENLARGED, enlarged)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -33,8 +33,15 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
+// The largest radix for an image. The pipelines of larger ones take a new process longer than the
+// stages that they save in small images.
+static uint32_t most_radix(struct vkb_size size)
+{
+    return size.width * size.height <= FFT_SMALL_PIXELS ? FFT_SMALL_RADIX : FFT_MOST_RADIX;
+}
+
 static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,
-                                     uint32_t extent, struct reach *reach)
+                                     uint32_t extent, uint32_t most, struct reach *reach)
 {
     const uint32_t kernel = reach->kernel;
     struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
@@ -47,12 +54,12 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
         reach->after = extent - 1 - extent / 2;
         padding = extent - 1;
     }
-    if (boundary == BOUNDARY_WRAP && vkb_fft_line(extent).length == extent)
+    if (boundary == BOUNDARY_WRAP && vkb_fft_line(extent, most).length == extent)
         padding = 0;
     if (boundary == BOUNDARY_ZERO)
         padding = reach->before > reach->after ? reach->before : reach->after;
     axis.before = reach->before;
-    axis.line = vkb_fft_line(extent + padding);
+    axis.line = vkb_fft_line(extent + padding, most);
     return axis;
 }
 
@@ -142,9 +149,15 @@ static bool add_kernel_spectrum(const struct convolution *convolution, uint32_t 
             .from = spectrum,
             .to = spectrum,
         };
-        for (; stage.number < axes[i]->line.stage_count; ++stage.number)
-            if (!add_stage(convolution, &stage, error))
+        // The first columns have the glow's pipeline, though none of their elements is padding.
+        stage.padded = i == 1 && axes[i]->line.length > axes[i]->extent;
+        for (; stage.number < axes[i]->line.stage_count; ++stage.number) {
+            struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
+            row.params.fft.extent = INT32_MAX;
+            if (!vkb_graph_add_pass(convolution->graph, &row, error))
                 return false;
+            stage.padded = false;
+        }
     }
     return true;
 }
@@ -164,6 +177,7 @@ static bool add_rows(const struct convolution *convolution, uint32_t rows, struc
     struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
 
     row.constants.stage = STAGE_FIRST;
+    row.constants.prefiltered = prefilter[1] >= prefilter[0];
     row.params.fft.prefilter_min = prefilter[0];
     row.params.fft.prefilter_max = prefilter[1];
     row.params.fft.prefilter_factor = prefilter[2];
@@ -256,10 +270,10 @@ bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_so
 
     convolution.x =
         make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
-                  size.width, &convolution.reach_x);
+                  size.width, most_radix(size), &convolution.reach_x);
     convolution.y =
         make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary,
-                  size.height, &convolution.reach_y);
+                  size.height, most_radix(size), &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
     const struct vkb_size lines = {padded.width, size.height};
     return add_kernel(&convolution, &kernel, error)

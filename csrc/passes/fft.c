@@ -56,7 +56,7 @@ static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *fo
     return least != UINT32_MAX;
 }
 
-struct vkb_fft_line vkb_fft_line(uint32_t least)
+struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
 {
     struct vkb_fft_line best = {0};
     uint64_t best_cost = UINT64_MAX;
@@ -66,7 +66,7 @@ struct vkb_fft_line vkb_fft_line(uint32_t least)
         struct vkb_fft_line line = {.length = length, .radices = {1, 1, 1, 1}};
         uint32_t first = 0;
         bool found = false;
-        while (radix_of(first) > most_radix(length))
+        while (radix_of(first) > most || radix_of(first) > most_radix(length))
             ++first;
         while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES)
             found = split(length, first, ++line.stage_count, line.radices);
@@ -146,6 +146,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.constants.direction = axis->direction;
     row.constants.inverse = stage->inverse;
     row.constants.padded = stage->padded;
+    row.constants.boundary = stage->padded ? (int32_t)axis->boundary : 0;
     set_radix(radix, &row);
     row.block = VKB_BLOCK_fft;
     params->count = (int)count;
@@ -158,10 +159,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     params->padded = (int)axis->line.length;
     params->extent = (int)axis->extent;
     params->turn = (int)(axis->extent + axis->before);
-    params->boundary = axis->boundary;
     params->limit = vkb_formats[target->format].limit;
-    // No prefilter.
-    params->prefilter_min = 1.0f;
     return row;
 }
 

@@ -13,8 +13,9 @@ struct vkb_fft_line {
     uint32_t radices[VKB_FFT_STAGES];  // then 1
 };
 
-// The line of at least `least` elements, up to 32768, that takes the least time.
-struct vkb_fft_line vkb_fft_line(uint32_t least);
+// The line of at least `least` elements, up to 32768, that takes the least time with radices of up
+// to `most`.
+struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most);
 
 // The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MOST_GROUP_RADIX
 // each, the longest first. False: there are none.

@@ -28,7 +28,7 @@ struct pipeline_key {
     VkRenderPass render_pass;
     struct vkb_hash vertex, shader;
     uint32_t geometry, reading;  // enum vkb_geometry, enum vkb_reading
-    uint16_t textured, blend;    // enum vkb_blend
+    uint32_t textured, blend;    // enum vkb_blend
     uint32_t target_count;
     uint32_t image_count;  // of the descriptors
     uint32_t layout;       // of a pass with resources
@@ -36,7 +36,7 @@ struct pipeline_key {
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (6 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                          + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {

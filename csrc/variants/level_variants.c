@@ -213,16 +213,19 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
 {
     const struct vkb_prefilter_params *params = &pass->params.prefilter;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const uint32_t height =
+        params->source_height ? (uint32_t)params->source_height : source->height;
     const enum vkb_mode groups = reduced_groups(pass);
     const bool taps = groups == GROUPS_FILAMENT
                    || (groups == GROUPS_BEVY && params->step_x == 1.0f && params->step_y == 1.0f);
 
-    *fits = taps && !pass->constants.masked
-         && (params->source_height ? (uint32_t)params->source_height : source->height)
-                >= (uint32_t)params->target_height
-         && loads(choice, pass);
-    return !*fits
-        || add_prefilter(choice, pass, shrink_words[source->format],
+    *fits = taps && !pass->constants.masked && loads(choice, pass);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row;
+    memcpy(&row, pass, sizeof row);
+    row.constants.enlarged = height < (uint32_t)params->target_height;
+    return add_prefilter(choice, &row, shrink_words[source->format],
                          4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
 }
 

@@ -8,15 +8,13 @@ vec3 prefiltered(vec3 colour)
     float wanted = min(params.prefilter_factor * (luminance - params.prefilter_min)
                            + params.prefilter_min,
                        params.prefilter_max);
-    bool filters =
-        params.prefilter_max >= params.prefilter_min && luminance > params.prefilter_min;
-    return filters ? colour * (wanted / luminance) : colour;
+    return luminance > params.prefilter_min ? colour * (wanted / luminance) : colour;
 }
 
 vec4 glow_of(vec4 texel)
 {
     vec4 kept = clamp(finite_or_zero(texel), -FFT_LIMIT, FFT_LIMIT);
-    return vec4(prefiltered(kept.rgb), ALPHA == ALPHA_BLUR ? kept.a : 0.0);
+    return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
 }
 
 // What the transform has at a place of the padded line. Where that lies before the source's first texel
@@ -25,13 +23,13 @@ vec4 load_padded(int along, int across)
 {
     bool inside = along < params.extent, behind = along < params.turn;
     int place = along;
-    if (params.boundary == BOUNDARY_WRAP)
+    if (BOUNDARY == BOUNDARY_WRAP)
         place = behind ? along - params.extent : along - params.padded + params.extent;
     else
         place = behind ? params.extent - 1 : 0;
     place = inside ? along : clamp(place, 0, params.extent - 1);
     vec4 texel = load_source(texel_at(place, across));
-    return inside || params.boundary != BOUNDARY_ZERO ? texel : vec4(0.0);
+    return inside || BOUNDARY != BOUNDARY_ZERO ? texel : vec4(0.0);
 }
 
 vec4 load(int along, int across)

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The first passes of published methods that read an image of any larger size, with bilinear taps one
+// The first passes of published methods that read an image of any other size, with bilinear taps one
 // texel or two apart. An invocation writes a strip from top to bottom. It has each row's taps once,
 // and keeps those of the rows that a pixel needs.
 #include "lib/block.glsl"
@@ -126,10 +126,11 @@ void main()
     for (int y = first.y; y < end; ++y) {
         // A level that is not larger than the source has at least one row for each pixel. llvmpipe
         // runs what a loop contains once more than it must if the condition comes first.
-        do {
-            add_row(++row);
-            rest -= divisor;
-        } while (rest >= divisor);
+        if (ENLARGED == 0 || rest >= divisor)
+            do {
+                add_row(++row);
+                rest -= divisor;
+            } while (rest >= divisor);
         float down = float(rest) / float(divisor);
         Line line = line_of(down);
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

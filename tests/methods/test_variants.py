@@ -30,6 +30,7 @@ from vkbloom import (
     gaussian_weights,
     presets,
 )
+from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
 
 VARIANTS = ("fragment", "cpu", "gpu")
@@ -435,3 +436,20 @@ def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_VARIANT", "quick")
     with pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto, fragment"):
         Renderer()
+
+
+def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once() -> None:
+    with Renderer("software") as software:
+        plan = software.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
+    (first,) = (one for one in plan.passes if one.name == "down_0")
+    assert first.shader.startswith("shrink_words")
+
+
+def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines() -> None:
+    def stages(size: tuple[int, int]) -> int:
+        image = np.zeros((size[1], size[0], 3), np.float32)
+        plan = software.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))
+        return sum(one.shader.startswith("fft_words") for one in plan.passes)
+
+    with Renderer("software") as software:
+        assert stages((500, 250)) > stages((500, 270))
