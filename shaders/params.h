@@ -442,6 +442,7 @@
 #define HALVE_WORDS_ROWS              32
 #define REDUCE_COLUMNS                4
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define DOUBLE_FINAL_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16

@@ -184,11 +184,11 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
 }
 
 // The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of two words of
-// any format, so that the invocations of a workgroup share a row as evenly as possible.
-static uint32_t strip_columns(uint32_t width)
+// any format, so that the invocations of a row share it as evenly as possible.
+static uint32_t strip_columns(uint32_t width, uint32_t beside)
 {
-    const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
-    const uint32_t invocations = ROW_INVOCATIONS * ((width + most - 1) / most);
+    const uint32_t most = beside * STRIP_COLUMNS;
+    const uint32_t invocations = beside * ((width + most - 1) / most);
 
     return ((width + invocations - 1) / invocations + 7) / 8 * 8;
 }
@@ -198,7 +198,12 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
                     bool *fits, struct vkb_error *error)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const uint32_t columns = strip_columns(target->width);
+    const uint32_t rows = STRIP_ROWS(vkb_formats[target->format].channel_size);
+    // Strips below each other load the same rows at the same time. With four single floats this
+    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
+    const bool vertical = target->format == VKB_FORMAT_RGBA32_FLOAT
+                       && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4;
+    const uint32_t columns = strip_columns(target->width, vertical ? 1 : ROW_INVOCATIONS);
     struct chain chain;
 
     *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &chain)
@@ -207,8 +212,12 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
     row.params.fused_bloom.columns = (int32_t)columns;
-    vkb_make_words(&row, strip_shaders[target->format], columns,
-                   STRIP_ROWS(vkb_formats[target->format].channel_size));
+    row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
+    vkb_make_words(&row, strip_shaders[target->format], columns, rows);
+    if (vertical) {
+        row.block_width = columns;
+        row.block_height = ROW_INVOCATIONS * rows;
+    }
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

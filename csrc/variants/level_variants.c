@@ -42,11 +42,11 @@ static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pas
 
 static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                           const struct vkb_shader *const *shaders,
-                          const struct vkb_shader *const *words, enum vkb_format format)
+                          const struct vkb_shader *const *words, uint32_t columns,
+                          enum vkb_format format)
 {
     if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_words(row, words[format], DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size),
-                       DOUBLE_WORDS_ROWS);
+        vkb_make_words(row, words[format], columns, DOUBLE_WORDS_ROWS);
     } else {
         vkb_make_dispatch(row, shaders[format], ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
         row->reading = VKB_READING_LOADED;
@@ -299,6 +299,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
                      bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
+    const enum vkb_format format = plain->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
     *fits = vkb_doubles(pass) && loads(choice, pass);
@@ -309,7 +310,8 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
         .add_own = pass->constants.add_own,
         .alpha = pass->constants.alpha,
     };
-    make_doubling(choice, &row, double_shaders, double_words, plain->images[pass->reads[0]].format);
+    make_doubling(choice, &row, double_shaders, double_words,
+                  DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size), format);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -335,7 +337,8 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    make_doubling(choice, &row, double_final_shaders, double_final_words, format);
+    make_doubling(choice, &row, double_final_shaders, double_final_words,
+                  DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];

@@ -14,6 +14,7 @@ READ_IMAGE(2, own);
 WRITE_IMAGE(3);
 
 #define HAS_OWN (ADD_OWN != 0)
+#define WORDS_COLUMNS DOUBLE_WORDS_COLUMNS
 
 uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
 {

@@ -1,11 +1,11 @@
 // Upsampling to exactly twice the size. An invocation writes a strip from top to bottom and loads
 // each texel once. The including shader includes pixels.glsl and defines: `smaller`; `own`, an
-// image of the target's size (HAS_OWN: whether it is read); and shade(), which computes a pixel
-// from the pixel of `own` and the upsampled sum.
+// image of the target's size (HAS_OWN: whether it is read); WORDS_COLUMNS; and shade(), which
+// computes a pixel from the pixel of `own` and the upsampled sum.
 #include "lib/doubling.glsl"
 
 #ifdef WORDS
-const int COLUMNS = DOUBLE_WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
+const int COLUMNS = WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
 #else
 const int COLUMNS = DOUBLE_COLUMNS, ROWS = DOUBLE_ROWS;
 #endif

@@ -15,6 +15,7 @@ READ_IMAGE(2, own);
 WRITE_IMAGE(3);
 
 #define HAS_OWN true
+#define WORDS_COLUMNS DOUBLE_FINAL_COLUMNS
 
 uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
 {

@@ -33,27 +33,45 @@ void store_run(int at, int count, uvec2 part[4])
         pairs_of_target.runs[at] =
             u64vec4(eighth(part[0]), eighth(part[1]), eighth(part[2]), eighth(part[3]));
 }
+
+// 64-bit integers of a run. Rows of three channels have multiples of three, others of four.
+const int STORE_BYTES = TARGET_CHANNELS * CHANNEL_BYTES;
+const int STORE_RUN = TARGET_CHANNELS == 3 ? 3 : STORE_COUNT * STORE_BYTES % 32 == 0 ? 4 : 2;
+const uint STORE_PIXELS = 8 * STORE_RUN / STORE_BYTES;
+
+int runs_in_row()
+{
+    return 2 * target_shape.z / STORE_RUN;
+}
+
+// The run that begins with this pixel.
+int run_at(int first, int row)
+{
+    return (row - target_shape.w) * runs_in_row() + int(uint(first) / STORE_PIXELS);
+}
+
+// Stores the pixels of a row from `first` on, which are in the runs from `at` on.
+void store_at(int at, int first, uvec4 raw[STORE_COUNT])
+{
+    const int COUNT = STORE_COUNT * STORE_BYTES / (8 * STORE_RUN);
+    int start = int(uint(first) / STORE_PIXELS);
+    int last = int(uint(target_shape.x - 1) / STORE_PIXELS);
+    [[unroll]] for (int i = 0; i < COUNT; ++i) {
+        uvec2 part[4];
+        [[unroll]] for (int j = 0; j < STORE_RUN; ++j)
+            part[j] = uvec2(quarter_of(raw, 2 * (STORE_RUN * i + j)),
+                            quarter_of(raw, 2 * (STORE_RUN * i + j) + 1));
+        // The first pixel is inside of the image.
+        if (i == 0 || start + i <= last)
+            store_run(at + i, STORE_RUN, part);
+    }
+}
 #endif
 
 void store(int first, int row, uvec4 raw[STORE_COUNT])
 {
 #ifdef WORDS
-    const int BYTES = TARGET_CHANNELS * CHANNEL_BYTES;
-    // 64-bit integers of a run. Rows of three channels have multiples of three, others of four.
-    const int RUN = TARGET_CHANNELS == 3 ? 3 : STORE_COUNT * BYTES % 32 == 0 ? 4 : 2;
-    const int COUNT = STORE_COUNT * BYTES / (8 * RUN);
-    const uint PIXELS = 8 * RUN / BYTES;
-    int start = int(uint(first) / PIXELS), last = int(uint(target_shape.x - 1) / PIXELS);
-    int row_start = (row - target_shape.w) * (2 * target_shape.z / RUN);
-    [[unroll]] for (int i = 0; i < COUNT; ++i) {
-        uvec2 part[4];
-        [[unroll]] for (int j = 0; j < RUN; ++j)
-            part[j] = uvec2(quarter_of(raw, 2 * (RUN * i + j)),
-                            quarter_of(raw, 2 * (RUN * i + j) + 1));
-        // The first pixel is inside of the image.
-        if (i == 0 || start + i <= last)
-            store_run(row_start + start + i, RUN, part);
-    }
+    store_at(run_at(first, row), first, raw);
 #else
     [[unroll]] for (int i = 0; i < STORE_COUNT; ++i) {
         ivec2 pixel = ivec2(first + i, row);

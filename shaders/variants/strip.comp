@@ -147,11 +147,20 @@ void add_run(int x, uvec4 loaded[LOADED][RUN_WORDS], ivec2 done, int width,
         finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
 }
 
+// The first pixel of this invocation. The strips of a workgroup are below or beside each other.
+ivec2 first_of_strip()
+{
+    if (DIRECTION == DIRECTION_HORIZONTAL)
+        return first_pixel(ivec2(params.columns, ROWS));
+    int below = int(gl_WorkGroupID.y * ROW_INVOCATIONS + gl_LocalInvocationID.x);
+    return ivec2(int(gl_WorkGroupID.x) * params.columns, below * ROWS + FIRST_ROW());
+}
+
 void main()
 {
     read_words();
     ivec2 size = READ_SIZE(image, 1);
-    ivec2 first = first_pixel(ivec2(params.columns, ROWS));
+    ivec2 first = first_of_strip();
     int end = min(first.x + params.columns, size.x);
 
     if (any(greaterThanEqual(first, size)))
@@ -173,8 +182,13 @@ void main()
         }
         if (done.x < first.x)
             continue;
-        [[unroll]] for (int row = 0; row < ROWS; ++row)
+        // Each run follows from the one above. If it were computed from its row, LLVM would do so for
+        // each invocation on its own, in the loop that stores.
+        int at = run_at(done.x, done.y);
+        [[unroll]] for (int row = 0; row < ROWS; ++row) {
             if (done.y + row < size.y)
-                store(done.x, done.y + row, raw[row]);
+                store_at(at, done.x, raw[row]);
+            at += runs_in_row();
+        }
     }
 }
