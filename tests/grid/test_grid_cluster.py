@@ -117,10 +117,12 @@ def test_renderers_are_kept_between_runs_and_closed_at_the_end(client: Any, tmp_
 def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "_RUN_POINTS", 1)
     most = 0
+    runs: list[str] = []
     submit = client.submit
 
     def counting(function: Any, *rest: Any, **more: Any) -> Any:
         nonlocal most
+        runs.extend([more["workers"]] if function is cluster._render else [])
         made = submit(function, *rest, **more)
         pending = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
         most = max(most, pending)
@@ -132,6 +134,8 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     # Of 48 points, two for each worker. As many that are done may not have left the scheduler yet,
     # and there are the grid itself and the layout's two.
     assert most <= 2 * (2 * 2) + 3
+    # Whichever worker has the grid.
+    assert all(runs.count(worker) >= len(runs) // 3 for worker in client.nthreads())
 
 
 def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Path) -> None:

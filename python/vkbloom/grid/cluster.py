@@ -39,7 +39,7 @@ _AHEAD: Final = 2
 # A run is short enough to balance the workers and to render again, long enough to amortize a task.
 _RUN_POINTS: Final = 4096
 _RUN_BYTES: Final = 64 << 20
-_RUNS_A_WORKER: Final = 8
+_RUNS_A_WORKER: Final = 16
 _RETRIES: Final = 2
 
 # The renderer of this process for each choice of adapter, with a lock held while a run uses it.
@@ -194,18 +194,35 @@ def run_there(
     workers = max(1, len(client.nthreads()))
     runs = _runs(todo, layout, math.ceil(missing / (workers * _RUNS_A_WORKER)))
     shared = _Shared(client, grid)
-    under_way: dict[Any, tuple[Block, ...]] = {}
+    # The blocks of each submitted run, and the worker that it was meant for.
+    under_way: dict[Any, tuple[tuple[Block, ...], str | None]] = {}
     finished = distributed.as_completed()
 
-    def submit(count: int) -> None:
-        for blocks in itertools.islice(runs, max(0, count)):
+    def submit() -> None:
+        # By itself the scheduler prefers the worker that has the grid. It may choose another one
+        # if the worker that is named here has died.
+        waiting = dict.fromkeys(client.nthreads() or [None], 0)
+        for _, worker in under_way.values():
+            if worker in waiting:
+                waiting[worker] += 1
+        for blocks in itertools.islice(runs, max(0, _AHEAD * len(waiting) - len(under_way))):
+            worker = min(waiting, key=waiting.__getitem__)
+            waiting[worker] += 1
             run = _Run(layout, sink.writer, blocks, adapter, validation)
-            future = client.submit(_render, shared.future, run, pure=False, retries=_RETRIES)
-            under_way[future] = blocks
+            future = client.submit(
+                _render,
+                shared.future,
+                run,
+                workers=worker,
+                allow_other_workers=worker is not None,
+                pure=False,
+                retries=_RETRIES,
+            )
+            under_way[future] = blocks, worker
             finished.add(future)
 
     def take(future: Any) -> None:
-        blocks = under_way.pop(future)
+        blocks, _ = under_way.pop(future)
         tally = future.result()
         if isinstance(tally, str):
             raise ValueError(tally)
@@ -214,11 +231,11 @@ def run_there(
 
     client.register_plugin(_plugin(), name=_PLUGIN)
     try:
-        submit(_AHEAD * workers)
+        submit()
         for future in finished:
             take(future)
             # The number of workers may have changed.
-            submit(_AHEAD * max(1, len(client.nthreads())) - len(under_way))
+            submit()
     except BaseException as error:
         _stop(client, under_way, take)
         if isinstance(error, distributed.KilledWorker):
@@ -228,7 +245,7 @@ def run_there(
         client.unregister_worker_plugin(_PLUGIN)
 
 
-def _stop(client: Client, under_way: dict[Any, tuple[Block, ...]], take: Any) -> None:
+def _stop(client: Client, under_way: Iterable[Any], take: Any) -> None:
     """Mark the runs that are done, and cancel the others."""
     for future in list(under_way):
         if future.status == "finished":
