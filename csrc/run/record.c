@@ -224,8 +224,11 @@ static uint32_t band_rows(const struct vkb_device *device, const struct vkb_pass
                           size_t row_pitch)
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
-    const size_t block =
-        pass->block_height * (align > VKB_WORD_SIZE ? (size_t)align / VKB_WORD_SIZE : 1);
+    const size_t aligned = align > VKB_WORD_SIZE ? (size_t)align / VKB_WORD_SIZE : 1;
+    size_t block = pass->block_height;
+
+    while (block % aligned != 0)
+        block += pass->block_height;
     const size_t blocks = device->limits.maxStorageBufferRange / row_pitch / block;
 
     return (uint32_t)((blocks ? blocks : 1) * block);

@@ -149,7 +149,7 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
         properties->limits.maxDrawIndexedIndexValue = 9;
     // Less than the largest image of the test has.
     if (lacks("bands"))
-        lower(&properties->limits.maxStorageBufferRange, 1 << 19);
+        lower(&properties->limits.maxStorageBufferRange, 1 << 20);
     if (lacks("wide"))
         lower(&properties->limits.maxImageDimension2D, 5000);
     if (lacks("high"))

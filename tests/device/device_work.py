@@ -310,12 +310,15 @@ def lifetime(renderer: Any) -> None:
     same(renderer.apply(OnDevice(image)), renderer.apply(image))
 
 
-def equal_gradients(found: Any, expected: Any, place: type = vkbloom.DeviceArray) -> None:
+def equal_gradients(
+    found: Any, expected: Any, place: type = vkbloom.DeviceArray, tolerance: float = 0.0
+) -> None:
     images = [name for name in ("image", "mask", "emission") if name in expected]
     for name in (*images, "intensity"):
         assert isinstance(found[name], place) or name not in images, name
         array = found[name].numpy() if isinstance(found[name], vkbloom.DeviceArray) else found[name]
-        np.testing.assert_array_equal(array, expected[name], err_msg=name)
+        atol = tolerance * np.abs(expected[name]).max()
+        np.testing.assert_allclose(array, expected[name], rtol=0, atol=atol, err_msg=name)
         assert array.shape == expected[name].shape
         assert array.dtype == np.float32
 
@@ -349,11 +352,15 @@ def gradients(renderer: Any) -> None:
         assert isinstance(frames["final"], vkbloom.DeviceArray)
         assert isinstance(found["image"], vkbloom.DeviceArray)
         assert settings.glare or bytes_so_far() == before
-        equal_gradients(found, expected)
+        # A CPU's words are of float32, as cotangents of the host are: one product less is rounded.
+        words = renderer.info.type == "cpu" and cotangent.dtype == np.float16
+        tolerance = 1e-6 if words else 0.0
+        equal_gradients(found, expected, tolerance=tolerance)
         equal_gradients(pullback({"final": cotangent}), expected)
         # Channels first, and all of one element, as PyTorch has them.
         first = np.ascontiguousarray(np.moveaxis(cotangent, -1, 0))
-        equal_gradients(pullback({"final": Interfaced(np.moveaxis(first, 0, -1))}), expected)
+        found = pullback({"final": Interfaced(np.moveaxis(first, 0, -1))})
+        equal_gradients(found, expected, tolerance=tolerance)
     one = np.lib.stride_tricks.as_strided(np.ones(1, np.float32), image.shape, (0, 0, 0))
     expected = renderer.vjp(image, Pyramid(levels=2))[1]({"final": np.ones(image.shape)})
     _, pullback = renderer.vjp(OnDevice(image), Pyramid(levels=2))
