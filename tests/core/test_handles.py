@@ -260,6 +260,8 @@ def test_the_memory_of_a_handle_goes_with_it(
     image = np.full((2048, 2048, 4), 0.5, np.float32)
     settings = Separable(bloom=False)
     renderer.apply(renderer.upload(image), settings, attachments=())
+    # What earlier tests of this process have left may go at any time.
+    gc.collect()
 
     def megabytes() -> int:
         with open("/proc/self/statm", encoding="ascii") as file:
