@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import import_extra
+from vkbloom.checks import check_index, import_extra
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io.srgb import encode_srgb
 
 __all__ = [
     "contact_sheet_html",
+    "contact_sheet_png",
     "labelled",
     "leading_png",
     "picture",
@@ -109,10 +110,35 @@ def _timings_html(frames: Framebuffers) -> str:
     return "".join(rows)
 
 
+def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
+    """Return a labelled contact sheet of all framebuffers as PNG.
+
+    Pictures are shown as in a notebook, without alpha, fitted into cells with the aspect of
+    `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
+    its fonts are missing, they are left out with a warning.
+
+    `width`: Width of a picture in pixels, 128 to 4096.
+    """
+    columns = check_index("columns", columns, 1, 32)
+    width = check_index("width", width, 128, 4096)
+    if not frames:
+        raise ValueError("frames: a contact sheet needs at least one framebuffer")
+    height = round(width / _aspect(frames))
+    tiles = []
+    for name, array in frames.items():
+        fit = min(width / array.shape[1], height / array.shape[0])
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
+        tiles.append((picture, name, _described(array)))
+    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
+    title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
+    return sheet_png(tiles, columns, (width, height), title)
+
+
 def sheet_png(
     tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
     columns: int,
     cell: tuple[int, int],
+    title: str = "",
 ) -> bytes:
     """Return pictures with two lines of text below each as PNG.
 
@@ -123,17 +149,18 @@ def sheet_png(
     columns = min(columns, len(tiles))
     text = max(11, width // 20)
     gap, caption = text, 3 * text
+    heading = 2 * text * bool(title)
     rows = -(-len(tiles) // columns)
     sheet = np.full(
-        (gap + rows * (height + caption + gap), gap + columns * (width + gap), 3),
+        (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
         24,
         np.uint8,
     )
-    labels = []
+    labels = [(gap, gap + text, title)] if title else []
     for index, (picture, *lines) in enumerate(tiles):
         row, column = divmod(index, columns)
         left = gap + column * (width + gap)
-        top = gap + row * (height + caption + gap)
+        top = gap + heading + row * (height + caption + gap)
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
         sheet[top : top + height, left : left + width] = 40
