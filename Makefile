@@ -140,10 +140,11 @@ format: build/stamp/lint
 	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
+# Their output is shown last, since a failure among the tests' lines is easily overlooked.
 sanitize: build/stamp/core build/stamp/test
-	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10 & threads=$$!; \
+	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10 >build/threads.log 2>&1 & threads=$$!; \
 	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; \
-	    wait $$threads || { echo "tools/threads/run.sh failed: see above"; exit 1; }; exit $$tests
+	    wait $$threads; threads=$$?; cat build/threads.log; exit $$((tests || threads))
 
 clean:
 	rm -rf build out docs/api docs/examples $(VENV) python/vkbloom/_core*.so
