@@ -137,6 +137,22 @@ class TestFigures:
         (reason,) = reasons(found)
         assert " % of the pixels differ; largest difference " in reason
 
+    @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+    def test_flip_of_equals_where_openimageio_rounds(
+        self, dtype: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # As its build for aarch64 does.
+        exact = oiio.ImageBufAlgo.FLIP_diff
+        monkeypatch.setattr(
+            oiio.ImageBufAlgo,
+            "FLIP_diff",
+            lambda *images, **options: oiio.ImageBufAlgo.add(exact(*images, **options), 1e-6),
+        )
+        a = noise_image(16, 16, 3, dtype=dtype)
+        assert compare(a, a.copy()).flip == 0
+        assert not flip_map(a, a.copy()).any()
+        assert compare(a, changed(a, (3, 4, 1), 0)).flip > 1e-6  # type: ignore[operator]
+
     @pytest.mark.parametrize("shape", [(1, 1, 3), (6, 100, 3), (100, 6, 1)])
     def test_ssim_needs_7_pixels(self, shape: tuple[int, ...]) -> None:
         a, b = noise_image(*shape), noise_image(*shape, seed=6)

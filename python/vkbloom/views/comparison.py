@@ -440,7 +440,12 @@ def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:
     "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
     """
     oiio = _oiio()
-    buffers = [oiio.ImageBuf(image) for image in _linear(pair)]
+    first, second = _linear(pair)
+    if np.array_equal(first, second):
+        # With fused multiply-adds, as for aarch64, OpenImageIO subtracts a product that is rounded
+        # from an equal one that is not, which leaves about 1e-6.
+        return np.zeros(first.shape[:2], np.float32)
+    buffers = [oiio.ImageBuf(image) for image in (first, second)]
     # OpenImageIO takes 0 as its default, which is FLIP's own.
     errors = oiio.ImageBufAlgo.FLIP_diff(
         *buffers, hdr=0 if pair.is_integer else 1, ppd=degree or 0.0
