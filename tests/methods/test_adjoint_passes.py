@@ -279,6 +279,15 @@ def test_what_is_not_finite_has_no_derivative(renderer: Renderer) -> None:
     check(found, expected, "image")
 
 
+def test_no_bloom_has_no_kernel(renderer: Renderer) -> None:
+    settings = vkbloom.Convolution(psf=np.ones((3, 3)), bloom=False)
+    image = random_image(5, 4, channels=3, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pulled(renderer, image, settings)
+    found = pullback(cotangents)
+    assert [*found] == [*expected]
+    check(found, expected, "image")
+
+
 def test_only_what_is_read_is_computed(renderer: Renderer) -> None:
     """Derivatives by images run no sums, and those of a closed renderer come from the reference."""
     image = random_image(9, 8, seed=1).astype(np.float32)

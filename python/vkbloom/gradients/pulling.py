@@ -130,7 +130,7 @@ def _starter(
     floats = settings.replace(format="rgba32float")
     recorded = functools.cache(lambda: _recorded(inputs, settings))
     names = (*inputs.named(), *differentiable(settings))
-    if callable(getattr(settings, "kernel", None)):
+    if settings.bloom and callable(getattr(settings, "kernel", None)):
         names += ("kernel",)
 
     def by_reference(cotangents: Checked) -> Gradients:
