@@ -79,9 +79,17 @@ WORDS_ALONE = {
     "hdrp_columns.comp",
     "adjoint_blend.comp",
     "adjoint_threshold.comp",
+    "adjoint_strip.comp",
 }
 # Shaders whose images are always single floats.
-FLOATS_ALONE = {"adjoint_taps.comp", "adjoint_blend.comp", "adjoint_threshold.comp"}
+FLOATS_ALONE = {
+    "adjoint_taps.comp",
+    "adjoint_blend.comp",
+    "adjoint_threshold.comp",
+    "adjoint_strip.comp",
+}
+# Shaders that make the caller's array, besides those of the finished picture.
+PACKED = {"adjoint_strip.comp"}
 # Shaders that load single floats and store words of each format, too.
 WORDS_STORED = {"fft.comp"}
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
@@ -100,7 +108,7 @@ def modules(shader: Path) -> list[Module]:
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for each format that it may load from: for images as words, and for storage images,
-    unless only CPUs run it. If it can make the finished picture, it is also compiled for a target
+    unless only CPUs run it. If it can make the caller's array, it is also compiled for a target
     of three channels, and if it can read the caller's image, for an image of three single floats.
     """
     name = shader.name.replace(".", "_")
@@ -122,7 +130,7 @@ def modules(shader: Path) -> list[Module]:
                 kinds.append(("rgb_", ("-DRGB",)))
             for kind, options in kinds:
                 found.append(Module(f"{shader.stem}_words_{kind}{ours}", shader, words + options))
-                if "finished(" in text:
+                if "finished(" in text or shader.name in PACKED:
                     packed = (*words, *options, "-DTARGET_CHANNELS=3")
                     found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
         return found

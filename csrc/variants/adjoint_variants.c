@@ -185,7 +185,7 @@ static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row 
         && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y) <= most);
 }
 
-static bool are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     bool fits = vkb_fits_words(choice, pass);
 
@@ -202,17 +202,22 @@ static void drop_read(struct vkb_pass_row *row, uint32_t number)
     vkb_drop_reads(row, row->read_count - 1);
 }
 
+bool vkb_is_factor(const struct vkb_pass_row *pass)
+{
+    return pass->shader == &vkb_shader_adjoint_composite_frag && !pass->constants.masked
+        && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.from_image
+        && pass->reads[0] == pass->reads[1]
+        && (pass->constants.composite == COMPOSITE_ADD
+            || pass->constants.composite == COMPOSITE_MIX);
+}
+
 // Reads the cotangents of a composite without a curve in place of what it brings to the bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
     const uint32_t brought = row->reads[0];
     const struct vkb_pass_row *pass = vkb_writer_of(graph, brought);
 
-    if (!pass || pass->shader != &vkb_shader_adjoint_composite_frag || pass->constants.masked
-        || pass->constants.by != BY_BLOOM || pass->constants.add_own || pass->constants.from_image
-        || pass->reads[0] != pass->reads[1]
-        || (pass->constants.composite != COMPOSITE_ADD
-            && pass->constants.composite != COMPOSITE_MIX))
+    if (!pass || !vkb_is_factor(pass))
         return;
     const struct vkb_composite_params *params = &pass->params.composite;
     const float intensity = pass->constants.bloom == BLOOM_LIT ? 1.0f : params->intensity;
@@ -232,7 +237,7 @@ static void read_words_of_composite(const struct vkb_variant_choice *choice,
 
     memcpy(&fused, row, sizeof fused);
     read_composite(&choice->plain, &fused);
-    if (are_floats(choice, &fused))
+    if (vkb_are_floats(choice, &fused))
         memcpy(row, &fused, sizeof fused);
 }
 
@@ -244,7 +249,7 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
     const bool threshold = pass->shader == &vkb_shader_adjoint_threshold_frag;
     struct vkb_pass_row row;
 
-    *fits = (filter || blend || threshold) && are_floats(choice, pass)
+    *fits = (filter || blend || threshold) && vkb_are_floats(choice, pass)
          && (filter ? fits_lists(choice->graph, pass, MOST_WORDS)
                     : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
          && (!threshold

@@ -193,17 +193,32 @@ static uint32_t strip_columns(uint32_t width, uint32_t beside)
     return ((width + invocations - 1) / invocations + 7) / 8 * 8;
 }
 
+// Those of a workgroup are below or beside each other.
+static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                        const struct vkb_shader *shader, bool vertical)
+{
+    const struct vkb_image_row *target = &choice->plain.images[row->targets[0]];
+    const uint32_t rows = STRIP_ROWS(vkb_formats[target->format].channel_size);
+    const uint32_t columns = strip_columns(target->width, vertical ? 1 : ROW_INVOCATIONS);
+
+    row->params.fused_bloom.columns = (int32_t)columns;
+    row->constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
+    vkb_make_words(row, shader, columns, rows);
+    if (vertical) {
+        row->block_width = columns;
+        row->block_height = ROW_INVOCATIONS * rows;
+    }
+}
+
 // Adds the composite, and after it the fused pass in strips, which may replace it.
 bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const uint32_t rows = STRIP_ROWS(vkb_formats[target->format].channel_size);
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     // Strips below each other load the same rows at the same time. With four single floats this
     // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
-    const bool vertical = target->format == VKB_FORMAT_RGBA32_FLOAT
+    const bool vertical = format == VKB_FORMAT_RGBA32_FLOAT
                        && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4;
-    const uint32_t columns = strip_columns(target->width, vertical ? 1 : ROW_INVOCATIONS);
     struct chain chain;
 
     *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &chain)
@@ -211,13 +226,7 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    row.params.fused_bloom.columns = (int32_t)columns;
-    row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
-    vkb_make_words(&row, strip_shaders[target->format], columns, rows);
-    if (vertical) {
-        row.block_width = columns;
-        row.block_height = ROW_INVOCATIONS * rows;
-    }
+    make_strips(choice, &row, strip_shaders[format], vertical);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -293,11 +302,11 @@ static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, ui
              : NULL;
 }
 
-// The graph's chain for tiles. The formats of image and bloom may differ.
-static bool find_any_chain(const struct vkb_graph *graph, struct chain *chain)
+// The graph's chain. The formats of image and bloom may differ.
+static bool find_any_chain(const struct vkb_graph *graph, int radius, struct chain *chain)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (find_chain(graph, &graph->passes[i], TILE_RADIUS, vkb_writer_of, chain))
+        if (find_chain(graph, &graph->passes[i], radius, vkb_writer_of, chain))
             return true;
     return false;
 }
@@ -319,7 +328,7 @@ bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct v
 
     *fits = vkb_is_line_blur(pass) && fits_tiles(choice->device)
          && is_differentiated(&choice->plain, pass->targets[0])
-         && find_any_chain(&choice->plain, &chain) && chain.horizontal == pass;
+         && find_any_chain(&choice->plain, TILE_RADIUS, &chain) && chain.horizontal == pass;
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
@@ -337,7 +346,8 @@ bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct v
 // vertical blur, if there is no threshold. What the composite brings to the scene is an image, or
 // left to the last pass.
 static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                               struct chain *chain, const struct vkb_pass_row **by_bloom)
+                               int radius, struct chain *chain,
+                               const struct vkb_pass_row **by_bloom)
 {
     const struct vkb_shader *filter = &vkb_shader_adjoint_filter_frag;
     const struct vkb_shader *composite = &vkb_shader_adjoint_composite_frag;
@@ -345,7 +355,7 @@ static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_p
                          && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
     if (!(thresholds || (pass->shader == filter && pass->constants.from_image))
-        || !pass->constants.add_own || !find_any_chain(graph, chain))
+        || !pass->constants.add_own || !find_any_chain(graph, radius, chain))
         return false;
     const struct vkb_pass_row *first =
         thresholds ? sole_adjoint(graph, pass->reads[2], filter) : pass;
@@ -358,28 +368,58 @@ static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_p
         && chain->threshold->reads[0] == pass->reads[4];
 }
 
-// The derivatives by the image in tiles: one pass instead of the composite's two, the blurs' and
-// the threshold's. Nothing is rounded between them, whatever the formats are.
+// A fused row of the derivatives by the image, which replaces the composite's passes, the blurs'
+// and the threshold's. Nothing is rounded between them, whatever the formats are.
+static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
+                                       const struct vkb_pass_row *pass, const struct chain *chain)
+{
+    struct vkb_pass_row row = fused_row(choice, chain);
+
+    memcpy(row.name, pass->name, sizeof row.name);
+    row.targets[0] = pass->targets[0];
+    row.constants.dither = 0;
+    // Its sums have another order, so it is taken always: all runs have the same bits.
+    row.fused = false;
+    return row;
+}
+
 bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
     const struct vkb_pass_row *by_bloom;
     struct chain chain;
 
-    *fits =
-        fits_tiles(choice->device) && find_adjoint_chain(&choice->plain, pass, &chain, &by_bloom);
+    *fits = fits_tiles(choice->device)
+         && find_adjoint_chain(&choice->plain, pass, TILE_RADIUS, &chain, &by_bloom);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = fused_row(choice, &chain);
-    memcpy(row.name, pass->name, sizeof row.name);
-    row.targets[0] = pass->targets[0];
+    struct vkb_pass_row row = adjoint_row(choice, pass, &chain);
     // Image, bloom and cotangents of the composite.
     for (row.read_count = 0; row.read_count < 2; ++row.read_count)
         row.reads[row.read_count] = by_bloom->reads[row.read_count];
     row.reads[row.read_count++] = by_bloom->reads[3];
-    row.constants.dither = 0;
-    // Its sums have another order, so it is taken always: all runs have the same bits.
-    row.fused = false;
     make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    const struct vkb_pass_row *by_bloom;
+    struct chain chain;
+    struct vkb_pass_row row;
+
+    *fits = find_adjoint_chain(&choice->plain, pass, STRIP_RADIUS, &chain, &by_bloom)
+         && vkb_is_factor(by_bloom);
+    if (!*fits)
+        return true;
+    row = adjoint_row(choice, pass, &chain);
+    row.reads[0] = by_bloom->reads[3];
+    row.reads[1] = by_bloom->reads[0];
+    row.read_count = 2;
+    *fits = vkb_are_floats(choice, &row);
+    if (!*fits)
+        return true;
+    make_strips(choice, &row, &vkb_shader_adjoint_strip_words_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

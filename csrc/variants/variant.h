@@ -24,8 +24,8 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
-// For derivatives of the latter by the image: these, and the bloom alone.
-vkb_variant_add vkb_add_adjoint_tiles, vkb_add_bloom_tiles;
+// For derivatives of these by the image: both, and the bloom alone.
+vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles, vkb_add_bloom_tiles;
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // The first of these with taps that are weighted by brightness.
@@ -73,6 +73,12 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 // `reducing`, the variant of `pass`.
 bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         const struct vkb_pass_row *reducing, struct vkb_error *error);
+
+// Whether a pass brings a factor of the cotangents of its composite to the bloom.
+bool vkb_is_factor(const struct vkb_pass_row *pass);
+
+// Whether the images that a pass reads are words of single floats.
+bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 // Whether an upsampling by a linear filter reads an image of the target's size.
 bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass);

@@ -70,6 +70,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "upsampled", vkb_add_kawase_up, 0},
     {VKB_VARIANTS_CPU, "strips", vkb_add_streaks, 0},
     {VKB_VARIANTS_CPU, "words", vkb_add_transform, 0},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_strips, 0},
     {VKB_VARIANTS_CPU, "words", vkb_add_adjoint_words, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},

@@ -199,6 +199,39 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             assert np.array_equal(again["image"], found["image"])
 
 
+#: Several strips, less than one, and less than a kernel.
+STRIPS = (
+    (Separable(threshold=0.5, knee=0.5), (35, 261, 3)),
+    (Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4)),
+    (Separable(composite="mix", intensity=0.4), (3, 9, 3)),
+    (Separable(threshold=0.2, knee=0.3), (1, 70, 4)),
+    (Separable(), (7, 1, 3)),
+)
+
+
+@pytest.mark.usefixtures("software")
+def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
+    random = np.random.default_rng(1)
+    with Renderer("software") as renderer:
+        for settings, size in STRIPS:
+            image = (random.random(size, np.float32) ** 2) * 1.5
+            cotangents = {"final": random.standard_normal(size, np.float32)}
+            # A finite image has another pipeline.
+            for value in (0.5, np.nan):
+                image[0, 0, 1] = value
+                found = renderer.vjp(image, settings)[1](cotangents)
+                check(found, reference.vjp(image, settings)[1](cotangents), "image")
+                again = renderer.vjp(image, settings)[1](cotangents)
+                assert np.array_equal(again["image"], found["image"])
+            source = Inputs(image).source((cotangents["final"],))
+            floats = settings.replace(format="rgba32float")
+            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+            assert plan
+            shaders = [shader for _, shader, *_ in plan.passes]
+            assert shaders == ["adjoint_strip_words_rgba32float"]
+
+
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
     """Also where the image itself is the source, and cotangents of the bloom go to it directly."""
     image = random_image(9, 14, channels=4, seed=1).astype(np.float32)
