@@ -17,7 +17,9 @@ enum { SUCCESS, INVALID_VALUE, OUT_OF_MEMORY, INVALID_DEVICE = 101 };
 enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
 
 // What is there now, by kind; and bytes that go to and come from the host.
-static long contexts, streams, events, memories, mappings, host_bytes, current;
+static _Atomic long contexts, streams, events, memories, mappings, host_bytes, current;
+// Each thread has its own stack of contexts.
+static _Thread_local long current_here;
 
 struct memory_handle {
     int type;
@@ -73,7 +75,7 @@ static void report(void)
 
 EXPORT int cuInit(unsigned flags)
 {
-    static int known;
+    static _Atomic int known;
 
     if (!known++)
         atexit(report);
@@ -135,13 +137,15 @@ EXPORT int cuDevicePrimaryCtxRelease_v2(int device)
 
 EXPORT int cuCtxPushCurrent_v2(void *context)
 {
-    __atomic_add_fetch(&current, 1, __ATOMIC_SEQ_CST);
+    ++current;
+    ++current_here;
     return context == &contexts ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuCtxPopCurrent_v2(void **context)
 {
-    __atomic_sub_fetch(&current, 1, __ATOMIC_SEQ_CST);
+    --current;
+    --current_here;
     *context = &contexts;
     return SUCCESS;
 }
@@ -179,13 +183,13 @@ EXPORT int cuEventCreate(void **event, unsigned flags)
 {
     *event = calloc(1, 1);
     if (*event)
-        __atomic_add_fetch(&events, 1, __ATOMIC_SEQ_CST);
+        ++events;
     return *event && flags == 2 ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuEventDestroy_v2(void *event)
 {
-    __atomic_sub_fetch(&events, 1, __ATOMIC_SEQ_CST);
+    --events;
     free(event);
     return SUCCESS;
 }
@@ -287,22 +291,22 @@ EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, 
 EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
 {
     do_copy();
-    __atomic_add_fetch(&host_bytes, (long)size, __ATOMIC_SEQ_CST);
+    host_bytes += (long)size;
     memcpy(to, (const void *)(uintptr_t)from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuMemcpyHtoDAsync_v2(unsigned long long to, const void *from, size_t size, void *stream)
 {
-    __atomic_add_fetch(&host_bytes, (long)size, __ATOMIC_SEQ_CST);
+    host_bytes += (long)size;
     memcpy((void *)(uintptr_t)to, from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
-// Not of CUDA: how many contexts are current.
+// Not of CUDA: how many contexts are current in this thread.
 EXPORT long stand_in_current(void)
 {
-    return current;
+    return current_here;
 }
 
 // Not of CUDA: the bytes so far.
