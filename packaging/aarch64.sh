@@ -40,7 +40,7 @@ install() {
 # What the tests import comes once, the wheels of dist/ each time.
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 test -d "$site" || install --find-links dist \
-    "vkbloom[software,images,cli,quality,grid,fit]==$version" pytest pytest-xdist hypothesis
+    "vkbloom[software,images,scenes,cli,quality,grid,fit]==$version" pytest pytest-xdist hypothesis
 install --no-deps dist/*_aarch64.whl
 
 # A processor without SVE: QEMU 7.2 runs the SVE code of NumPy's OpenBLAS wrong.
