@@ -115,7 +115,8 @@ struct vkb_pass_row {
     uint32_t reads[VKB_MAX_READS];
     uint32_t read_count;
     enum vkb_reading reading;
-    bool fused;  // a fused pass: may replace the pass before it, with the same target
+    bool fused;            // a fused pass: may replace the pass before it, with the same target
+    bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity
     uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup
     uint32_t groups_width, groups_height;  // number of workgroups; 0: what covers the target
     uint32_t targets[VKB_MAX_TARGETS];

@@ -206,6 +206,19 @@ bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *r
     return done;
 }
 
+bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                    struct vkb_pass_row *row, struct vkb_error *error)
+{
+    const uint32_t target = pass->targets[0];
+    struct vkb_filter filter;
+
+    if (!pass->constants.masked)
+        return true;
+    row->constants.by = BY_MASK;
+    vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
+    return vkb_bring_through(adjoint, row, &filter, pass->reads[1], target, error);
+}
+
 static struct vkb_size blocks_of(struct vkb_size size)
 {
     return (struct vkb_size){(size.width + SUM_SIDE - 1) / SUM_SIDE,

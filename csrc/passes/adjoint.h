@@ -59,6 +59,11 @@ bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *r
                        const struct vkb_filter *filter, uint32_t image, uint32_t target,
                        struct vkb_error *error);
 
+// If the pass reads a mask, its second image: brings the row's result by it, at the target's
+// pixels, to the mask.
+bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                    struct vkb_pass_row *row, struct vkb_error *error);
+
 // If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
 // add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
 // values, which tell how exact the sum is.

@@ -142,13 +142,8 @@ static bool bring_first_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.block = VKB_BLOCK_prefilter;
     row.params.prefilter = pass->params.prefilter;
     vkb_filter_begin(adjoint->graph, source, target, &filter);
-    if (!vkb_bring_through(adjoint, &row, rows ? &filter : blur, source, target, error))
-        return false;
-    if (!pass->constants.masked)
-        return true;
-    row.constants.by = BY_MASK;
-    vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
-    return vkb_bring_through(adjoint, &row, &filter, pass->reads[1], target, error);
+    return vkb_bring_through(adjoint, &row, rows ? &filter : blur, source, target, error)
+        && vkb_bring_mask(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

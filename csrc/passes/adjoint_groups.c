@@ -163,11 +163,7 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
         if (!vkb_bring_through(adjoint, &row, &filter, pass->reads[0], target, error))
             return false;
     }
-    if (!pass->constants.masked)
-        return true;
-    row.constants.by = BY_MASK;
-    vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
-    return vkb_bring_through(adjoint, &row, &filter, pass->reads[1], target, error);
+    return vkb_bring_mask(adjoint, pass, &row, error);
 }
 
 // Without threshold and mask the reduction is a filter.

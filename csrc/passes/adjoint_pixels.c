@@ -58,15 +58,24 @@ static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     return true;
 }
 
-bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                             struct vkb_error *error)
+static struct vkb_pass_row composite_row(const struct vkb_adjoint *adjoint,
+                                         const struct vkb_pass_row *pass,
+                                         const struct vkb_shader *shader)
 {
     const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
                               vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_composite_frag, reads, 4);
+    struct vkb_pass_row row = vkb_adjoint_row(shader, reads, 4);
 
     row.constants = pass->constants;
     row.constants.dither = 0;
+    return row;
+}
+
+bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_composite_frag);
+
     row.block = VKB_BLOCK_composite;
     row.params.composite = pass->params.composite;
     if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
@@ -77,12 +86,8 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
 bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                                    struct vkb_error *error)
 {
-    const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
-                              vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_godot_final_frag, reads, 4);
+    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag);
 
-    row.constants = pass->constants;
-    row.constants.dither = 0;
     row.block = VKB_BLOCK_godot_final;
     row.params.godot_final = pass->params.godot_final;
     return bring_composite(adjoint, pass, &row, row.params.godot_final.limit, error);
@@ -112,10 +117,8 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
         && !vkb_bring_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
-    if (!bring_sampled(adjoint, &row, pass->reads[0], target, error))
-        return false;
-    row.constants.by = BY_MASK;
-    return !pass->constants.masked || bring_sampled(adjoint, &row, pass->reads[1], target, error);
+    return bring_sampled(adjoint, &row, pass->reads[0], target, error)
+        && vkb_bring_mask(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

@@ -348,20 +348,13 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
     return true;
 }
 
-// Whether the pass is one that gains from a source without NaN and infinity, and this one has none.
-// It is compiled a second time for a source that has.
+// Whether the pass gains from a source without NaN and infinity, and this one has none.
 static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct vkb_specials *specials = &run->frame->specials;
-    const bool gains = (pass->block == VKB_BLOCK_fused_bloom && pass->reading == VKB_READING_WORDS)
-                    || pass->shader == &vkb_shader_adjoint_tile_comp
-                    || pass->shader == &vkb_shader_adjoint_taps_comp_rgba32float
-                    || pass->shader == &vkb_shader_adjoint_filter_dispatch
-                    || pass->shader == &vkb_shader_adjoint_taps_words_rgba32float
-                    || pass->shader == &vkb_shader_adjoint_blend_words_rgba32float
-                    || pass->shader == &vkb_shader_adjoint_threshold_words_rgba32float;
 
-    return gains && !run->unknown_specials && specials->nan == 0 && specials->inf == 0;
+    return pass->gains_if_finite && !run->unknown_specials && specials->nan == 0
+        && specials->inf == 0;
 }
 
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,

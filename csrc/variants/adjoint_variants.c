@@ -258,6 +258,7 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
+    row.gains_if_finite = true;
     if (!filter)
         drop_read(&row, threshold ? 1 : 2);  // the mask
     if (blend) {
@@ -288,6 +289,7 @@ bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
+    row.gains_if_finite = true;
     read_composite(&choice->plain, &row);
     if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MOST_REGISTERS))
         return vkb_add_fullscreen(choice, &row, error);

@@ -203,6 +203,7 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
 
     row->params.fused_bloom.columns = (int32_t)columns;
     row->constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
+    row->gains_if_finite = true;
     vkb_make_words(row, shader, columns, rows);
     if (vertical) {
         row->block_width = columns;
@@ -398,6 +399,7 @@ bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct
     for (row.read_count = 0; row.read_count < 2; ++row.read_count)
         row.reads[row.read_count] = by_bloom->reads[row.read_count];
     row.reads[row.read_count++] = by_bloom->reads[3];
+    row.gains_if_finite = true;
     make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -9,7 +9,7 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = ADJOINT_SIDE;
+const int COLUMNS = ADJOINT_SIDE, ROWS = TEXEL_ROWS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, scene);
@@ -20,23 +20,18 @@ READ_IMAGE(3, cotangents);
 #include "variants/adjoint_runs.glsl"
 #include "lib/adjoint_composite.glsl"
 
-void main()
+void write_row(int first, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE(), first = first_pixel(ivec2(COLUMNS, TEXEL_ROWS));
-    int end = min(first.y + TEXEL_ROWS, size.y);
+    vec4 found[COLUMNS];
 
-    if (first.x >= size.x)
-        return;
-    for (int y = first.y; y < end; ++y) {
-        vec4 found[COLUMNS];
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            int x = min(first.x + i, size.x - 1);
-            Pixel p = pixel_of(load_floats(scene, read_shapes[0], x, y),
-                               LEVELS == 0 ? vec4(0.0) : load_floats(bloom, read_shapes[1], x, y), 1.0,
-                               load_floats(cotangents, read_shapes[2], x, y));
-            found[i] = BY == BY_BLOOM ? by_bloom(p) : by_scene(p);
-        }
-        store_gathered(first.x, y, 1.0, found);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        int x = min(first + i, read_shapes[0].x - 1);
+        Pixel p = pixel_of(load_floats(scene, read_shapes[0], x, y),
+                           LEVELS == 0 ? vec4(0.0) : load_floats(bloom, read_shapes[1], x, y), 1.0,
+                           load_floats(cotangents, read_shapes[2], x, y));
+        found[i] = BY == BY_BLOOM ? by_bloom(p) : by_scene(p);
     }
+    store_gathered(first, y, 1.0, found);
 }
+
+#include "variants/rows.glsl"

@@ -12,7 +12,7 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = ADJOINT_SIDE;
+const int COLUMNS = ADJOINT_SIDE, ROWS = TEXEL_ROWS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, image);
@@ -21,24 +21,18 @@ READ_IMAGE(2, cotangents);
 #define DIFFERENTIATED 4
 #include "variants/adjoint_runs.glsl"
 
-void main()
+void write_row(int first, int y)
 {
-    read_words();
-    ivec2 size = TARGET_SIZE(), first = first_pixel(ivec2(COLUMNS, TEXEL_ROWS));
-    int end = min(first.y + TEXEL_ROWS, size.y);
-    float threshold = params.threshold, knee = params.knee;
+    vec4 found[COLUMNS];
 
-    if (first.x >= size.x)
-        return;
-    for (int y = first.y; y < end; ++y) {
-        vec4 found[COLUMNS];
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            int x = min(first.x + i, size.x - 1);
-            vec4 colour = finite_or_zero(load_floats(image, read_shapes[0], x, y));
-            vec4 brought = load_floats(cotangents, read_shapes[1], x, y);
-            found[i] = back_through_threshold(colour, vec4(brought.rgb, 0.0), THRESHOLD_MODE,
-                                              threshold, knee);
-        }
-        store_gathered(first.x, y, 1.0, found);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        int x = min(first + i, read_shapes[0].x - 1);
+        vec4 colour = finite_or_zero(load_floats(image, read_shapes[0], x, y));
+        vec4 brought = load_floats(cotangents, read_shapes[1], x, y);
+        found[i] = back_through_threshold(colour, vec4(brought.rgb, 0.0), THRESHOLD_MODE,
+                                          params.threshold, params.knee);
     }
+    store_gathered(first, y, 1.0, found);
 }
+
+#include "variants/rows.glsl"
