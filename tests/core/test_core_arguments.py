@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 import threading
 import weakref
 from pathlib import Path
@@ -143,6 +144,10 @@ def test_objects_of_one_type_may_differ_in_attributes() -> None:
         scene_plan(settings_with(loops=17), (16, 16))
 
 
+@pytest.mark.skipif(
+    sys.version_info < (3, 14) and not getattr(sys, "_is_gil_enabled", lambda: True)(),
+    reason="Python 3.13 without the GIL keeps every type once a thread has been started",
+)
 def test_types_of_settings_are_not_kept() -> None:
     class Passing(Given):
         method = "pyramid"
