@@ -47,7 +47,7 @@ SIMPLER = f"""
     --simplify-instructions {SPLIT} --vector-dce --eliminate-dead-inserts
     --eliminate-dead-branches --simplify-instructions --if-conversion --copy-propagate-arrays
     --reduce-load-size --eliminate-dead-code-aggressive --merge-blocks --redundancy-elimination
-    --eliminate-dead-branches --merge-blocks --simplify-instructions
+    --eliminate-dead-branches --merge-blocks --simplify-instructions --compact-ids
 """.split()
 # Larger modules keep their loops: those of many filters, of which their constants leave little.
 MOST_UNROLLED = 260_000

@@ -12,6 +12,12 @@ enum {
     SPV_BOUND = 3,    // the word of the header that all ids are below
     SPV_SPEC_ID = 1,  // decorations
     SPV_BUILT_IN = 11,
+    // Storage classes.
+    SPV_UNIFORM_CONSTANT = 0,
+    SPV_INPUT = 1,
+    SPV_UNIFORM = 2,
+    SPV_PUSH_CONSTANT = 9,
+    SPV_UNROLL = 1,  // how a loop is declared
 };
 
 enum vkb_opcode {
@@ -25,6 +31,7 @@ enum vkb_opcode {
     SPV_TYPE_FLOAT,
     SPV_TYPE_VECTOR,
     SPV_TYPE_IMAGE = 25,
+    SPV_TYPE_ARRAY = 28,
     SPV_TYPE_POINTER = 32,
     SPV_TYPE_FORWARD_POINTER = 39,
     SPV_CONSTANT_TRUE = 41,
@@ -40,15 +47,21 @@ enum vkb_opcode {
     SPV_VARIABLE = 59,
     SPV_IMAGE_TEXEL_POINTER,
     SPV_LOAD = 61,
+    SPV_STORE,
     SPV_ACCESS_CHAIN = 65,
     SPV_IN_BOUNDS_ACCESS_CHAIN,
+    SPV_ARRAY_LENGTH = 68,
     SPV_DECORATE = 71,
     SPV_VECTOR_EXTRACT_DYNAMIC = 77,
     SPV_VECTOR_SHUFFLE = 79,
     SPV_COMPOSITE_CONSTRUCT,
     SPV_COMPOSITE_EXTRACT,
+    SPV_COMPOSITE_INSERT,
+    SPV_COPY_OBJECT,
     SPV_SAMPLE_IMPLICIT = 87,
     SPV_SAMPLE_EXPLICIT,
+    SPV_SAMPLE_DREF_IMPLICIT,
+    SPV_SAMPLE_DREF_EXPLICIT,
     SPV_IMAGE_FETCH = 95,
     SPV_IMAGE_GATHER,
     SPV_IMAGE_DREF_GATHER,
@@ -94,6 +107,8 @@ enum vkb_opcode {
     SPV_BITWISE_AND,
     SPV_NOT,
     SPV_FWIDTH_COARSE = 215,
+    SPV_CONTROL_BARRIER = 224,
+    SPV_MEMORY_BARRIER,
     SPV_ATOMIC_LOAD = 227,
     SPV_ATOMIC_STORE,
     SPV_ATOMIC_XOR = 242,
@@ -104,6 +119,8 @@ enum vkb_opcode {
     SPV_BRANCH,
     SPV_BRANCH_CONDITIONAL,
     SPV_SWITCH,
+    SPV_KILL,
+    SPV_RETURN,
     SPV_UNREACHABLE = 255,
     SPV_NO_LINE = 317,
     SPV_MODULE_PROCESSED = 330,
