@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
-__all__ = ["Named", "did_you_mean", "lacking", "nearest", "unknown"]
+__all__ = ["Named", "NamedLate", "did_you_mean", "lacking", "nearest", "unknown"]
 
 T = TypeVar("T")
 
@@ -72,3 +72,31 @@ class Named(dict[str, T]):
 
     def __missing__(self, name: object) -> T:
         raise KeyError(unknown(f"unknown {self._kind}", name, self))
+
+
+class NamedLate(Mapping[str, T]):
+    """Objects by their published names, as `Named`; each is made when it is first asked for."""
+
+    def __init__(self, kind: str, makers: Mapping[str, Callable[[], T]]) -> None:
+        self._kind = kind
+        self._makers = makers
+        self._made: dict[str, T] = {}
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._makers:
+            raise KeyError(unknown(f"unknown {self._kind}", name, self))
+        if name not in self._made:
+            self._made.setdefault(name, self._makers[name]())
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._makers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))

@@ -69,7 +69,7 @@ def test_what_is_said_of_presets_and_glares() -> None:
         (line,) = (line for line in text.splitlines() if line.split()[:1] == [name])
         assert one.what in line
         assert one.whose in line
-        assert line.split()[1] == one.settings.composite
+        assert line.split()[1] == one.make().composite
     assert all(one.what in run("glares").stdout for one in GLARES.values())
 
 

@@ -377,6 +377,13 @@ def test_layers_that_are_not_pairs_are_refused() -> None:
 # Presets
 
 
+def test_a_preset_imports_its_method_alone() -> None:
+    code = "import sys, vkbloom; assert 'kino' in vkbloom.presets; {}; print(*sys.modules)"
+    uses = "pass", "vkbloom.presets['kino']"
+    names, kino = (output("-c", code.format(use)).split() for use in uses)
+    assert {*kino} - {*names} == {"vkbloom.methods.kino"}
+
+
 def test_presets() -> None:
     assert presets["tutorial"] == Separable()
     assert presets["outline"] == Separable(first_tap=0, texel="x")

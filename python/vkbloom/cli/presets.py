@@ -13,7 +13,7 @@ from vkbloom.settings import Settings
 def entries() -> Iterator[Entry]:
     """Yield the presets."""
     for name, one in PRESETS.items():
-        settings = one.settings
+        settings = one.make()
         # The command line expands the highlights of a photograph for the preset photo.
         needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
         values = {"intensity": settings.intensity, "settings": settings.to_dict()}
@@ -21,7 +21,7 @@ def entries() -> Iterator[Entry]:
 
 
 def _shown(entry: Entry, _: Settings) -> Settings:
-    return PRESETS[entry.name].settings
+    return PRESETS[entry.name].make()
 
 
 command = listing_command(
