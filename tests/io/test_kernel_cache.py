@@ -24,6 +24,7 @@ APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(kernel_cache, "_written", 0)
+    monkeypatch.setattr(kernel_cache, "LEAST_SECONDS", 0)
     # Nothing is found in memory.
     monkeypatch.setattr(kept_arrays, "_of_renderers", lambda: kept_arrays.KeptArrays(0, 0))
     return tmp_path / "cache" / "kernels"
@@ -215,3 +216,20 @@ def test_all_that_differs_is_in_the_key() -> None:
         (psf.cie_total(),),
     ]
     assert len({kernel_cache._key(key) for key in keys} - {None}) == len(keys)
+
+
+@pytest.mark.parametrize(("seconds", "files"), [(1.5, 0), (2, 1)])
+def test_only_what_took_long_has_a_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, seconds: float, files: int
+) -> None:
+    now = 0.0
+
+    def make() -> CoreKernel:
+        nonlocal now
+        now += seconds
+        return kernel_of(1)()
+
+    monkeypatch.setattr(kernel_cache, "LEAST_SECONDS", 2)
+    monkeypatch.setattr(kernel_cache.time, "thread_time", lambda: now)
+    kernel_cache.find_or_make((SPREAD,), make)
+    assert len([*folder.glob("*")]) == files

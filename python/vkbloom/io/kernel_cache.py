@@ -2,7 +2,8 @@
 
 A file is used only if its checksum is right for its content and for what the kernel follows from:
 its function and sizes, the package's source of the formulas, and the version of NumPy. All files
-together have `MOST_BYTES` at the most; the ones whose last use is longest ago are removed.
+together have `MOST_BYTES` at the most; the ones whose last use is longest ago are removed. A kernel
+that was computed in less than `LEAST_SECONDS` has no file: reading one takes a part of that, too.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import functools
 import hashlib
 import os
 import struct
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -25,12 +27,14 @@ from vkbloom.io import pipeline_cache
 from vkbloom.io.safe_writing import write_file
 from vkbloom.psf.values import ArrayValue
 
-__all__ = ["MOST_BYTES", "find_or_make", "folder"]
+__all__ = ["LEAST_SECONDS", "MOST_BYTES", "find_or_make", "folder"]
 
 MAGIC: Final = b"vkbloom kernel 1\n"
 #: The bound of all files. A process writes no more than that in total, so that a long sweep of
 #: kernels does not replace the files of other processes again and again.
 MOST_BYTES: Final = 256 << 20
+#: Of processor time of the thread.
+LEAST_SECONDS: Final = 0.02
 
 # Serial, width, height; left, top, width, height and channels of the part that is not 0.
 _HEADER: Final = struct.Struct("<Q7I")
@@ -51,7 +55,7 @@ def folder() -> Path | None:
 
 
 def find_or_make(what: tuple[object, ...], make: Callable[[], CoreKernel]) -> CoreKernel:
-    """Return a kernel from the cache, or make it and write it there.
+    """Return a kernel from the cache, or make it and write it there if that took long.
 
     `what`: All that the kernel follows from: numbers, strings, tuples, point-spread functions.
     """
@@ -61,8 +65,10 @@ def find_or_make(what: tuple[object, ...], make: Callable[[], CoreKernel]) -> Co
     file = base / f"{key.hex()}.bin"
     kernel = _read(file, key)
     if kernel is None:
+        start = time.thread_time()
         kernel = make()
-        _write(file, _pack(kernel, key))
+        if time.thread_time() - start >= LEAST_SECONDS:
+            _write(file, _pack(kernel, key))
     return kernel
 
 
