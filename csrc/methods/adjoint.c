@@ -205,6 +205,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
 {
     struct vkb_adjoint adjoint = {
         .graph = graph,
+        .max_side = max_side,
         .sums = cotangents->sums,
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,

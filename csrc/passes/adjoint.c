@@ -133,7 +133,8 @@ static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *fi
                         uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_axis *x = &filter->x, *y = &filter->y;
-    const bool rows = (uint64_t)x->from * y->to <= (uint64_t)x->to * y->from;
+    // Only the table of columns knows where the first row is.
+    const bool rows = y->first == 0 && (uint64_t)x->from * y->to <= (uint64_t)x->to * y->from;
     const struct vkb_size size = {rows ? x->from : x->to, rows ? y->to : y->from};
     struct vkb_filter first = *filter;
     uint32_t start, between;
@@ -173,6 +174,15 @@ bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
     return vkb_bring(adjoint, &row, image, error);
 }
 
+bool vkb_add_apart(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                   struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+
+    read_nothing(&row);
+    return add_row(adjoint, &row, size, image, error);
+}
+
 bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, struct vkb_size size, uint32_t *image,
                       struct vkb_error *error)
@@ -185,8 +195,7 @@ bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
         return false;
     row.params.adjoint_filter.start_x = (int)start_x;
     row.params.adjoint_filter.start_y = (int)start_y;
-    read_nothing(&row);
-    return add_row(adjoint, &row, size, image, error);
+    return vkb_add_apart(adjoint, &row, size, image, error);
 }
 
 bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,

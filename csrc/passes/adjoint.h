@@ -13,7 +13,8 @@ struct vkb_adjoint {
     uint32_t table_image;
     uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
     uint32_t added;     // images so far
-    bool sums;          // the derivatives by fields are wanted, not those by images
+    uint32_t max_side;
+    bool sums;  // the derivatives by fields are wanted, not those by images
     // What a composite without a curve brings to its scene is `share` times the cotangents that it
     // has, `brought` of the scene until another pass brings more. That pass adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -49,7 +50,10 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
-// The same as a new image of `size`, to which no other cotangents are added.
+// Adds the row, whose result is a new image of `size`, to which no other cotangents are added; the
+// same of the transpose of a filter.
+bool vkb_add_apart(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                   struct vkb_size size, uint32_t *image, struct vkb_error *error);
 bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, struct vkb_size size, uint32_t *image,
                       struct vkb_error *error);

@@ -141,29 +141,71 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
     }
 }
 
+// All groups from one pass, below each other in one image.
+static bool bring_stacked(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                          const struct vkb_pass_row *given, int count, struct vkb_error *error)
+{
+    const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
+    const uint32_t height = target->height;
+    const struct vkb_size size = {target->width, (uint32_t)count * height};
+    struct vkb_pass_row row = *given;
+    struct vkb_filter filter;
+    uint32_t image;
+
+    row.constants.radix_1 = count;
+    if (!vkb_add_apart(adjoint, &row, size, &image, error))
+        return false;
+    for (int group = 0; group < count; ++group) {
+        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        set_group(&row, group, &filter);
+        filter.y.first = (uint32_t)group * height;
+        if (!vkb_bring_filter(adjoint, &filter, image, pass->reads[0], error))
+            return false;
+    }
+    return true;
+}
+
+// Each group by a pass of its own: if there is one, or if an image of all would be too high, and
+// Blender's, since a driver takes long to compile one shader for its 13.
+static bool bring_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                       const struct vkb_pass_row *given, int count, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+    struct vkb_filter filter;
+
+    for (int group = 0; group < count; ++group) {
+        row.constants.levels = group;
+        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        set_group(&row, group, &filter);
+        if (!vkb_bring_through(adjoint, &row, &filter, pass->reads[0], pass->targets[0], error))
+            return false;
+    }
+    return true;
+}
+
 bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                           struct vkb_error *error)
 {
     const enum vkb_mode groups = groups_of(pass);
     const int count = count_of(groups, pass);
-    const uint32_t target = pass->targets[0];
+    const uint32_t height = adjoint->graph->images[pass->targets[0]].height;
+    const bool stacked =
+        count > 1 && groups != GROUPS_BLENDER && (uint64_t)count * height <= adjoint->max_side;
     const uint32_t reads[] = {pass->reads[0], pass->reads[pass->constants.masked ? 1 : 0],
                               vkb_brought(adjoint, pass)};
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_groups_frag, reads, 3);
-    struct vkb_filter filter;
 
     row.constants = pass->constants;
     row.constants.groups = groups;
+    row.constants.levels = 0;
+    row.constants.radix_1 = 1;
     row.block = VKB_BLOCK_prefilter;
     take_params(pass, &row.params.prefilter);
-    for (int group = 0; group < count; ++group) {
-        row.constants.levels = group;
-        vkb_filter_begin(adjoint->graph, pass->reads[0], target, &filter);
-        set_group(&row, group, &filter);
-        if (!vkb_bring_through(adjoint, &row, &filter, pass->reads[0], target, error))
-            return false;
-    }
-    return vkb_bring_mask(adjoint, pass, &row, error);
+    // Its groups are texels then.
+    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, pass->reads[0], pass->targets[0]))
+        row.constants.sampling = SAMPLING_TEXEL;
+    return (stacked ? bring_stacked : bring_each)(adjoint, pass, &row, count, error)
+        && vkb_bring_mask(adjoint, pass, &row, error);
 }
 
 // Without threshold and mask the reduction is a filter.

@@ -44,7 +44,7 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
 
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
-    return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0
+    return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
         && axis->kind == VKB_KIND_LINEAR && axis->count == 1 && axis->taps[0].offset == 0.0
         && axis->taps[0].weights[0] == 1.0;
 }
@@ -249,7 +249,7 @@ static bool write_table(const struct vkb_axis *axis, bool kernels, const struct 
             to[i] = reader < count ? (float)weights[row->start + reader][kernel] : 0.0f;
         }
         const size_t place = place_list(table, size, lists, &next);
-        table->texels[start + texel][0] = (float)row->first;
+        table->texels[start + texel][0] = (float)(axis->first + row->first);
         table->texels[start + texel][1] = (float)count;
         table->texels[start + texel][2] = (float)place;
         table->texels[start + texel][3] = 0.0f;

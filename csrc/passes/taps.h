@@ -51,6 +51,7 @@ struct vkb_axis {
     double origin, step;
     enum vkb_kind kind;
     enum vkb_border border;
+    uint32_t first;  // where pixel 0 is in the image that the transpose reads
     uint32_t count;
     struct vkb_tap taps[VKB_MOST_TAPS];
 };

@@ -278,6 +278,25 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
+// An invocation for all groups of a pixel, which fragments would compute anew for each.
+bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = pass->shader == &vkb_shader_adjoint_groups_frag && pass->constants.radix_1 > 1;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
+    // Those of one picture, since llvmpipe also runs what an early end leaves out.
+    const struct vkb_image_row *target = &choice->graph->images[row.targets[0]];
+    const uint32_t height = target->height / (uint32_t)row.constants.radix_1;
+    row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
+    row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 // On a GPU, blocks are faster where a filter has several kernels, of which each texel needs all
 // pixels. With one, most texels are in a cache.
 bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
-// in these: of group number LEVELS, or of the mask.
+// in these: of RADIX_1 groups from number LEVELS on, or of the mask.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/sampling.glsl"
@@ -16,6 +16,8 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 3) uniform sampler2D cotangents;
 
 #define TARGET_BINDING 6
+#define STACKED RADIX_1
+#define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 #include "lib/kino.glsl"
@@ -23,6 +25,11 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 #include "lib/thirteen_taps.glsl"
 #include "lib/highlights.glsl"
 #include "lib/mean_of_texels.glsl"
+
+// The group whose cotangents are wanted, what the groups are, and the cotangents of the pixel.
+int own_group;
+Place place;
+vec4 found[5], brought;
 
 // Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
 int group_count()
@@ -144,7 +151,7 @@ vec4 back_weighted(vec4 found[5], vec4 brought, Place place)
         float weight = weight_of(found[group], share_of(group, place), slope);
         sum += weight * found[group];
         total += weight;
-        if (group == LEVELS) {
+        if (group == own_group) {
             own = found[group];
             own_weight = weight;
             own_slope = slope;
@@ -164,7 +171,7 @@ vec4 back_bevy(vec4 found[5], vec4 brought)
         vec4 part = GROUP_SHARES[group] * found[group];
         float luminance = group_luminance(part);
         sum += part / (1.0 + 0.25 * luminance);
-        if (group == LEVELS) {
+        if (group == own_group) {
             own = part;
             own_luminance = luminance;
             own_share = GROUP_SHARES[group];
@@ -236,9 +243,9 @@ vec4 back_kino(vec4 found[5], vec4 brought)
     if (ANTI_FLICKER != 0) {
         vec4 columns[3] = back_middle(first, values[3], values[4], brought);
         vec4 rows[3] = back_middle(values[0], values[1], values[2], columns[0]);
-        brought = LEVELS < 3 ? rows[LEVELS] : columns[LEVELS - 2];
+        brought = own_group < 3 ? rows[own_group] : columns[own_group - 2];
     }
-    return vec4(brought.rgb * vec3(lessThan(found[LEVELS].rgb, vec3(65000.0))), brought.a);
+    return vec4(brought.rgb * vec3(lessThan(found[own_group].rgb, vec3(65000.0))), brought.a);
 }
 
 // The derivative of what a smooth transition subtracts or adds (highlights.glsl).
@@ -269,8 +276,8 @@ vec4 back_highlights(vec4 value, vec4 brought)
 // Of one of Blender's 13 taps: of up to four groups, in each of which brighter taps weigh less.
 vec4 back_blender(Taps taps, vec4 brought)
 {
-    bool inner = LEVELS >= 9;
-    vec4 own = inner ? taps.inner[LEVELS - 9] : taps.outer[LEVELS];
+    bool inner = own_group >= 9;
+    vec4 own = inner ? taps.inner[own_group - 9] : taps.outer[own_group];
     float weight = weighted(own).weight;
     vec4 slope = vec4(-weight * weight * shares_of_brightest(own.rgb), 0.0), total = vec4(0.0);
     for (int group = 0; group < 5; ++group) {
@@ -280,7 +287,7 @@ vec4 back_blender(Taps taps, vec4 brought)
         for (int i = 0; i < 4; ++i) {
             int corner = (group - 1 & 1) + (i & 1) + 3 * ((group - 1 >> 1) + (i >> 1));
             Weighted tap = weighted(group == 0 ? taps.inner[i] : taps.outer[corner]);
-            belongs = belongs || LEVELS == (group == 0 ? 9 + i : corner);
+            belongs = belongs || own_group == (group == 0 ? 9 + i : corner);
             sum += tap.value;
             weights += tap.weight;
         }
@@ -334,12 +341,18 @@ vec4 back(vec4 found[5], vec4 brought, Place place)
     return back_weighted(found, brought, place);
 }
 
-vec4 shade()
+void start()
 {
-    Place place = PLACE_IN(source);
-    vec4 found[5] = means(place), brought = texelFetch(cotangents, PIXEL, 0);
+    place = PLACE_IN(source);
+    found = means(place);
+    brought = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
         brought.a = 0.0;
+}
+
+vec4 shade(int number)
+{
+    own_group = LEVELS + number;
     if (BY == BY_MASK)
         return gathered(vec4(dot(prefiltered(found, place), brought), 0.0, 0.0, 0.0));
     return gathered(back(found, mask_value() * brought, place));

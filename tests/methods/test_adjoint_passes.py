@@ -302,6 +302,15 @@ def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
             check(found, expected, name)
 
 
+def test_groups_of_high_images_have_images_of_their_own(renderer: Renderer) -> None:
+    """Below each other they would be higher than images may be."""
+    image = random_image(4000, 2, channels=3, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pulled(renderer, image, KinoBloom(radius=1.0))
+    found = pullback(cotangents)
+    assert isinstance(found, DeviceGradients)
+    check(found, expected, "image")
+
+
 def test_what_is_not_finite_has_no_derivative(renderer: Renderer) -> None:
     image = random_image(9, 8, seed=1).astype(np.float32)
     image[2, 3, 1], image[5, 5, 0] = np.nan, np.inf
