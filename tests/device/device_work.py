@@ -1,6 +1,6 @@
 """What a renderer does with arrays of CUDA, over the stand-in for libcuda; prints JSON.
 
-Arguments: "validated" or "plain", and the names of functions of WORK; all without.
+Arguments: "validated" or "plain", and the names of functions; all of WORK without.
 
 The device's memory is the host's, so that arrays of NumPy stand for arrays on the device.
 """
@@ -133,6 +133,9 @@ def streams(renderer: Any) -> None:
     renderer.apply(image)
     assert len(image.streams) == 1
     assert image.streams[0] not in (None, 0)
+    # The copy waits for the producer's stream; before version 3 it is the default one.
+    for about in ({"stream": 7}, {"version": 2}):
+        same(renderer.apply(Interfaced(image.array, **about)), renderer.apply(image.array))
 
 
 def sequences(renderer: Any) -> None:
@@ -444,6 +447,12 @@ def errors(renderer: Any) -> None:
     same(apply(wide), apply(image))
 
 
+def missing(renderer: Any) -> None:
+    """With another UUID of the second GPU of the stand-in."""
+    part = "which is not among CUDA's GPUs: Stand-in 0 (uuid:eeeeeeee-"
+    raises(ValueError, part, lambda: renderer.apply(OnDevice(picture(24, 16))))
+
+
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, recycling, lifetime, errors),
     *(gradients, gradient_places),
@@ -468,9 +477,7 @@ def main() -> None:
     use_low_levels()
     wrong = {}
     with Renderer(ADAPTER, validation=VALIDATION) as renderer:
-        for work in WORK:
-            if sys.argv[2:] and work.__name__ not in sys.argv[2:]:
-                continue
+        for work in [globals()[name] for name in sys.argv[2:]] or WORK:
             try:
                 work(renderer)
             except Exception as error:

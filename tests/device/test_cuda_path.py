@@ -32,6 +32,12 @@ def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None
     check(done, folder)
 
 
+def test_a_renderer_on_another_gpu(folder: Path, software: AdapterInfo) -> None:
+    variables = stand_in.variables(folder, software) | {"STAND_IN_UUID": "11" * 16}
+    program = ("-m", "tests.device.device_work", "validated", "missing")
+    check(python(*program, cwd=ROOT, **variables), folder)
+
+
 WORK = ("layouts", "sequences", "layers", "places", "gradients")
 
 
