@@ -18,7 +18,7 @@ fi
 folder=$PWD/build/coverage
 rm -rf "$folder"
 mkdir -p "$folder/tree"
-cp -r csrc shaders python setup.py pyproject.toml README.md tests tools "$folder/tree/"
+cp -r csrc shaders python setup.py pyproject.toml README.md docs examples tests tools "$folder/tree/"
 rm -f "$folder"/tree/python/vkbloom/_core*.so
 test -d ../shared && ln -sfn "$(cd .. && pwd)/shared" "$folder/shared"
 cd "$folder/tree"
