@@ -230,6 +230,6 @@ def test_only_what_took_long_has_a_file(
         return kernel_of(1)()
 
     monkeypatch.setattr(kernel_cache, "LEAST_SECONDS", 2)
-    monkeypatch.setattr(kernel_cache.time, "thread_time", lambda: now)
+    monkeypatch.setattr("time.thread_time", lambda: now)
     kernel_cache.find_or_make((SPREAD,), make)
     assert len([*folder.glob("*")]) == files
