@@ -118,11 +118,13 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(cluster, "_RUN_POINTS", 1)
     most = 0
     runs: list[str] = []
+    sent: list[Any] = []
     submit = client.submit
 
     def counting(function: Any, *rest: Any, **more: Any) -> Any:
         nonlocal most
         runs.extend([more["workers"]] if function is cluster._render else [])
+        sent.extend([function] if function is cluster._unpickled else [])
         made = submit(function, *rest, **more)
         pending = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
         most = max(most, pending)
@@ -132,10 +134,18 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
     made = make(tmp_path / "a.zarr", client)
     assert made["done"].values.all()
     # Of 48 points, two for each worker. As many that are done may not have left the scheduler yet,
-    # and there are the grid itself and the layout's two.
-    assert most <= 2 * (2 * 2) + 3
+    # and there are the grid itself, which is sent once, and the layout.
+    assert most <= 2 * (2 * 2) + 2
+    assert len(sent) == 1
     # Whichever worker has the grid.
     assert all(runs.count(worker) >= len(runs) // 3 for worker in client.nthreads())
+
+
+def test_a_refused_store_leaves_no_renderer(client: Any, tmp_path: Path) -> None:
+    make(tmp_path / "a.zarr", client, reduce={"n": reductions.Max()}, attachments=())
+    with pytest.raises(ValueError, match="another grid"):
+        make(tmp_path / "a.zarr", client, reduce={"n": reductions.Mean()}, attachments=())
+    assert list(client.run(lambda: len(cluster._held)).values()) == [0, 0]
 
 
 def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Path) -> None:

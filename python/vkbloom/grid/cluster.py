@@ -29,8 +29,9 @@ from vkbloom.renderer import Renderer
 
 # Dask's own types are incomplete.
 Client: TypeAlias = Any
+Future: TypeAlias = Any
 
-__all__ = ["check_client", "lay_out_there", "run_there"]
+__all__ = ["check_client", "lay_out_there", "run_there", "shared_grid"]
 
 _PURPOSE: Final = "A grid on a Dask cluster"
 _PLUGIN: Final = "vkbloom-renderers"
@@ -140,26 +141,29 @@ def check_client(client: Any) -> None:
         raise TypeError("client: it is asynchronous; pass one made with asynchronous=False")
 
 
-class _Shared:
-    """A grid, kept by the cluster as the result of a task.
+@contextlib.contextmanager
+def shared_grid(client: Client, grid: Grid) -> Iterator[Future]:
+    """Keep a grid on a cluster, as the result of a task, and the workers' renderers with it.
 
     Unlike scattered data, the result is computed again if the worker that holds it dies.
     """
-
-    def __init__(self, client: Client, grid: Grid) -> None:
-        cloudpickle = import_extra("cloudpickle", "grid", _PURPOSE)
+    cloudpickle = import_extra("cloudpickle", "grid", _PURPOSE)
+    client.register_plugin(_plugin(), name=_PLUGIN)
+    try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
-            self.future = client.submit(
+            shared = client.submit(
                 _unpickled, cloudpickle.dumps(grid), pure=False, retries=_RETRIES
             )
+        yield shared
+    finally:
+        client.unregister_worker_plugin(_PLUGIN)
 
 
-def lay_out_there(client: Client, grid: Grid, adapter: str, validation: bool) -> Layout:
+def lay_out_there(client: Client, shared: Future, adapter: str, validation: bool) -> Layout:
     """Lay out a grid on a worker's renderer: the client's machine may have no adapter."""
-    shared = _Shared(client, grid)
     layout: Layout = client.submit(
-        _lay_out, shared.future, adapter, validation, pure=False, retries=_RETRIES
+        _lay_out, shared, adapter, validation, pure=False, retries=_RETRIES
     ).result()
     return layout
 
@@ -179,7 +183,7 @@ def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[
 
 def run_there(
     client: Client,
-    grid: Grid,
+    shared: Future,
     layout: Layout,
     sink: Sink,
     todo: Iterable[Block],
@@ -193,7 +197,6 @@ def run_there(
     distributed = import_extra("distributed", "grid", _PURPOSE)
     workers = max(1, len(client.nthreads()))
     runs = _runs(todo, layout, math.ceil(missing / (workers * _RUNS_A_WORKER)))
-    shared = _Shared(client, grid)
     # The blocks of each submitted run, and the worker that it was meant for.
     under_way: dict[Any, tuple[tuple[Block, ...], str | None]] = {}
     finished = distributed.as_completed()
@@ -211,7 +214,7 @@ def run_there(
             run = _Run(layout, sink.writer, blocks, adapter, validation)
             future = client.submit(
                 _render,
-                shared.future,
+                shared,
                 run,
                 workers=worker,
                 allow_other_workers=worker is not None,
@@ -229,7 +232,6 @@ def run_there(
         progress.add(tally)
         sink.mark(blocks)
 
-    client.register_plugin(_plugin(), name=_PLUGIN)
     try:
         submit()
         for future in finished:
@@ -241,8 +243,6 @@ def run_there(
         if isinstance(error, distributed.KilledWorker):
             raise Error(f"client: too many workers died: {error}") from error
         raise
-    finally:
-        client.unregister_worker_plugin(_PLUGIN)
 
 
 def _stop(client: Client, under_way: Iterable[Any], take: Any) -> None:

@@ -38,7 +38,8 @@ def render_grid(
             from vkbloom.grid import cluster  # noqa: PLC0415  Dask is optional
 
             cluster.check_client(client)
-            layout = cluster.lay_out_there(client, grid, adapter, validation)
+            shared = stack.enter_context(cluster.shared_grid(client, grid))
+            layout = cluster.lay_out_there(client, shared, adapter, validation)
         sink = prepared(layout)
         done = int(sink.done.sum())
         shown = stack.enter_context(Progress(sink.total, done, shown=progress))
@@ -49,7 +50,7 @@ def render_grid(
         else:
             cluster.run_there(
                 client,
-                grid,
+                shared,
                 layout,
                 sink,
                 sink.missing(),
