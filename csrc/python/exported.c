@@ -231,6 +231,11 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
         done = done && (!waits || vkb_export_filled(self->run, &error));
         Py_END_ALLOW_THREADS
     }
+    if (done && !waits) {
+        VKB_LOCK(vkb_memory);
+        done = vkb_export_filling(self->run, &error);
+        VKB_UNLOCK(vkb_memory);
+    }
     if (done)
         return (PyObject *)self;
     Py_DECREF(self);
@@ -308,6 +313,29 @@ static void destroy_capsule(PyObject *capsule)
     }
 }
 
+// Orders a stream of CUDA, NULL: the renderer's, after what the device draws to the memory.
+static bool order_stream(const struct exported_object *self, void *stream, struct vkb_error *error)
+{
+    VKB_LOCK(vkb_memory);
+    const bool done = vkb_export_drawn(self->run, stream, error);
+    VKB_UNLOCK(vkb_memory);
+    return done;
+}
+
+// stream() -> the renderer's stream, ordered after the device; None: the memory is complete.
+static PyObject *get_stream(PyObject *object, PyObject *unused)
+{
+    struct exported_object *self = exported_of(object);
+    struct vkb_error error = {0};
+
+    (void)unused;
+    if (!self->run->drawn)
+        Py_RETURN_NONE;
+    return order_stream(self, NULL, &error)
+             ? PyLong_FromVoidPtr(vkb_cuda_stream(self->exports->cuda))
+             : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+}
+
 static bool read_shape(PyObject *shape, struct shared *shared)
 {
     const Py_ssize_t count = PyTuple_Size(shape);
@@ -331,12 +359,20 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
     struct exported_object *self = exported_of(object);
     PyObject *shape;
     int code, bits, versioned;
-    Py_ssize_t offset = 0;
+    Py_ssize_t offset;
+    long long stream;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!iip|n:capsule", &PyTuple_Type, &shape, &code, &bits,
-                          &versioned, &offset))
+    if (!PyArg_ParseTuple(arguments, "O!iipnL:capsule", &PyTuple_Type, &shape, &code, &bits,
+                          &versioned, &offset, &stream))
         return NULL;
+    if (!order_stream(self, stream > 0 ? (void *)(uintptr_t)stream : NULL, &error))
+        return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    if (stream < 0) {
+        Py_BEGIN_ALLOW_THREADS
+        vkb_exports_settle(self->exports);
+        Py_END_ALLOW_THREADS
+    }
     struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
     if (!shared)
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -385,9 +421,11 @@ static PyObject *move_bytes(PyObject *object, PyObject *array, Py_ssize_t offset
     if (reaches(self, offset, view.len)) {
         const vkb_cuda_address address = self->run->memory.address + (vkb_cuda_address)offset;
         const size_t size = (size_t)view.len;
+        done = order_stream(self, NULL, &error);
         Py_BEGIN_ALLOW_THREADS
-        done = writes ? vkb_cuda_write(self->exports->cuda, address, view.buf, size, &error)
-                      : vkb_cuda_read(self->exports->cuda, view.buf, address, size, &error);
+        done = done
+            && (writes ? vkb_cuda_write(self->exports->cuda, address, view.buf, size, &error)
+                       : vkb_cuda_read(self->exports->cuda, view.buf, address, size, &error));
         Py_END_ALLOW_THREADS
         if (!done)
             vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -422,7 +460,8 @@ static PyObject *copy_to(PyObject *object, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "KnK|n:copy_to", &address, &size, &after, &offset)
         || !reaches(self, offset, size))
         return NULL;
-    done = vkb_cuda_check(self->exports->cuda, "out", address, &error);
+    done = vkb_cuda_check(self->exports->cuda, "out", address, &error)
+        && order_stream(self, NULL, &error);
     if (done) {
         Py_BEGIN_ALLOW_THREADS
         done = vkb_cuda_copy(self->exports->cuda, address,
@@ -456,9 +495,10 @@ static PyObject *clone_export(PyObject *object, PyObject *arguments)
         Py_DECREF(other);
         return NULL;
     }
-    done = other->run != NULL;
-    if (done) {
+    if (other->run)
         other->exports = self->exports;
+    done = other->run && order_stream(self, NULL, &error);
+    if (done) {
         Py_BEGIN_ALLOW_THREADS
         done = vkb_cuda_copy(self->exports->cuda, other->run->memory.address,
                              self->run->memory.address + (vkb_cuda_address)offset, (size_t)size,
@@ -485,7 +525,10 @@ static PyObject *get_ordinal(PyObject *object, void *unused)
 
 static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
-     "capsule(shape, code, bits, versioned, offset=0) -> a capsule of DLPack."},
+     "capsule(shape, code, bits, versioned, offset, stream) -> a capsule of DLPack. The stream "
+     "waits for the device; -1: this call does."},
+    {"stream", get_stream, METH_NOARGS,
+     "stream() -> the renderer's stream, which waits for the device; None: it need not."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
     {"write", write_bytes, METH_O, "write(array). Copies an array of the host there."},
     {"clone", clone_export, METH_VARARGS,

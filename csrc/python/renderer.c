@@ -104,6 +104,18 @@ static void close_memory(struct vkb_renderer *self)
     VKB_UNLOCK(vkb_memory);
 }
 
+// Streams of CUDA may still wait for the device, which has finished everything.
+static void end_waits(struct vkb_renderer *self)
+{
+    VKB_LOCK(vkb_memory);
+    struct vkb_exports *exports = self->exports;
+    vkb_exports_complete(exports);
+    VKB_UNLOCK(vkb_memory);
+    Py_BEGIN_ALLOW_THREADS
+    vkb_exports_settle(exports);
+    Py_END_ALLOW_THREADS
+}
+
 // Called with the lock and without the GIL. The validation layer reports objects that were not
 // destroyed. After an interrupted wait the renderer stays open. A device that is busy for too long
 // is not destroyed, nor is anything that it may still use.
@@ -123,6 +135,7 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
+    end_waits(self);
     close_memory(self);
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);

@@ -357,6 +357,16 @@ static PyObject *results(const struct vkb_pending *pending)
     return list ? Py_BuildValue("(NN)", list, describe_specials(&pending->requests[0])) : NULL;
 }
 
+// CUDA need not wait any more for what the host has waited for.
+static void complete_exported(const struct vkb_pending *pending)
+{
+    VKB_LOCK(vkb_memory);
+    for (size_t i = 0; i < pending->view_count; ++i)
+        if (pending->outputs[i].exported)
+            pending->outputs[i].exported->drawn = 0;
+    VKB_UNLOCK(vkb_memory);
+}
+
 static PyObject *refuse_to_wait(void)
 {
     PyErr_SetString(PyExc_RuntimeError, "wait: the submission was already waited for");
@@ -394,12 +404,27 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
         vkb_renderer_abandon(renderer, pending);
         return vkb_raise(state_of(object), &error);
     }
+    if (done)
+        complete_exported(pending);
     PyObject *result = done ? results(pending) : vkb_raise(state_of(object), &error);
     PyObject *type, *value, *traceback;
     PyErr_Fetch(&type, &value, &traceback);
     vkb_pending_release(pending);
     PyErr_Restore(type, value, traceback);
     return result;
+}
+
+// Without outputs, or with one that the host has to wait for, it is not ordered.
+static PyObject *get_ordered(PyObject *object, void *unused)
+{
+    const struct submission *self = (struct submission *)object;
+    const struct vkb_pending *pending = self->pending;
+    bool ordered = pending && pending->view_count > 0;
+
+    (void)unused;
+    for (size_t i = 0; ordered && i < pending->view_count; ++i)
+        ordered = pending->outputs[i].exported && pending->outputs[i].exported->drawn;
+    return PyBool_FromLong(ordered);
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)
@@ -435,11 +460,18 @@ static PyMethodDef methods[] = {
     {0},
 };
 
+static PyGetSetDef attributes[] = {
+    {"ordered", get_ordered, NULL,
+     "Whether streams of CUDA wait for all its arrays, so that the host need not.", NULL},
+    {0},
+};
+
 static PyType_Slot slots[] = {
     {Py_tp_dealloc, vkb_dealloc},
     {Py_tp_traverse, traverse},
     {Py_tp_clear, clear},
     {Py_tp_methods, methods},
+    {Py_tp_getset, attributes},
     {Py_tp_doc, "Plans that the device runs as one submission."},
     {0},
 };

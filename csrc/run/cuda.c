@@ -50,6 +50,7 @@ enum {
     ATTRIBUTE_DEVICE_ORDINAL = 9,
     HANDLE_OPAQUE_FD = 1,
     MEMORY_DEDICATED = 1,
+    HANDLE_TIMELINE_FD = 9,
 };
 
 struct memory_handle {
@@ -67,6 +68,24 @@ struct memory_handle {
 
 struct memory_buffer {
     unsigned long long offset, size;
+    unsigned flags, reserved[16];
+};
+
+struct semaphore_handle {
+    int type;
+    union {
+        int descriptor;
+        struct {
+            void *handle;
+            const void *name;
+        } other;
+    } handle;
+    unsigned flags, reserved[16];
+};
+
+// CUDA has two structs of this size, for signals and for waits.
+struct semaphore_point {
+    unsigned long long value, others[8];
     unsigned flags, reserved[16];
 };
 
@@ -102,13 +121,22 @@ struct uuid {
     NAME(cuExternalMemoryGetMappedBuffer, "cuExternalMemoryGetMappedBuffer", \
          (vkb_cuda_address *, void *, const struct memory_buffer *)) \
     NAME(cuDestroyExternalMemory, "cuDestroyExternalMemory", (void *)) \
+    NAME(cuImportExternalSemaphore, "cuImportExternalSemaphore", \
+         (void **, const struct semaphore_handle *)) \
+    NAME(cuDestroyExternalSemaphore, "cuDestroyExternalSemaphore", (void *)) \
+    NAME(cuSignalExternalSemaphoresAsync, "cuSignalExternalSemaphoresAsync", \
+         (void *const *, const struct semaphore_point *, unsigned, void *)) \
+    NAME(cuWaitExternalSemaphoresAsync, "cuWaitExternalSemaphoresAsync", \
+         (void *const *, const struct semaphore_point *, unsigned, void *)) \
     NAME(cuMemFree, "cuMemFree_v2", (vkb_cuda_address)) \
     NAME(cuMemcpyDtoDAsync, "cuMemcpyDtoDAsync_v2", \
          (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
     NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *)) \
     NAME(cuMemcpyHtoDAsync, "cuMemcpyHtoDAsync_v2", \
          (vkb_cuda_address, const void *, size_t, void *))
-#define LATER_FUNCTIONS(NAME) NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *))
+#define LATER_FUNCTIONS(NAME) \
+    NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *)) \
+    NAME(cuCtxWaitEvent, "cuCtxWaitEvent", (void *, void *))
 
 struct vkb_cuda {
 #define MEMBER(name, symbol, arguments) result(*name) arguments;
@@ -331,6 +359,58 @@ void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
     *memory = (struct vkb_cuda_memory){0};
 }
 
+void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vkb_error *error)
+{
+    const struct semaphore_handle handle = {
+        .type = HANDLE_TIMELINE_FD,
+        .handle.descriptor = descriptor,
+    };
+    void *semaphore = NULL;
+
+    if (!enter(cuda, error)
+        || !leave(cuda, CU(error, cuda->cuImportExternalSemaphore(&semaphore, &handle)))) {
+        close_descriptor(descriptor);
+        return NULL;
+    }
+    return semaphore;
+}
+
+void vkb_cuda_free_semaphore(struct vkb_cuda *cuda, void *semaphore)
+{
+    struct vkb_error ignored;
+
+    if (enter(cuda, &ignored))
+        leave(cuda, cuda->cuDestroyExternalSemaphore(semaphore) == 0);
+}
+
+bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
+                     struct vkb_error *error)
+{
+    const struct semaphore_point point = {.value = value};
+
+    return enter(cuda, error)
+        && leave(cuda, CU(error, cuda->cuSignalExternalSemaphoresAsync(&semaphore, &point, 1,
+                                                                       cuda->stream)));
+}
+
+bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
+                   struct vkb_error *error)
+{
+    const struct semaphore_point point = {.value = value};
+
+    return enter(cuda, error)
+        && leave(cuda, CU(error, cuda->cuWaitExternalSemaphoresAsync(
+                                     &semaphore, &point, 1, stream ? stream : cuda->stream)));
+}
+
+void vkb_cuda_settle(struct vkb_cuda *cuda)
+{
+    struct vkb_error ignored;
+
+    if (enter(cuda, &ignored))
+        leave(cuda, cuda->cuCtxSynchronize() == 0);
+}
+
 bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
                     struct vkb_error *error)
 {
@@ -391,6 +471,14 @@ bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_
                  follow(cuda, after, error)
                      && CU(error, cuda->cuMemcpyDtoDAsync(to->address, from, size, cuda->stream))
                      && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
+}
+
+bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to)
+{
+    struct vkb_error ignored;
+
+    return cuda->cuCtxWaitEvent && enter(cuda, &ignored)
+        && leave(cuda, cuda->cuCtxWaitEvent(cuda->context, to->event) == 0);
 }
 
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,

@@ -28,6 +28,19 @@ void vkb_cuda_close(struct vkb_cuda *cuda);
 bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error);
 void vkb_cuda_leave(struct vkb_cuda *cuda);
 
+// Imports an exported timeline semaphore. The descriptor belongs to CUDA or is closed.
+void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vkb_error *error);
+// No stream may still wait for it or signal it.
+void vkb_cuda_free_semaphore(struct vkb_cuda *cuda, void *semaphore);
+// Signals it when the stream has done all work that it has got so far.
+bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
+                     struct vkb_error *error);
+// Makes a stream wait for it; NULL: the own one.
+bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
+                   struct vkb_error *error);
+// Waits until the context has done all work. May overlap with other calls.
+void vkb_cuda_settle(struct vkb_cuda *cuda);
+
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
 // As other libraries get it.
 void *vkb_cuda_stream(const struct vkb_cuda *cuda);
@@ -55,6 +68,10 @@ bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_
                          size_t size, void *after, struct vkb_error *error);
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error);
+// Makes all work that the context gets from now on wait for the copy, so that its source can be
+// freed or overwritten: nothing tells which stream would do that. False where drivers are too old,
+// or while a graph is captured; then the host has to wait.
+bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to);
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
 bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,

@@ -214,12 +214,46 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     return true;
 }
 
-bool vkb_exported_filled(const struct vkb_run *run, struct vkb_error *error)
+// The next exported output from `*output` of `*request` on; NULL: there is none. Both are advanced.
+static struct vkb_export *next_output(const struct vkb_request *requests, uint32_t request_count,
+                                      uint32_t *request, uint32_t *output)
 {
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (run->inputs[kind].input && !vkb_export_filled(run->inputs[kind].input->exported, error))
+    for (; *request < request_count; ++*request, *output = 0)
+        while (*output < requests[*request].plan->output_count) {
+            struct vkb_export *exported = requests[*request].outputs[(*output)++].exported;
+            if (exported)
+                return exported;
+        }
+    return NULL;
+}
+
+bool vkb_exported_begin(const struct vkb_run *run, const struct vkb_request *requests,
+                        uint32_t request_count, struct vkb_order *order, struct vkb_error *error)
+{
+    uint32_t request = 0, at = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        const struct vkb_input *input = run->inputs[kind].input;
+        if (!input)
+            continue;
+        if (!vkb_export_filled(input->exported, error))
             return false;
+        vkb_export_wait(input->exported, &order->waits[VKB_NEIGHBOUR_CUDA]);
+    }
+    const struct vkb_export *output = next_output(requests, request_count, &request, &at);
+    if (output)
+        vkb_export_signal(output, &order->signals[VKB_NEIGHBOUR_CUDA]);
     return true;
+}
+
+void vkb_exported_end(const struct vkb_request *requests, uint32_t request_count,
+                      const struct vkb_order *order)
+{
+    uint32_t request = 0, at = 0;
+    struct vkb_export *output;
+
+    while ((output = next_output(requests, request_count, &request, &at)))
+        output->drawn = order->signals[VKB_NEIGHBOUR_CUDA].value;
 }
 
 static bool gather_image(struct vkb_run *run, struct vkb_image *image, struct vkb_gather_work *work,

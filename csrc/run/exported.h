@@ -22,8 +22,13 @@ bool vkb_exported_dispatches(const struct vkb_device *device, const struct vkb_o
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
-// Waits until CUDA has filled the memory of the inputs, before the device reads it.
-bool vkb_exported_filled(const struct vkb_run *run, struct vkb_error *error);
+// Orders the submission after what CUDA fills, and before what it reads. Where the device has no
+// timelines, this waits until CUDA has filled the memory of the inputs.
+bool vkb_exported_begin(const struct vkb_run *run, const struct vkb_request *requests,
+                        uint32_t request_count, struct vkb_order *order, struct vkb_error *error);
+// After the submission: the outputs know the point at which they are complete.
+void vkb_exported_end(const struct vkb_request *requests, uint32_t request_count,
+                      const struct vkb_order *order);
 
 // Records what follows the copy of an output by its sink: it is handed over to CUDA.
 bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,

@@ -4,6 +4,38 @@
 #define KEPT_BYTES ((uint64_t)512 << 20)
 #define GRANULE    ((uint64_t)64 << 10)
 
+static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline)
+{
+    if (timeline->cuda)
+        vkb_cuda_free_semaphore(exports->cuda, timeline->cuda);
+    exports->device->vk.vkDestroySemaphore(exports->device->handle, timeline->semaphore, NULL);
+    *timeline = (struct vkb_shared_timeline){0};
+}
+
+static bool create_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline)
+{
+    struct vkb_error ignored = {0};
+    int descriptor;
+
+    if (!vkb_timeline_export(exports->device, &timeline->semaphore, &descriptor, &ignored))
+        return false;
+    timeline->cuda = vkb_cuda_import_semaphore(exports->cuda, descriptor, &ignored);
+    return timeline->cuda;
+}
+
+// Both or none: without them the host waits, so that a failure is none of the caller's.
+static void share_timelines(struct vkb_exports *exports)
+{
+    if (!exports->device->timelines)
+        return;
+    const struct vkb_messages *before = vkb_messages_begin(&exports->device->messages);
+    if (!create_timeline(exports, &exports->filled) || !create_timeline(exports, &exports->drawn)) {
+        destroy_timeline(exports, &exports->filled);
+        destroy_timeline(exports, &exports->drawn);
+    }
+    vkb_messages_end(before);
+}
+
 struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct vkb_error *error)
 {
     struct vkb_exports *exports;
@@ -19,8 +51,10 @@ struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct v
         return NULL;
     exports->device = device;
     exports->cuda = vkb_cuda_open(device->adapter.uuid, device->adapter.name, error);
-    if (exports->cuda)
+    if (exports->cuda) {
+        share_timelines(exports);
         return exports;
+    }
     vkb_free(exports);
     return NULL;
 }
@@ -45,7 +79,7 @@ static struct vkb_export *create_export(struct vkb_exports *exports, uint64_t si
     if (!one)
         return NULL;
     one->size = (size + GRANULE - 1) / GRANULE * GRANULE;
-    one->cuda = exports->cuda;
+    one->exports = exports;
     const struct vkb_messages *before = vkb_messages_begin(&exports->device->messages);
     const bool done =
         vkb_buffer_export(exports->device, one->size, &one->buffer, &descriptor, error);
@@ -109,14 +143,66 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
     } else if (!(one = create_export(exports, size, error))) {
         return NULL;
     }
+    one->filled = one->drawn = 0;
     push(&exports->taken, one);
     return one;
 }
 
 bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error)
 {
-    one->filling = one->filling && !vkb_cuda_end_copy(one->cuda, &one->memory, error);
+    one->filling = one->filling && !vkb_cuda_end_copy(one->exports->cuda, &one->memory, error);
     return !one->filling;
+}
+
+bool vkb_export_filling(struct vkb_export *one, struct vkb_error *error)
+{
+    struct vkb_shared_timeline *timeline = &one->exports->filled;
+
+    if (!timeline->semaphore || !vkb_cuda_order_copy(one->exports->cuda, &one->memory))
+        return true;
+    if (!vkb_cuda_signal(one->exports->cuda, timeline->cuda, timeline->value + 1, error))
+        return false;
+    one->filled = ++timeline->value;
+    one->filling = false;
+    return true;
+}
+
+void vkb_export_wait(const struct vkb_export *one, struct vkb_point *point)
+{
+    if (one->filled > point->value)
+        *point = (struct vkb_point){one->exports->filled.semaphore, one->filled};
+}
+
+void vkb_export_signal(const struct vkb_export *one, struct vkb_point *point)
+{
+    struct vkb_shared_timeline *timeline = &one->exports->drawn;
+
+    if (timeline->semaphore)
+        *point = (struct vkb_point){timeline->semaphore, ++timeline->value};
+}
+
+bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error)
+{
+    const struct vkb_exports *exports = one->exports;
+
+    if (!one->drawn)
+        return true;
+    if (exports->device->lost)
+        return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+                        "the device was lost before the framebuffer was complete");
+    return vkb_cuda_wait(exports->cuda, exports->drawn.cuda, one->drawn, stream, error);
+}
+
+void vkb_exports_complete(struct vkb_exports *exports)
+{
+    for (struct vkb_export *one = exports ? exports->taken : NULL; one; one = one->next)
+        one->drawn = 0;
+}
+
+void vkb_exports_settle(const struct vkb_exports *exports)
+{
+    if (exports && exports->filled.semaphore)
+        vkb_cuda_settle(exports->cuda);
 }
 
 // A closed object is freed with its last memory.
@@ -151,6 +237,8 @@ void vkb_exports_close(struct vkb_exports *exports)
         drop_oldest(exports);
     for (struct vkb_export *one = exports->taken; one; one = one->next)
         vkb_buffer_destroy(exports->device, &one->buffer);
+    destroy_timeline(exports, &exports->filled);
+    destroy_timeline(exports, &exports->drawn);
     exports->device = NULL;
     free_closed(exports);
 }

@@ -6,14 +6,24 @@
 
 #include "run/cuda.h"
 #include "vulkan/export.h"
+#include "vulkan/timeline.h"
 
 struct vkb_export {
     struct vkb_export *previous, *next;  // in the list of taken or idle ones
     struct vkb_buffer buffer;
     struct vkb_cuda_memory memory;
     uint64_t size;
-    struct vkb_cuda *cuda;
-    bool filling;  // CUDA may still copy to it
+    struct vkb_exports *exports;
+    bool filling;  // CUDA may still copy to it, and no point tells when it is filled
+    // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
+    uint64_t filled, drawn;
+};
+
+// A timeline of Vulkan that CUDA shares. `value` is the last point that was given away.
+struct vkb_shared_timeline {
+    VkSemaphore semaphore;  // VK_NULL_HANDLE: there is none; the host waits instead
+    void *cuda;
+    uint64_t value;
 };
 
 struct vkb_exports {
@@ -21,6 +31,8 @@ struct vkb_exports {
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
     uint64_t idle_size;
+    // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
+    struct vkb_shared_timeline filled, drawn;
 };
 
 // Opens CUDA for the device.
@@ -34,6 +46,23 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error);
 // Waits for a copy that vkb_cuda_begin_copy has begun. May overlap with calls for other memory.
 bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error);
+
+// Lets CUDA signal that the copy is complete, so that the host need not wait for it, if CUDA can
+// order it with the work of other streams.
+bool vkb_export_filling(struct vkb_export *one, struct vkb_error *error);
+// The point of the copy, if it is later than `point` and the host does not wait for it.
+void vkb_export_wait(const struct vkb_export *one, struct vkb_point *point);
+// The next point of the device's work, with the renderer's lock; none without timelines.
+void vkb_export_signal(const struct vkb_export *one, struct vkb_point *point);
+// Makes a stream of CUDA wait until the device has drawn to the memory; NULL: CUDA's own stream
+// here. Fails if the device was lost before.
+bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error);
+
+// The device has finished everything: no stream has to wait any more. May be NULL, as below.
+void vkb_exports_complete(struct vkb_exports *exports);
+// Waits until CUDA has done all work of the context, before the timelines are destroyed. May
+// overlap with other calls.
+void vkb_exports_settle(const struct vkb_exports *exports);
 // The device must have finished all work on it, and CUDA a copy to it. What CUDA's streams have got
 // so far may still use it.
 void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one);

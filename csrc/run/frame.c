@@ -146,7 +146,7 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
         return true;
     if (!vkb_submissions_wait(device, &run->frame->submissions, error)
         || !vkb_scene_begin(device, &submission->commands, data, scene, error)
-        || !vkb_submission_submit(device, submission, VK_NULL_HANDLE, error)
+        || !vkb_submission_submit(device, submission, NULL, error)
         || !vkb_submission_wait(device, &run->frame->submissions, submission, error))
         return false;
     vkb_scene_end(device, data, scene);
@@ -289,7 +289,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
     VkCommandBuffer commands = submission->commands.buffer;
-    VkSemaphore rendered = VK_NULL_HANDLE;
+    struct vkb_order order = {0};
 
     if (run->show) {
         if (!vkb_screen_acquire(device, &run->frame->submissions, run->show,
@@ -297,7 +297,9 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
         if (!run->show->acquired)
             return true;
-        rendered = run->show->screen->images[run->show->screen->index].rendered;
+        order.waits[VKB_NEIGHBOUR_SCREEN].semaphore = submission->commands.available;
+        order.signals[VKB_NEIGHBOUR_SCREEN].semaphore =
+            run->show->screen->images[run->show->screen->index].rendered;
     }
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
@@ -311,8 +313,12 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
     vkb_barrier_record_host_read(device, commands);
     // Not earlier: the host records while CUDA copies the inputs.
-    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_filled(run, error)
-        && vkb_submission_submit(device, submission, rendered, error);
+    if (!vkb_buffer_flush(device, &submission->uniforms, error)
+        || !vkb_exported_begin(run, requests, request_count, &order, error)
+        || !vkb_submission_submit(device, submission, &order, error))
+        return false;
+    vkb_exported_end(requests, request_count, &order);
+    return true;
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,

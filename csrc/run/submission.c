@@ -92,9 +92,9 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
 }
 
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
-                           VkSemaphore rendered, struct vkb_error *error)
+                           const struct vkb_order *order, struct vkb_error *error)
 {
-    submission->pending = vkb_commands_submit(device, &submission->commands, rendered, error);
+    submission->pending = vkb_commands_submit(device, &submission->commands, order, error);
     return submission->pending;
 }
 

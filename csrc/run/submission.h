@@ -48,7 +48,7 @@ bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submi
 
 // Ends the recording and submits it, as vkb_commands_submit does.
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
-                           VkSemaphore rendered, struct vkb_error *error);
+                           const struct vkb_order *order, struct vkb_error *error);
 // Waits until the device has finished the submission and all before it. On failure it is still
 // pending.
 bool vkb_submission_wait(struct vkb_device *device, const struct vkb_submissions *submissions,

@@ -60,11 +60,10 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 }
 
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         VkSemaphore rendered, struct vkb_error *error)
+                         const struct vkb_order *order, struct vkb_error *error)
 {
     return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
-        && vkb_device_submit(device, commands->buffer, commands->available, rendered,
-                             commands->fence, error);
+        && vkb_device_submit(device, commands->buffer, order, commands->fence, error);
 }
 
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,

@@ -19,10 +19,9 @@ void vkb_commands_destroy(const struct vkb_device *device, struct vkb_commands *
 // Begins an empty recording. A recording that was not submitted is discarded.
 bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *commands,
                         struct vkb_error *error);
-// Ends the recording and submits it. The device runs submissions in order. With `rendered`, which
-// is signalled when the commands have run, they wait for `available`.
+// Ends the recording and submits it. The device runs submissions in order. `order` may be NULL.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         VkSemaphore rendered, struct vkb_error *error);
+                         const struct vkb_order *order, struct vkb_error *error);
 // Waits for the last submission, which contains `frames` frames.
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);

@@ -93,36 +93,94 @@ static bool has_scalar_layout(const struct vkb_device *device)
     return layout.scalarBlockLayout;
 }
 
-// Finds the optional extensions that the device can use, and what they are for.
-static bool choose_extensions(struct vkb_device *device, const char *extensions[4], uint32_t *count,
-                              struct vkb_error *error)
+// Whether the device can export timeline semaphores, if it has the extensions.
+static bool exports_timelines(const struct vkb_device *device)
 {
-    bool has_import;
+    const VkSemaphoreTypeCreateInfo type = {
+        .sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO,
+        .semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE,
+    };
+    VkExternalSemaphoreProperties properties = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_SEMAPHORE_PROPERTIES,
+    };
+    VkPhysicalDeviceTimelineSemaphoreFeatures timelines = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_TIMELINE_SEMAPHORE_FEATURES,
+    };
 
-    *count = 0;
-    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
-        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
-        || !has_extension(device, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME, &device->exports, error)
-        || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
-                          error))
+    device->instance->vk.vkGetPhysicalDeviceFeatures2(
+        device->adapter.physical, &(VkPhysicalDeviceFeatures2){
+                                      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
+                                      .pNext = &timelines,
+                                  });
+    device->instance->vk.vkGetPhysicalDeviceExternalSemaphoreProperties(
+        device->adapter.physical,
+        &(VkPhysicalDeviceExternalSemaphoreInfo){
+            .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_SEMAPHORE_INFO,
+            .pNext = &type,
+            .handleType = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT,
+        },
+        &properties);
+    return timelines.timelineSemaphore
+        && (properties.externalSemaphoreFeatures & VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT);
+}
+
+enum { MOST_EXTENSIONS = 6 };
+
+struct extensions {
+    const char *names[MOST_EXTENSIONS];
+    uint32_t count;
+};
+
+// What shares buffers with CUDA, and the order of the work on them.
+static bool choose_exports(struct vkb_device *device, struct extensions *extensions,
+                           struct vkb_error *error)
+{
+    bool has_timelines;
+
+    if (!has_extension(device, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME, &device->exports, error)
+        || !has_extension(device, VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME, &device->timelines,
+                          error)
+        || !has_extension(device, VK_KHR_TIMELINE_SEMAPHORE_EXTENSION_NAME, &has_timelines, error))
         return false;
-    if (has_import && imports_buffers(device)) {
-        device->import_alignment = import_alignment(device);
-        extensions[(*count)++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
-    }
     device->exports = device->exports
                    && (external_features(device, vkb_device_export_usage(),
                                          VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT)
                        & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT);
+    device->timelines =
+        device->exports && device->timelines && has_timelines && exports_timelines(device);
     if (device->exports)
-        extensions[(*count)++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
+        extensions->names[extensions->count++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
+    if (device->timelines) {
+        extensions->names[extensions->count++] = VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME;
+        extensions->names[extensions->count++] = VK_KHR_TIMELINE_SEMAPHORE_EXTENSION_NAME;
+    }
+    return true;
+}
+
+// Finds the optional extensions that the device can use, and what they are for.
+static bool choose_extensions(struct vkb_device *device, struct extensions *extensions,
+                              struct vkb_error *error)
+{
+    bool has_import;
+
+    *extensions = (struct extensions){0};
+    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
+        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
+        || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
+                          error)
+        || !choose_exports(device, extensions, error))
+        return false;
+    if (has_import && imports_buffers(device)) {
+        device->import_alignment = import_alignment(device);
+        extensions->names[extensions->count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+    }
     // It depends on the instance's extension.
     device->presents = device->presents && device->instance->surfaces;
     if (device->presents)
-        extensions[(*count)++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+        extensions->names[extensions->count++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
     device->scalar_layout = device->scalar_layout && has_scalar_layout(device);
     if (device->scalar_layout)
-        extensions[(*count)++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
+        extensions->names[extensions->count++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
     return true;
 }
 
@@ -130,22 +188,26 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &device->instance->vk;
     const VkPhysicalDeviceFeatures available = available_features(device);
-    const char *extensions[4];
-    uint32_t extension_count;
+    struct extensions extensions;
+
+    if (!choose_extensions(device, &extensions, error))
+        return false;
     VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
         .scalarBlockLayout = VK_TRUE,
     };
-
-    if (!choose_extensions(device, extensions, &extension_count, error))
-        return false;
+    VkPhysicalDeviceTimelineSemaphoreFeatures timelines = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_TIMELINE_SEMAPHORE_FEATURES,
+        .pNext = device->scalar_layout ? &scalar_layout : NULL,
+        .timelineSemaphore = VK_TRUE,
+    };
     device->dispatch = available.shaderStorageImageWriteWithoutFormat;
     return VK(error,
               vk->vkCreateDevice(
                   device->adapter.physical,
                   &(VkDeviceCreateInfo){
                       .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                      .pNext = device->scalar_layout ? &scalar_layout : NULL,
+                      .pNext = device->timelines ? &timelines : timelines.pNext,
                       .pEnabledFeatures =
                           &(VkPhysicalDeviceFeatures){
                               .shaderStorageImageWriteWithoutFormat = device->dispatch,
@@ -164,8 +226,8 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                               .queueCount = 1,
                               .pQueuePriorities = &(float){1.0f},
                           },
-                      .enabledExtensionCount = extension_count,
-                      .ppEnabledExtensionNames = extensions,
+                      .enabledExtensionCount = extensions.count,
+                      .ppEnabledExtensionNames = extensions.names,
                   },
                   NULL, &device->handle));
 }
@@ -342,20 +404,51 @@ static bool remember_loss(struct vkb_device *device, bool done, const struct vkb
     return done;
 }
 
-bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkSemaphore available,
-                       VkSemaphore rendered, VkFence fence, struct vkb_error *error)
+// Appends the points that there are to the semaphores and values of a submission.
+static uint32_t add_points(const struct vkb_point points[VKB_NEIGHBOUR_COUNT],
+                           VkSemaphore semaphores[VKB_NEIGHBOUR_COUNT],
+                           uint64_t values[VKB_NEIGHBOUR_COUNT],
+                           VkPipelineStageFlags stages[VKB_NEIGHBOUR_COUNT])
 {
-    const uint32_t semaphore_count = rendered != VK_NULL_HANDLE;
-    const VkPipelineStageFlags stages = vkb_access_stages(VKB_ACCESS_ACQUIRED);
-    VkSubmitInfo submit = {
+    uint32_t count = 0;
+
+    for (int neighbour = 0; neighbour < VKB_NEIGHBOUR_COUNT; ++neighbour) {
+        if (!points[neighbour].semaphore)
+            continue;
+        semaphores[count] = points[neighbour].semaphore;
+        values[count] = points[neighbour].value;
+        stages[count++] = neighbour == VKB_NEIGHBOUR_SCREEN ? vkb_access_stages(VKB_ACCESS_ACQUIRED)
+                                                            : VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+    }
+    return count;
+}
+
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
+                       const struct vkb_order *order, VkFence fence, struct vkb_error *error)
+{
+    VkSemaphore waits[VKB_NEIGHBOUR_COUNT], signals[VKB_NEIGHBOUR_COUNT];
+    uint64_t wait_values[VKB_NEIGHBOUR_COUNT], signal_values[VKB_NEIGHBOUR_COUNT];
+    VkPipelineStageFlags stages[VKB_NEIGHBOUR_COUNT], unused[VKB_NEIGHBOUR_COUNT];
+    const uint32_t wait_count = order ? add_points(order->waits, waits, wait_values, stages) : 0;
+    const uint32_t signal_count =
+        order ? add_points(order->signals, signals, signal_values, unused) : 0;
+    const VkTimelineSemaphoreSubmitInfo values = {
+        .sType = VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO,
+        .waitSemaphoreValueCount = wait_count,
+        .pWaitSemaphoreValues = wait_values,
+        .signalSemaphoreValueCount = signal_count,
+        .pSignalSemaphoreValues = signal_values,
+    };
+    const VkSubmitInfo submit = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
-        .waitSemaphoreCount = semaphore_count,
-        .pWaitSemaphores = &available,
-        .pWaitDstStageMask = &stages,
+        .pNext = device->timelines ? &values : NULL,
+        .waitSemaphoreCount = wait_count,
+        .pWaitSemaphores = waits,
+        .pWaitDstStageMask = stages,
         .commandBufferCount = 1,
         .pCommandBuffers = &commands,
-        .signalSemaphoreCount = semaphore_count,
-        .pSignalSemaphores = &rendered,
+        .signalSemaphoreCount = signal_count,
+        .pSignalSemaphores = signals,
     };
     bool done = VK(error, device->vk.vkQueueSubmit(device->queue, 1, &submit, fence));
 

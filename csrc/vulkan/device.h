@@ -6,6 +6,7 @@
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
+#include "vulkan/timeline.h"
 
 #include <stdatomic.h>
 
@@ -31,6 +32,7 @@ struct vkb_device {
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
     bool exports;      // buffers can be exported as descriptors
+    bool timelines;    // so can timeline semaphores
     atomic_bool lost;  // other threads read it while the device is in use
     bool timed_out;    // lost because a wait took too long; it may still be busy
     VkFence idle;      // of vkb_device_wait_idle; null: not needed so far
@@ -59,10 +61,10 @@ VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device);
 VkBufferUsageFlags vkb_device_export_usage(void);
 
 // Submits the recorded commands. The unsignalled `fence` is signalled when the device has run them
-// and all earlier submissions. With `rendered`, which is signalled, too, the commands wait for
-// `available` before VKB_ACCESS_ACQUIRED. Device loss is stored in the device.
-bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands, VkSemaphore available,
-                       VkSemaphore rendered, VkFence fence, struct vkb_error *error);
+// and all earlier submissions. The commands wait for a screen before VKB_ACCESS_ACQUIRED, and for
+// CUDA before anything. `order` may be NULL. Device loss is stored in the device.
+bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
+                       const struct vkb_order *order, VkFence fence, struct vkb_error *error);
 // Waits for the fence and resets it. If the wait takes longer than `frames` frames may take, the
 // device counts as lost. Device loss is stored in the device. After a failure the device may still
 // be busy.

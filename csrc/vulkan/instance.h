@@ -22,6 +22,7 @@ extern const char vkb_install_hint[];
     NAME(vkEnumeratePhysicalDevices) \
     NAME(vkGetDeviceProcAddr) \
     NAME(vkGetPhysicalDeviceExternalBufferProperties) \
+    NAME(vkGetPhysicalDeviceExternalSemaphoreProperties) \
     NAME(vkGetPhysicalDeviceFeatures) \
     NAME(vkGetPhysicalDeviceFeatures2) \
     NAME(vkGetPhysicalDeviceFormatProperties) \

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from vkbloom.device_arrays import Taken
     from vkbloom.frames import Frames
+    from vkbloom.requests import Ends
     from vkbloom.settings import Settings
 
 __all__ = ["Batches"]
@@ -40,6 +42,7 @@ class _Part(NamedTuple):
 
     submission: _core.Submission
     first: int
+    layers: int
     outputs: tuple[tuple[str, tuple[int, ...], str, int, _core.Exported], ...]
     frames: list[Frames]
 
@@ -54,8 +57,9 @@ class _Part(NamedTuple):
 class Batches:
     """The batches of a renderer. Keeps the last plan: of small images it takes long to make."""
 
-    def __init__(self, core: _core.Renderer) -> None:
+    def __init__(self, core: _core.Renderer, ends: Ends) -> None:
         self._core = core
+        self._ends = ends
         self._last: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
         self._size: tuple[Settings, tuple[Any, ...], int] | None = None
 
@@ -103,15 +107,15 @@ class Batches:
                     yield from rest(done)
                     return
                 part = pending.popleft()
-                timings, counts = part.submission.wait()
-                done = part.first + len(counts) // 2
-                share = {name: 2 * took / len(counts) for name, took in timings[0].items()}
-                index = len(counts) - 2 * len(part.frames)
+                done = part.first + part.layers
+                end = self._ends.add(part.submission)
+                if not part.submission.ordered:
+                    end.come()
                 while part.frames:
                     # Yielded frames are not kept, so that the caller is their only owner.
-                    part.frames[-1]._finish(share, counts[index], counts[index + 1])
+                    layer = part.layers - len(part.frames)
+                    part.frames[-1]._finish_later(functools.partial(end.of_layer, layer))
                     yield part.frames.pop()
-                    index += 2
                 del part
         finally:
             pending.clear()
@@ -157,7 +161,8 @@ class Batches:
             ]
         )
         arrays = tuple([memory for *_, memory in outputs])
-        return _Part(self._core.run(source, (plan,), (arrays,)), first, outputs, [])
+        self._ends.wait()
+        return _Part(self._core.run(source, (plan,), (arrays,)), first, layers, outputs, [])
 
 
 def _stride(shape: tuple[int, ...], dtype: str) -> int:

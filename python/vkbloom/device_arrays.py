@@ -169,7 +169,8 @@ class DeviceArray:
     ) -> Any:
         """Return a capsule of DLPack.
 
-        `stream`: The consumer's. The framebuffer is complete, so that no stream has to wait.
+        `stream`: The consumer's, which waits for the framebuffer; None: CUDA's default stream. -1,
+        no stream: this call waits.
         `max_version`: At least (1, 0) gives a capsule of DLPack 1, otherwise one of 0.
         `dl_device`: This device, or (1, 0) for a copy on the host.
         `copy`: True gives a copy.
@@ -200,6 +201,7 @@ class DeviceArray:
             8 * self.dtype.itemsize,
             versioned_capsule,
             offset,
+            _LEGACY if stream is None else stream,
         )
 
     @property
@@ -212,8 +214,7 @@ class DeviceArray:
             "typestr": self.dtype.str,
             "data": (self._memory.address + self._offset, False),
             "strides": None,
-            # Complete: no stream has to wait.
-            "stream": None,
+            "stream": self._memory.stream(),
             "version": 3,
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -88,25 +88,37 @@ class Frames(Mapping[str, NDArray[Any]]):
         self._timings = {name: float(seconds) for name, seconds in timings.items()}
         self._settings = settings
         self._info = dict(info)
+        self._end: Callable[[], tuple[dict[str, float], int, int]] | None = None
 
     def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
         """Add what is known when the device has finished."""
         self._timings = timings
         self._info |= {"nan": nan, "inf": inf}
 
+    def _finish_later(self, end: Callable[[], tuple[dict[str, float], int, int]]) -> None:
+        """Call `end`, which waits and returns the arguments of `_finish`, when they are read."""
+        self._end = end
+
+    def _complete(self) -> None:
+        if (end := self._end) is not None:
+            self._finish(*end())
+            self._end = None
+
     def _on_host(self) -> Frames:
         """Return the same with arrays of NumPy: this object, if it has no others."""
         if not any(isinstance(array, DeviceArray) for array in self._arrays.values()):
             return self
         arrays = {name: on_host(array) for name, array in self._arrays.items()}
-        return Frames(arrays, timings=self._timings, settings=self._settings, info=self._info)
+        return Frames(arrays, timings=self.timings, settings=self._settings, info=self.info)
 
     @property
     def timings(self) -> Mapping[str, float]:
         """Seconds on the device by pass name, for the passes that ran; read-only.
 
-        NaN if the device's queue has no timestamps.
+        NaN if the device's queue has no timestamps. Of framebuffers on a GPU this waits until they
+        are complete.
         """
+        self._complete()
         return MappingProxyType(self._timings)
 
     @property
@@ -116,7 +128,11 @@ class Frames(Mapping[str, NDArray[Any]]):
 
     @property
     def info(self) -> dict[str, Any]:
-        """Adapter, driver and version, and the numbers of "nan" and "inf" values in the input."""
+        """Adapter, driver and version, and the numbers of "nan" and "inf" values in the input.
+
+        Of framebuffers on a GPU this waits until they are complete.
+        """
+        self._complete()
         return self._info
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -194,9 +210,9 @@ class Frames(Mapping[str, NDArray[Any]]):
             {name: (dims[name], array) for name, array in host.items()},
             coords=channels,
             attrs={
-                **{k: v if isinstance(v, int | float) else str(v) for k, v in self._info.items()},
+                **{k: v if isinstance(v, int | float) else str(v) for k, v in self.info.items()},
                 "settings": json.dumps(self._settings.to_dict()),
-                "timings": json.dumps(self._timings),
+                "timings": json.dumps(dict(self.timings)),
             },
         )
         return dataset

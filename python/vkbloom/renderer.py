@@ -258,7 +258,8 @@ class Renderer:
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
         self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
-        self._batches = Batches(self._core)
+        self._ends = requests.Ends()
+        self._batches = Batches(self._core, self._ends)
         # What apply_each has checked last.
         self._named: tuple[object, tuple[str, ...]] = None, ()
         self._kept: KeptArrays | None = shared()
@@ -289,7 +290,12 @@ class Renderer:
         """
         self._planned = self._kept = None
         self._batches.forget()
-        self._core.close()
+        try:
+            self._ends.wait()
+        except ValueError:  # the device belongs to the process that this one was forked from
+            self._ends.forget()
+        finally:
+            self._core.close()
 
     @checked
     def capture(self, path: str | os.PathLike[str]) -> contextlib.AbstractContextManager[None]:
@@ -535,6 +541,7 @@ class Renderer:
         (10.0, 0.0)
         """
         settings = check_settings(settings, of_image=True)
+        self._ends.wait()
         source = image_source(image, mask, emission, self._core, waits=False)
         return self._run_one(source, settings, check_attachments(attachments), out, device)
 
@@ -599,6 +606,7 @@ class Renderer:
         from vkbloom.gradients import vjp  # noqa: PLC0415  costs start-up time
 
         settings = check_settings(settings, of_image=True)
+        self._ends.wait()
         return vjp(self, image, settings, mask, emission, device)
 
     @checked
@@ -646,6 +654,7 @@ class Renderer:
         ...     [frames["final"].max().item() for frames in renderer.apply_many(image, settings)]
         [0.5, 1.0]
         """
+        self._ends.wait()
         source = image_source(image, core=self._core)
         return self._run_many(source, settings_seq, check_attachments(attachments), device)
 
@@ -1073,11 +1082,16 @@ class Renderer:
         device: Device | None,
     ) -> Frames:
         place = self._placed(device)(source)
+        self._ends.wait()
         plan = self._plan_of(source, settings, names)
         arrays = _arrays_for(self._core, plan, out, place)
         submission = self._core.run(source, (plan,), (arrays,), True)
         # While the device works.
         frames = self._frames(settings, requests.named(plan, arrays, place))
+        if not out and submission.ordered:
+            frames._finish_later(self._ends.add(submission).of_request)
+            self._save_pipelines()
+            return frames
         (timings,), counts = submission.wait()
         for name, target in (out or {}).items():
             if on_cuda(target):
@@ -1091,6 +1105,7 @@ class Renderer:
         names: tuple[str, ...] | None,
         place: Callable[[_core.Source], requests.Place],
     ) -> Iterator[Frames]:
+        self._ends.wait()
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
@@ -1181,6 +1196,7 @@ class Renderer:
         *,
         alone: bool = False,
     ) -> Iterator[Frames]:
+        self._ends.wait()
         results = requests.run(sequence, self._core, names, alone=alone, place=place)
         return (self._frames_of(settings, result) for settings, result in results)
 

@@ -425,7 +425,7 @@ def _on_device(  # noqa: PLR0917
         settings = _replaced(settings, dict(zip(_split(names), values, strict=True)))
     renderer = _renderer(number, image)
     images = _batch(image)
-    if mask is None and emission is None:
+    if mask is None and emission is None and len(images) > 1:
         frames = renderer.apply_each(images, settings, attachments="final")
     else:
         masks, emissions = (

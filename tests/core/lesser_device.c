@@ -1,10 +1,13 @@
 // A Vulkan layer for tests: the device below it with less than it has. VKBLOOM_LESSER names what is
 // taken, separated by commas. test_lesser_devices.py builds and uses it.
+#define _GNU_SOURCE
 #include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
 #include <vulkan/vk_layer.h>
 
 #define INSTANCE_FUNCTIONS(FUNCTION) \
@@ -20,7 +23,8 @@
     FUNCTION(vkGetPhysicalDeviceMemoryProperties) \
     FUNCTION(vkGetPhysicalDeviceMemoryProperties2) \
     FUNCTION(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
-    FUNCTION(vkEnumerateDeviceExtensionProperties)
+    FUNCTION(vkEnumerateDeviceExtensionProperties) \
+    FUNCTION(vkGetPhysicalDeviceExternalSemaphoreProperties)
 
 #define DEVICE_FUNCTIONS(FUNCTION) \
     FUNCTION(vkGetBufferMemoryRequirements) \
@@ -32,7 +36,10 @@
     FUNCTION(vkAcquireNextImageKHR) \
     FUNCTION(vkQueuePresentKHR) \
     FUNCTION(vkQueueWaitIdle) \
-    FUNCTION(vkDestroySemaphore)
+    FUNCTION(vkCreateSemaphore) \
+    FUNCTION(vkDestroySemaphore) \
+    FUNCTION(vkSignalSemaphoreKHR) \
+    FUNCTION(vkWaitSemaphoresKHR)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
 // by their handles. Messages go to the instance that was created last.
@@ -256,9 +263,16 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, 
                                                      uint32_t *count,
                                                      VkExtensionProperties *extensions)
 {
+    const uint32_t room = *count;
     VkResult result =
         below.vkEnumerateDeviceExtensionProperties(physical, layer, count, extensions);
 
+    if (lacks("waits") && (!extensions || *count < room)) {
+        if (extensions)
+            extensions[*count] =
+                (VkExtensionProperties){VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME, 1};
+        ++*count;
+    }
     if (lacks("gpus") && extensions && *count > 0)
         strcpy(extensions[0].extensionName, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME);
     for (uint32_t i = 0; extensions && i < *count && lacks("import"); ++i)
@@ -418,6 +432,77 @@ static VKAPI_ATTR VkResult VKAPI_CALL submit(VkQueue queue, uint32_t count,
     return below.vkQueueSubmit(queue, count, infos, fence);
 }
 
+// Without "waits", the host need not wait for CUDA: the stand-in for it (cuda_stand_in.c) shares
+// the device's timeline semaphores. A file describes each.
+struct shared_semaphore {
+    void (*signal)(void *device, uint64_t semaphore, uint64_t value);
+    void (*wait)(void *device, uint64_t semaphore, uint64_t value);
+    void *device;
+    uint64_t semaphore;
+};
+
+static void signal_shared(void *handle, uint64_t semaphore, uint64_t value)
+{
+    below.vkSignalSemaphoreKHR(handle, &(VkSemaphoreSignalInfo){
+                                           .sType = VK_STRUCTURE_TYPE_SEMAPHORE_SIGNAL_INFO,
+                                           .semaphore = (VkSemaphore)semaphore,
+                                           .value = value,
+                                       });
+}
+
+static void wait_shared(void *handle, uint64_t semaphore, uint64_t value)
+{
+    below.vkWaitSemaphoresKHR(handle,
+                              &(VkSemaphoreWaitInfo){
+                                  .sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO,
+                                  .semaphoreCount = 1,
+                                  .pSemaphores = &(VkSemaphore){(VkSemaphore)semaphore},
+                                  .pValues = &value,
+                              },
+                              UINT64_MAX);
+}
+
+static VKAPI_ATTR void VKAPI_CALL get_semaphores(VkPhysicalDevice physical,
+                                                 const VkPhysicalDeviceExternalSemaphoreInfo *info,
+                                                 VkExternalSemaphoreProperties *properties)
+{
+    below.vkGetPhysicalDeviceExternalSemaphoreProperties(physical, info, properties);
+    if (!lacks("waits"))
+        return;
+    properties->externalSemaphoreFeatures = VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT;
+    properties->compatibleHandleTypes = properties->exportFromImportedHandleTypes =
+        VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_semaphore(VkDevice handle,
+                                                       const VkSemaphoreCreateInfo *info,
+                                                       const VkAllocationCallbacks *callbacks,
+                                                       VkSemaphore *semaphore)
+{
+    VkSemaphoreCreateInfo changed = *info;
+    VkSemaphoreTypeCreateInfo type;
+
+    // What the core chains behind the type says only that it is exported.
+    if (lacks("waits") && info->pNext) {
+        type = *(const VkSemaphoreTypeCreateInfo *)info->pNext;
+        type.pNext = NULL;
+        changed.pNext = &type;
+    }
+    return below.vkCreateSemaphore(handle, &changed, callbacks, semaphore);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL get_semaphore_file(VkDevice handle,
+                                                         const VkSemaphoreGetFdInfoKHR *info,
+                                                         int *descriptor)
+{
+    const struct shared_semaphore shared = {signal_shared, wait_shared, handle,
+                                            (uint64_t)info->semaphore};
+
+    *descriptor = memfd_create("semaphore", 0);
+    return write(*descriptor, &shared, sizeof shared) == sizeof shared ? VK_SUCCESS
+                                                                       : VK_ERROR_TOO_MANY_OBJECTS;
+}
+
 static VKAPI_ATTR void VKAPI_CALL destroy_semaphore(VkDevice handle, VkSemaphore semaphore,
                                                     const VkAllocationCallbacks *callbacks)
 {
@@ -484,7 +569,16 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
         link = (VkLayerDeviceCreateInfo *)link->pNext;
     below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
     link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    VkResult result = below.vkCreateDevice(physical, info, callbacks, created);
+    const char *kept[64];
+    VkDeviceCreateInfo changed = *info;
+    changed.ppEnabledExtensionNames = kept;
+    changed.enabledExtensionCount = 0;
+    for (uint32_t i = 0; i < info->enabledExtensionCount; ++i)
+        if (!lacks("waits")
+            || strcmp(info->ppEnabledExtensionNames[i], VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME)
+                   != 0)
+            kept[changed.enabledExtensionCount++] = info->ppEnabledExtensionNames[i];
+    VkResult result = below.vkCreateDevice(physical, &changed, callbacks, created);
 #define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkAllocateMemory) {
         DEVICE_FUNCTIONS(FETCH)
@@ -522,6 +616,8 @@ static const struct entry {
     ENTRY(vkGetPhysicalDeviceMemoryProperties2KHR, get_memory2, false),
     ENTRY(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, get_surface, false),
     ENTRY(vkEnumerateDeviceExtensionProperties, get_extensions, false),
+    ENTRY(vkGetPhysicalDeviceExternalSemaphoreProperties, get_semaphores, false),
+    ENTRY(vkGetPhysicalDeviceExternalSemaphorePropertiesKHR, get_semaphores, false),
     ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
     ENTRY(vkGetBufferMemoryRequirements, get_buffer_requirements, true),
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
@@ -532,6 +628,8 @@ static const struct entry {
     ENTRY(vkAcquireNextImageKHR, acquire, true),
     ENTRY(vkQueuePresentKHR, present, true),
     ENTRY(vkQueueWaitIdle, wait_idle, true),
+    ENTRY(vkCreateSemaphore, create_semaphore, true),
+    ENTRY(vkGetSemaphoreFdKHR, get_semaphore_file, true),
     ENTRY(vkDestroySemaphore, destroy_semaphore, true),
 };
 

@@ -1,7 +1,7 @@
 // A stand-in for libcuda.so.1: one GPU, whose UUID is STAND_IN_UUID and whose memory is the host's.
 // It imports the memory that lavapipe exports by mapping its descriptor. With STAND_IN_LOG, it
-// writes what is left at the end to that file. A copy within the device is done when something
-// waits for its stream, all other work at once.
+// writes what is left at the end to that file. The work of its stream is done in a thread; other
+// streams are the host's, whose work is done at once.
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -37,28 +37,97 @@ struct memory {
     int descriptor;
 };
 
-// The copy that the stream has not done yet.
-static struct {
-    pthread_mutex_t mutex;
-    void *to;
+// A timeline semaphore of the layer (lesser_device.c), as it describes itself in a file.
+struct semaphore {
+    void (*signal)(void *device, uint64_t semaphore, uint64_t value);
+    void (*wait)(void *device, uint64_t semaphore, uint64_t value);
+    void *device;
+    uint64_t semaphore;
+};
+
+struct semaphore_handle {
+    int type;
+    union {
+        int descriptor;
+        void *others[2];
+    } handle;
+    unsigned flags, reserved[16];
+};
+
+struct semaphore_point {
+    unsigned long long value, others[8];
+    unsigned flags, reserved[16];
+};
+
+// The work of the stream, which a thread does in order.
+struct work {
+    void *to;  // NULL: no copy
     const void *from;
     size_t size;
-} last = {.mutex = PTHREAD_MUTEX_INITIALIZER};
+    struct semaphore *signal, *wait;  // NULL: none
+    uint64_t value;
+};
 
-static void replace_copy(void *to, const void *from, size_t size)
+enum { MOST_WORK = 64 };
+
+static struct {
+    pthread_mutex_t mutex;
+    pthread_cond_t changed;
+    struct work work[MOST_WORK];
+    unsigned first, count;
+    int started;
+} queue = {.mutex = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER};
+
+static void do_work(const struct work *work)
 {
-    pthread_mutex_lock(&last.mutex);
-    if (last.size)
-        memcpy(last.to, last.from, last.size);
-    last.to = to;
-    last.from = from;
-    last.size = size;
-    pthread_mutex_unlock(&last.mutex);
+    if (work->to) {
+        usleep(5000);  // so that whoever should wait for it and does not is found
+        memcpy(work->to, work->from, work->size);
+    }
+    if (work->wait)
+        work->wait->wait(work->wait->device, work->wait->semaphore, work->value);
+    if (work->signal)
+        work->signal->signal(work->signal->device, work->signal->semaphore, work->value);
 }
 
-static void do_copy(void)
+static void *work_off(void *unused)
 {
-    replace_copy(NULL, NULL, 0);
+    (void)unused;
+    pthread_mutex_lock(&queue.mutex);
+    for (;;) {
+        while (queue.count == 0)
+            pthread_cond_wait(&queue.changed, &queue.mutex);
+        const struct work work = queue.work[queue.first];
+        pthread_mutex_unlock(&queue.mutex);
+        do_work(&work);
+        pthread_mutex_lock(&queue.mutex);
+        queue.first = (queue.first + 1) % MOST_WORK;
+        --queue.count;
+        pthread_cond_broadcast(&queue.changed);
+    }
+    return NULL;
+}
+
+static void push(struct work work)
+{
+    pthread_t thread;
+
+    pthread_mutex_lock(&queue.mutex);
+    if (!queue.started++ && pthread_create(&thread, NULL, work_off, NULL) == 0)
+        pthread_detach(thread);
+    while (queue.count == MOST_WORK)
+        pthread_cond_wait(&queue.changed, &queue.mutex);
+    queue.work[(queue.first + queue.count++) % MOST_WORK] = work;
+    pthread_cond_broadcast(&queue.changed);
+    pthread_mutex_unlock(&queue.mutex);
+}
+
+static void finish(void)
+{
+    pthread_mutex_lock(&queue.mutex);
+    while (queue.count > 0)
+        pthread_cond_wait(&queue.changed, &queue.mutex);
+    pthread_mutex_unlock(&queue.mutex);
 }
 
 static void report(void)
@@ -152,6 +221,7 @@ EXPORT int cuCtxPopCurrent_v2(void **context)
 
 EXPORT int cuCtxSynchronize(void)
 {
+    finish();
     return SUCCESS;
 }
 
@@ -170,7 +240,7 @@ EXPORT int cuStreamDestroy_v2(void *stream)
 
 EXPORT int cuStreamSynchronize(void *stream)
 {
-    do_copy();
+    finish();
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
@@ -201,16 +271,23 @@ EXPORT int cuEventRecord(void *event, void *stream)
 
 EXPORT int cuEventQuery(void *event)
 {
+    finish();
     return event ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuEventSynchronize(void *event)
 {
-    do_copy();
+    finish();
     return event ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuCtxRecordEvent(void *context, void *event)
+{
+    return context == &contexts && event ? SUCCESS : INVALID_VALUE;
+}
+
+// Tests leave the sources of copies as they are, so that nothing of the host has to wait.
+EXPORT int cuCtxWaitEvent(void *context, void *event)
 {
     return context == &contexts && event ? SUCCESS : INVALID_VALUE;
 }
@@ -265,6 +342,7 @@ EXPORT int cuExternalMemoryGetMappedBuffer(unsigned long long *address, void *ha
 
 EXPORT int cuMemFree_v2(unsigned long long address)
 {
+    finish();
     --mappings;
     return address ? SUCCESS : INVALID_VALUE;
 }
@@ -284,13 +362,17 @@ EXPORT int cuDestroyExternalMemory(void *handle)
 EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, size_t size,
                                 void *stream)
 {
-    replace_copy((void *)(uintptr_t)to, (const void *)(uintptr_t)from, size);
+    push((struct work){
+        .to = (void *)(uintptr_t)to,
+        .from = (const void *)(uintptr_t)from,
+        .size = size,
+    });
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
 {
-    do_copy();
+    finish();
     host_bytes += (long)size;
     memcpy(to, (const void *)(uintptr_t)from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
@@ -301,6 +383,50 @@ EXPORT int cuMemcpyHtoDAsync_v2(unsigned long long to, const void *from, size_t 
     host_bytes += (long)size;
     memcpy((void *)(uintptr_t)to, from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuImportExternalSemaphore(void **handle, const struct semaphore_handle *given)
+{
+    struct semaphore *semaphore = calloc(1, sizeof *semaphore);
+    const int descriptor = given->handle.descriptor;
+
+    if (!semaphore || given->type != 9 || given->flags
+        || pread(descriptor, semaphore, sizeof *semaphore, 0) != sizeof *semaphore) {
+        free(semaphore);
+        return INVALID_VALUE;
+    }
+    close(descriptor);
+    *handle = semaphore;
+    ++memories;
+    return SUCCESS;
+}
+
+EXPORT int cuDestroyExternalSemaphore(void *handle)
+{
+    --memories;
+    free(handle);
+    return SUCCESS;
+}
+
+EXPORT int cuSignalExternalSemaphoresAsync(void *const *semaphores,
+                                           const struct semaphore_point *points, unsigned count,
+                                           void *stream)
+{
+    push((struct work){.signal = semaphores[0], .value = points[0].value});
+    return count == 1 && stream == &streams ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuWaitExternalSemaphoresAsync(void *const *semaphores,
+                                         const struct semaphore_point *points, unsigned count,
+                                         void *stream)
+{
+    const struct work work = {.wait = semaphores[0], .value = points[0].value};
+
+    if (stream == &streams)
+        push(work);
+    else
+        do_work(&work);
+    return count == 1 && stream ? SUCCESS : INVALID_VALUE;
 }
 
 // Not of CUDA: how many contexts are current in this thread.

@@ -27,6 +27,8 @@ from vkbloom import Convolution, Pyramid, Renderer, Separable
 from vkbloom.device_arrays import merged
 
 VALIDATION = "validated" in sys.argv
+#: Whether calls return before the device has finished.
+LATE = "waits" in os.environ.get("VKBLOOM_LESSER", "").split(",")
 ADAPTER = os.environ.get("VKBLOOM_TEST_NAME") or "software"
 
 _get = ctypes.pythonapi.PyCapsule_GetPointer
@@ -256,12 +258,43 @@ def capsules(renderer: Any) -> None:
         assert address == array.__cuda_array_interface__["data"][0]
     about = array.__cuda_array_interface__
     assert about["version"] == 3
-    assert about["stream"] is None
+    assert about["stream"] == (renderer._core.cuda()[1] if LATE else None)
     copied = vkbloom._core.read_dlpack(array.__dlpack__(stream=1, copy=True))
     assert copied[0] != address
     np.testing.assert_array_equal(np.from_dlpack(Consumer(array)), array.numpy())
     raises(ValueError, "stream: 0", lambda: array.__dlpack__(stream=0))
     raises(BufferError, "dl_device: (2, 0)", lambda: array.__dlpack__(dl_device=(2, 0)))
+
+
+def ends(renderer: Any) -> None:
+    """What the host learns late: whether it reads it, lets go of it, or closes the renderer."""
+    image = picture(64, 48)
+    image[3, 4, 0] = np.nan
+    expected = renderer.apply(image)
+    frames = renderer.apply(OnDevice(image))
+    assert (frames._end is not None) == LATE
+    assert bool(frames["final"]._memory.stream()) == LATE
+    assert list(frames.timings) == list(expected.timings)
+    assert frames.info["nan"] == 1
+    # Whoever has waited once need not do so again, nor need streams.
+    assert frames._end is None
+    assert frames["final"]._memory.stream() is None
+    # A consumer without a stream cannot wait.
+    late = renderer.apply(OnDevice(image))["final"]
+    address = vkbloom._core.read_dlpack(late.__dlpack__(stream=-1))[0]
+    view = np.ctypeslib.as_array((ctypes.c_float * late.size).from_address(address))
+    np.testing.assert_array_equal(view, expected["final"].ravel())
+    kept = [renderer.apply(OnDevice(image)) for _ in range(6)]
+    # The next call has waited for those before.
+    to_come = [one._end is not None and one._end.__self__._submission is not None for one in kept]
+    assert to_come == [*[False] * 5, LATE]
+    for one in kept:
+        same(one, expected)
+    other: Any = Renderer(ADAPTER, validation=VALIDATION)
+    with other:
+        left = [other.apply(OnDevice(image)) for _ in range(3)]
+    assert [one.info["nan"] for one in left] == [1, 1, 1]
+    np.testing.assert_array_equal(left[2]["final"].numpy(), expected["final"])
 
 
 class Consumer:
@@ -454,7 +487,7 @@ def missing(renderer: Any) -> None:
 
 
 WORK = (
-    *(layouts, streams, sequences, layers, places, capsules, recycling, lifetime, errors),
+    *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
     *(gradients, gradient_places),
 )
 

@@ -51,6 +51,19 @@ def test_dispatches_access_images(
     check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
 
 
+@pytest.mark.parametrize("lesser", ["waits", "waits,cpu"])
+def test_the_host_does_not_wait(
+    folder: Path,
+    software: AdapterInfo,
+    layer: Path,  # noqa: F811
+    lesser: str,
+) -> None:
+    """With timeline semaphores that CUDA shares: the same bits, and calls return earlier."""
+    program = ("-m", "tests.device.device_work", "validated")
+    variables = stand_in.variables(folder, software)
+    check(run(layer, software.name, lesser, program, **variables), folder)
+
+
 def check(done: subprocess.CompletedProcess[str], folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {}
