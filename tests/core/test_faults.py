@@ -11,13 +11,16 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import vkbloom
+from tests.core import test_lesser_devices
 from tests.core.builds import ROOT, core_with_faults
 from tests.core.fault_walk import METHODS
+from tests.core.test_lesser_devices import layer  # noqa: F401  a fixture
 from tests.device import stand_in
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.processes import output
@@ -106,6 +109,22 @@ def test_points_of_every_workload(
             # Each point was reached, and most of them raised; closing continues after any failure.
             assert row["walked"] >= 0.6 * row["points"] > 0, name
             assert row["raised"] > 0 or name == "close", name
+
+
+def test_points_where_the_host_waits_late(
+    faulty: dict[str, str],
+    software: AdapterInfo,
+    layer: Path,  # noqa: F811
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Arrays on the device, with semaphores that CUDA shares."""
+    stride = "1" if EXHAUSTIVE else "60"
+    program = ("-m", "tests.core.fault_walk", stride, "arrays on the device")
+    done = test_lesser_devices.run(layer, software.name, "waits", program, **faulty)
+    assert done.returncode == 0, done.stderr
+    row = json.loads(done.stdout)
+    show({row["workload"]: row}, capsys)
+    assert row["raised"] > 0
 
 
 # Prints how many instances a process makes.
