@@ -17,6 +17,19 @@ bool vkb_ends_block(const uint32_t *at)
         || vkb_opcode(at) == SPV_TERMINATE_INVOCATION;
 }
 
+uint32_t vkb_target(const uint32_t *at, uint32_t i)
+{
+    switch (vkb_opcode(at)) {
+    case SPV_BRANCH:
+        return i == 0 ? at[1] : 0;
+    case SPV_BRANCH_CONDITIONAL:
+        return i < 2 ? at[2 + i] : 0;
+    case SPV_SWITCH:
+        return 2 + 2 * i < vkb_word_count(at) ? at[2 + 2 * i] : 0;
+    }
+    return 0;
+}
+
 bool vkb_is_pure(const uint32_t *at)
 {
     const uint32_t code = vkb_opcode(at);

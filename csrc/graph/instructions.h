@@ -148,6 +148,9 @@ bool vkb_is_debug(const uint32_t *at);
 // Whether it is the last one of a block.
 bool vkb_ends_block(const uint32_t *at);
 
+// Number i of the blocks that may follow this end of a block; 0: there are no more.
+uint32_t vkb_target(const uint32_t *at, uint32_t i);
+
 // Whether it has a result, and no effect if nothing uses the result.
 bool vkb_is_pure(const uint32_t *at);
 

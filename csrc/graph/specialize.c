@@ -1,6 +1,6 @@
 #include "graph/specialize.h"
 
-#include "graph/instructions.h"
+#include "graph/module.h"
 
 #include <string.h>
 
@@ -8,7 +8,6 @@
 enum role { NO_ROLE, MERGE_BLOCK, CONTINUE_BLOCK };
 
 struct id {
-    const uint32_t *at;   // its instruction; NULL: none
     const uint32_t *end;  // of a label: the instruction that ends the block
     uint32_t value;       // if `known`
     uint32_t block;       // the label of its block; of a function, that of its first block
@@ -20,53 +19,34 @@ struct id {
 };
 
 struct module {
-    const uint32_t *words, *end;
-    const uint32_t *functions;  // the first one
-    uint32_t entry;             // of the entry point
+    struct vkb_module read;
+    uint32_t entry;  // of the entry point
     struct id *ids;
-    uint32_t bound;
     uint32_t *stack;  // of ids
     size_t stack_count;
+    struct vkb_code made;
 };
 
-// Whether values of a type can be known.
-static bool is_word(const struct module *module, uint32_t type)
-{
-    const uint32_t *at = module->ids[type].at;
-
-    return at
-        && (vkb_opcode(at) == SPV_TYPE_BOOL || (vkb_opcode(at) == SPV_TYPE_INT && at[2] == 32));
-}
-
-// Notes where each id is defined. Fails if an instruction or an id is outside.
-static bool read_module(struct module *module)
+// Notes where each block starts and ends, and in which one each id is defined.
+static void read_blocks(struct module *module)
 {
     uint32_t block = 0, function = 0;
 
-    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->end;
-         at = vkb_next(at)) {
-        if (vkb_word_count(at) == 0 || vkb_word_count(at) > (size_t)(module->end - at)
-            || vkb_result(at) >= module->bound)
-            return false;
-        struct id *id = &module->ids[vkb_result(at)];
-        if (vkb_opcode(at) == SPV_FUNCTION) {
+    for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
+        if (vkb_opcode(at) == SPV_FUNCTION)
             function = at[2];
-            module->functions = module->functions ? module->functions : at;
-        } else if (vkb_opcode(at) == SPV_LABEL) {
+        else if (vkb_opcode(at) == SPV_LABEL) {
             block = at[1];
             if (!module->ids[function].block)
                 module->ids[function].block = block;
         }
-        if (vkb_result(at)) {
-            id->at = at;
-            id->block = vkb_opcode(at) == SPV_FUNCTION ? 0 : block;
-        }
+        if (vkb_result(at) && vkb_opcode(at) != SPV_FUNCTION)
+            module->ids[vkb_result(at)].block = block;
         if (vkb_ends_block(at)) {
             module->ids[block].end = at;
             block = 0;
         }
     }
-    return module->functions != NULL;
 }
 
 // The value of an operation on ids, if it follows from what is known.
@@ -78,7 +58,7 @@ static bool evaluate(const struct module *module, uint32_t code, const uint32_t 
     if (count == 0 || count > 3)
         return false;
     for (size_t i = 0; i < count; ++i) {
-        if (operands[i] >= module->bound)
+        if (operands[i] >= module->read.bound)
             return false;
         of[i] = &module->ids[operands[i]];
     }
@@ -104,12 +84,12 @@ static bool evaluate(const struct module *module, uint32_t code, const uint32_t 
 // loop stays, since a loop has one.
 static uint32_t only_target(const struct module *module, const uint32_t *at)
 {
-    const struct id *ids = module->ids;
+    const uint32_t *const *defined = module->read.at;
 
-    if (vkb_opcode(at) != SPV_BRANCH_CONDITIONAL || !ids[at[1]].known || ids[at[2]].at <= at
-        || ids[at[3]].at <= at)
+    if (vkb_opcode(at) != SPV_BRANCH_CONDITIONAL || !module->ids[at[1]].known
+        || defined[at[2]] <= at || defined[at[3]] <= at)
         return 0;
-    return ids[at[1]].value ? at[2] : at[3];
+    return module->ids[at[1]].value ? at[2] : at[3];
 }
 
 // Number i of the blocks that may follow this end of a block; 0: there are no more.
@@ -119,15 +99,7 @@ static uint32_t target(const struct module *module, const uint32_t *at, uint32_t
 
     if (only)
         return i == 0 ? only : 0;
-    switch (vkb_opcode(at)) {
-    case SPV_BRANCH:
-        return i == 0 ? at[1] : 0;
-    case SPV_BRANCH_CONDITIONAL:
-        return i < 2 ? at[2 + i] : 0;
-    case SPV_SWITCH:
-        return 2 + 2 * i < vkb_word_count(at) ? at[2 + 2 * i] : 0;
-    }
-    return 0;
+    return vkb_target(at, i);
 }
 
 static bool follows(const struct module *module, uint32_t from, uint32_t label)
@@ -151,16 +123,17 @@ static void reach(struct module *module, uint32_t label)
 // Finds the blocks that the entry point reaches, also through calls.
 static void find_reached(struct module *module)
 {
-    for (uint32_t i = 0; i < module->bound; ++i)
+    for (uint32_t i = 0; i < module->read.bound; ++i)
         module->ids[i].reached = false;
     reach(module, module->ids[module->entry].block);
     while (module->stack_count > 0) {
-        const struct id *block = &module->ids[module->stack[--module->stack_count]];
-        for (const uint32_t *at = block->at; at < block->end; at = vkb_next(at))
+        const uint32_t label = module->stack[--module->stack_count];
+        const uint32_t *at = module->read.at[label], *end = module->ids[label].end;
+        for (; at < end; at = vkb_next(at))
             if (vkb_opcode(at) == SPV_FUNCTION_CALL)
                 reach(module, module->ids[at[3]].block);
-        for (uint32_t i = 0; target(module, block->end, i); ++i)
-            reach(module, target(module, block->end, i));
+        for (uint32_t i = 0; target(module, end, i); ++i)
+            reach(module, target(module, end, i));
     }
 }
 
@@ -186,10 +159,10 @@ static bool find_values(struct module *module)
 {
     bool more = false;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+    for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
         struct id *id = &module->ids[vkb_result(at)];
         if (!vkb_is_pure(at) || id->known || !module->ids[id->block].reached
-            || !is_word(module, at[1]))
+            || !vkb_is_word(&module->read, at[1]))
             continue;
         id->known = vkb_opcode(at) == SPV_PHI ? phi_value(module, at, &id->value)
                                               : evaluate(module, vkb_opcode(at), at + 3,
@@ -203,42 +176,40 @@ static bool find_values(struct module *module)
 static void give_value(struct module *module, const uint32_t *decoration,
                        const struct vkb_constants *constants)
 {
+    const uint32_t *at = module->read.at[decoration[1]];
     struct id *id = &module->ids[decoration[1]];
 
-    for (uint32_t i = 0; i < VKB_CONSTANT_COUNT; ++i)
+    for (uint32_t i = 0; at && i < VKB_CONSTANT_COUNT; ++i)
         if (vkb_constant_rows[i].id == decoration[3]) {
             memcpy(&id->value, (const char *)constants + vkb_constant_rows[i].offset,
                    sizeof id->value);
-            id->known = true;
+            if (vkb_opcode(at) != SPV_SPEC_CONSTANT)
+                id->value = id->value != 0;
+            id->known = vkb_is_word(&module->read, at[1]);
         }
 }
 
 static void find_constants(struct module *module, const struct vkb_constants *constants)
 {
-    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->functions;
-         at = vkb_next(at)) {
+    const struct vkb_module *read = &module->read;
+
+    for (const uint32_t *at = read->first; at < read->functions; at = vkb_next(at)) {
         const uint32_t code = vkb_opcode(at);
         struct id *id = &module->ids[vkb_result(at)];
         if (code == SPV_ENTRY_POINT)
             module->entry = at[2];
         else if (code == SPV_DECORATE && at[2] == SPV_SPEC_ID)
             give_value(module, at, constants);
-        else if (code == SPV_CONSTANT || code == SPV_SPEC_CONSTANT) {
-            id->value = id->known ? id->value : at[3];
-            id->known = is_word(module, at[1]);
-        } else if (code == SPV_CONSTANT_TRUE || code == SPV_CONSTANT_FALSE
-                   || code == SPV_SPEC_CONSTANT_TRUE || code == SPV_SPEC_CONSTANT_FALSE) {
-            id->value = id->known ? id->value != 0
-                                  : code == SPV_CONSTANT_TRUE || code == SPV_SPEC_CONSTANT_TRUE;
-            id->known = true;
-        } else if (code == SPV_SPEC_CONSTANT_OP && is_word(module, at[1]))
+        else if (code == SPV_SPEC_CONSTANT_OP && vkb_is_word(read, at[1]))
             id->known = evaluate(module, at[3], at + 4, vkb_word_count(at) - 4, &id->value);
+        else if (!id->known)
+            id->known = vkb_constant(read, at, &id->value);
     }
 }
 
 static void use(struct module *module, uint32_t word)
 {
-    struct id *id = &module->ids[word < module->bound ? word : 0];
+    struct id *id = &module->ids[word < module->read.bound ? word : 0];
 
     if (id->used || !id->block || !module->ids[id->block].reached)
         return;
@@ -281,7 +252,7 @@ static void find_used(struct module *module)
 {
     uint32_t block = 0;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+    for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
         if (vkb_opcode(at) == SPV_LABEL)
             block = at[1];
         if (!module->ids[block].reached || vkb_is_pure(at) || !stays(module, at))
@@ -292,92 +263,63 @@ static void find_used(struct module *module)
             use_operands(module, at);
     }
     while (module->stack_count > 0)
-        use_operands(module, module->ids[module->stack[--module->stack_count]].at);
+        use_operands(module, module->read.at[module->stack[--module->stack_count]]);
 }
 
-static uint32_t *copy(uint32_t *out, const uint32_t *at)
+static void write_declarations(struct module *module)
 {
-    memcpy(out, at, vkb_word_count(at) * sizeof *at);
-    return out + vkb_word_count(at);
-}
+    const struct vkb_module *read = &module->read;
 
-static uint32_t *write_constant(const struct module *module, uint32_t *out, const uint32_t *at)
-{
-    const bool is_bool = vkb_opcode(module->ids[at[1]].at) == SPV_TYPE_BOOL;
-    const uint32_t value = module->ids[at[2]].value;
-
-    *out++ = is_bool ? 3 << 16 | (value ? SPV_CONSTANT_TRUE : SPV_CONSTANT_FALSE)
-                     : 4 << 16 | SPV_CONSTANT;
-    *out++ = at[1];
-    *out++ = at[2];
-    if (!is_bool)
-        *out++ = value;
-    return out;
-}
-
-static uint32_t *write_declarations(const struct module *module, uint32_t *out)
-{
-    for (const uint32_t *at = module->words + SPV_HEADER_WORDS; at < module->functions;
-         at = vkb_next(at)) {
+    for (const uint32_t *at = read->first; at < read->functions; at = vkb_next(at)) {
         const uint32_t code = vkb_opcode(at);
-        const struct id *id = &module->ids[code == SPV_DECORATE ? at[1] : vkb_result(at)];
+        const uint32_t id = code == SPV_DECORATE ? at[1] : vkb_result(at);
         if (vkb_is_debug(at)
             || (code == SPV_DECORATE
-                && (at[2] == SPV_SPEC_ID || (id->at >= module->functions && !id->used))))
+                && (at[2] == SPV_SPEC_ID
+                    || (read->at[id] >= read->functions && !module->ids[id].used))))
             continue;
-        if (id->known && code >= SPV_SPEC_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
-            out = write_constant(module, out, at);
+        if (module->ids[id].known && code >= SPV_SPEC_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
+            vkb_write_constant(&module->made, read, at[1], id, module->ids[id].value);
         else
-            out = copy(out, at);
+            vkb_write(&module->made, at, vkb_word_count(at));
     }
-    return out;
-}
-
-static uint32_t *write_branch(uint32_t *out, uint32_t label)
-{
-    *out++ = 2 << 16 | SPV_BRANCH;
-    *out++ = label;
-    return out;
 }
 
 // A block that only the structure needs.
-static uint32_t *write_unreached(const struct id *label, uint32_t *out)
+static void write_unreached(struct module *module, const uint32_t *label)
 {
-    if (label->role == NO_ROLE)
-        return out;
-    out = copy(out, label->at);
-    if (label->role == CONTINUE_BLOCK)
-        return write_branch(out, label->loop);
-    *out++ = 1 << 16 | SPV_UNREACHABLE;
-    return out;
+    const struct id *id = &module->ids[label[1]];
+
+    if (id->role == NO_ROLE)
+        return;
+    vkb_write(&module->made, label, vkb_word_count(label));
+    if (id->role == CONTINUE_BLOCK)
+        VKB_WRITE(&module->made, SPV_BRANCH, id->loop);
+    else
+        vkb_write(&module->made, &(uint32_t){1 << 16 | SPV_UNREACHABLE}, 1);
 }
 
 // Only the entries of blocks that this one follows stay. A continue block that nothing reaches
 // gives the phi itself: any value would do.
-static uint32_t *write_phi(const struct module *module, uint32_t *out, const uint32_t *at)
+static void write_phi(struct module *module, const uint32_t *at)
 {
     const uint32_t block = module->ids[at[2]].block;
-    uint32_t *first = out;
+    const size_t first = module->made.count;
 
-    out = copy(out, at) - (vkb_word_count(at) - 3);
+    vkb_write(&module->made, at, 3);
     for (uint32_t i = 3; i < vkb_word_count(at); i += 2)
-        if (follows(module, at[i + 1], block)) {
-            *out++ = at[i];
-            *out++ = at[i + 1];
-        }
-    if (module->ids[block].loop) {
-        *out++ = at[2];
-        *out++ = module->ids[block].loop;
-    }
-    *first = (uint32_t)(out - first) << 16 | SPV_PHI;
-    return out;
+        if (follows(module, at[i + 1], block))
+            vkb_write(&module->made, at + i, 2);
+    if (module->ids[block].loop)
+        vkb_write(&module->made, (uint32_t[]){at[2], module->ids[block].loop}, 2);
+    vkb_end_instruction(&module->made, first);
 }
 
-static uint32_t *write_functions(const struct module *module, uint32_t *out)
+static void write_functions(struct module *module)
 {
     bool reached = false, function_reached = false;
 
-    for (const uint32_t *at = module->functions; at < module->end; at = vkb_next(at)) {
+    for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
         const uint32_t code = vkb_opcode(at), only = only_target(module, at);
         const struct id *id = &module->ids[vkb_result(at)];
         if (code == SPV_FUNCTION)
@@ -387,46 +329,47 @@ static uint32_t *write_functions(const struct module *module, uint32_t *out)
         else if (code == SPV_LABEL) {
             reached = id->reached;
             if (!reached)
-                out = write_unreached(id, out);
+                write_unreached(module, at);
         }
         if (!reached || vkb_is_debug(at) || (vkb_is_pure(at) && !id->used) || !stays(module, at))
             continue;
-        out = only            ? write_branch(out, only)
-            : code == SPV_PHI ? write_phi(module, out, at)
-                              : copy(out, at);
+        if (only)
+            VKB_WRITE(&module->made, SPV_BRANCH, only);
+        else if (code == SPV_PHI)
+            write_phi(module, at);
+        else
+            vkb_write(&module->made, at, vkb_word_count(at));
     }
-    return out;
 }
 
 bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants *constants,
                     uint32_t **code, size_t *size, struct vkb_error *error)
 {
-    const size_t count = shader->size / sizeof *shader->code;
-    struct module module = {.words = shader->code, .end = shader->code + count};
+    struct module module = {.made.error = error};
+    bool done = vkb_read_module(shader, &module.read, error);
 
-    *code = NULL;
-    if (count > SPV_HEADER_WORDS && shader->code[0] == SPV_MAGIC)
-        module.bound = shader->code[SPV_BOUND];
-    module.ids = vkb_alloc(error, (size_t)module.bound + 1, sizeof *module.ids);
-    module.stack = vkb_alloc(error, (size_t)module.bound + 1, sizeof *module.stack);
-    uint32_t *out = vkb_alloc(error, count, sizeof *out);
-    bool done = module.ids && module.stack && out;
-    if (done && !read_module(&module))
-        done = vkb_fail(error, VKB_ERROR_SHADER, "%s is not SPIR-V", shader->name);
     if (done) {
+        module.ids = vkb_alloc(error, (size_t)module.read.bound + 1, sizeof *module.ids);
+        module.stack = vkb_alloc(error, (size_t)module.read.bound + 1, sizeof *module.stack);
+        done = module.ids && module.stack;
+    }
+    if (done) {
+        read_blocks(&module);
         find_constants(&module, constants);
         do
             find_reached(&module);
         while (find_values(&module));
         find_used(&module);
-        memcpy(out, module.words, SPV_HEADER_WORDS * sizeof *out);
-        *size =
-            (size_t)(write_functions(&module, write_declarations(&module, out + SPV_HEADER_WORDS))
-                     - out)
-            * sizeof *out;
-        *code = out;
-    } else
-        vkb_free(out);
+        vkb_write(&module.made, shader->code, SPV_HEADER_WORDS);
+        write_declarations(&module);
+        write_functions(&module);
+        done = !module.made.failed;
+    }
+    *code = done ? module.made.words : NULL;
+    *size = module.made.count * sizeof **code;
+    if (!done)
+        vkb_free(module.made.words);
+    vkb_free(module.read.at);
     vkb_free(module.ids);
     vkb_free(module.stack);
     return done;

@@ -27,6 +27,9 @@ SOURCES = (
     "graph/params",
     "graph/specialize",
     "graph/unroll",
+    "graph/unroll_copy",
+    "graph/unroll_values",
+    "graph/module",
     "graph/instructions",
 )
 Specialize = Callable[[bytes, list[int]], bytes]
