@@ -39,13 +39,11 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_blender_down_frag, vkb_transpose_groups, NULL},
         {&vkb_shader_blender_end_frag, vkb_transpose_blender_end, NULL},
         {&vkb_shader_streaks_frag, vkb_transpose_streaks, NULL},
-        {&vkb_shader_ghosts_frag, vkb_transpose_ghosts, NULL},
+        {&vkb_shader_ghosts_frag, vkb_transpose_flare, NULL},
+        {&vkb_shader_halo_frag, vkb_transpose_flare, NULL},
         {&vkb_shader_dirt_frag, vkb_transpose_dirt, NULL},
     };
 
-    // Which pixels read a texel at a distance along the radius is not known by axis.
-    if (pass->shader == &vkb_shader_ghosts_frag && pass->params.flare.aberration > 0.0f)
-        return NULL;
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)
             return pass->constants.firefly_filter ? families[i].weighted : families[i].transpose;
@@ -139,6 +137,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))
             return false;
+        *possible = *possible && !adjoint->too_large;
     }
     return !*possible || vkb_end_scene(adjoint, error);
 }

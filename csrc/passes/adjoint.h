@@ -14,7 +14,8 @@ struct vkb_adjoint {
     uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
     uint32_t added;     // images so far
     uint32_t max_side;
-    bool sums;  // the derivatives by fields are wanted, not those by images
+    bool sums;       // the derivatives by fields are wanted, not those by images
+    bool too_large;  // a pass would need an image beyond max_side
     // What a composite without a curve brings to its scene is `share` times the cotangents that it
     // has, `brought` of the scene until another pass brings more. That pass adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -63,6 +64,11 @@ bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *r
                        const struct vkb_filter *filter, uint32_t image, uint32_t target,
                        struct vkb_error *error);
 
+// Brings, where samples are not on a grid, what the row brings to the samples of its pixels: those
+// of a halo, or of ghost number `levels`.
+bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t source,
+                     struct vkb_error *error);
+
 // If the pass reads a mask, its second image: brings the row's result by it, at the target's
 // pixels, to the mask.
 bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -89,8 +95,8 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_tran
     vkb_transpose_godot_blur;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
-// Glare. Ghosts without aberration.
-vkb_transpose vkb_transpose_streaks, vkb_transpose_ghosts, vkb_transpose_dirt;
+// Glare.
+vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt;
 
 // Brings the cotangents of what a convolution's prefilter of bright colours makes of the glow.
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,

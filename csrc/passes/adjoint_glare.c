@@ -1,4 +1,5 @@
-// The adjoints of glare: rays of streaks, ghosts, dirt, and the prefilter of a convolution.
+// The adjoints of glare: rays of streaks, ghosts and halo, dirt, and the prefilter of a
+// convolution.
 #include "passes/adjoint.h"
 
 #include <stdio.h>
@@ -81,26 +82,34 @@ static void scale_axis(double scale, struct vkb_axis *axis)
     axis->border = VKB_BORDER_ZERO;
 }
 
-bool vkb_transpose_ghosts(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                          struct vkb_error *error)
+// Ghosts, or a halo, which has none.
+bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                         struct vkb_error *error)
 {
     const struct vkb_flare_params *params = &pass->params.flare;
     const uint32_t source = pass->reads[0], target = pass->targets[0];
     const uint32_t reads[] = {source, vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_ghosts_frag, reads, 2);
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_flare_frag, reads, 2);
     struct vkb_filter filter;
 
     if (pass->constants.add_own && !bring_all(adjoint, reads[1], pass->reads[1], error))
         return false;
     row.constants = pass->constants;
+    row.constants.add_own = 0;
     row.block = VKB_BLOCK_flare;
     row.params.flare = *params;
+    if (params->count == 0)
+        return vkb_bring_moved(adjoint, &row, source, error);
     for (int ghost = 0; ghost < params->count; ++ghost) {
+        const float scale = params->ghosts[ghost][3];
         row.constants.levels = ghost;
         vkb_filter_begin(adjoint->graph, source, target, &filter);
-        scale_axis(params->ghosts[ghost][3], &filter.x);
-        scale_axis(params->ghosts[ghost][3], &filter.y);
-        if (!vkb_bring_through(adjoint, &row, &filter, source, target, error))
+        scale_axis(scale, &filter.x);
+        scale_axis(scale, &filter.y);
+        // What is sampled in the centre alone is not moved.
+        if (params->aberration > 0.0f && scale != 0.0f
+                ? !vkb_bring_moved(adjoint, &row, source, error)
+                : !vkb_bring_through(adjoint, &row, &filter, source, target, error))
             return false;
     }
     return true;

@@ -2,35 +2,73 @@
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-// The source at an offset from the centre, in texels.
+// The texel at an offset from the centre, in texels, and how far the offset is beyond its centre, in
+// `part`. The offset is not added to the size of the image first, which would round it.
+ivec2 texel_from_centre(vec2 offset, out vec2 part)
+{
+    vec2 centre = 0.5 * vec2(textureSize(source, 0)) - 0.5, start = floor(centre);
+    vec2 moved = centre - start + offset, integer = floor(moved);
+    part = moved - integer;
+    return ivec2(start + integer);
+}
+
+// The source there.
 vec4 sample_from_centre(vec2 offset)
 {
-    vec2 place = 0.5 * vec2(textureSize(source, 0)) - 0.5 + offset;
-    vec2 integer = floor(place);
-    ivec2 texel = ivec2(integer);
+    vec2 part;
+    ivec2 texel = texel_from_centre(offset, part);
     vec4 four[4] = vec4[4](
         fetch_inside(source, texel), fetch_inside(source, texel + ivec2(1, 0)),
         fetch_inside(source, texel + ivec2(0, 1)), fetch_inside(source, texel + ivec2(1, 1)));
-    return bilinear(four, place - integer);
+    return bilinear(four, part);
 }
 
-// The same with red and blue moved along the radius, above the threshold and up to the maximum.
+// Whether red (-1) and blue (1) are sampled at other places than green, and the place of each.
+bool is_aberrated(vec2 offset)
+{
+    return params.aberration > 0.0 && length(offset / vec2(textureSize(source, 0))) > 0.0;
+}
+
+vec2 aberrated(vec2 offset, float side)
+{
+    float distance = length(offset / vec2(textureSize(source, 0)));
+    return offset + side * (params.aberration / distance * offset);
+}
+
+// The same with red and blue moved along the radius.
+vec4 colours_from_centre(vec2 offset)
+{
+    vec4 value = sample_from_centre(offset);
+    if (is_aberrated(offset)) {
+        value.r = sample_from_centre(aberrated(offset, -1.0)).r;
+        value.b = sample_from_centre(aberrated(offset, 1.0)).b;
+    }
+    return value;
+}
+
+// The same above the threshold and up to the maximum.
 vec4 seen_from_centre(vec2 offset)
 {
-    vec2 size = vec2(textureSize(source, 0)), share = offset / size;
-    float distance = length(share);
-    vec4 value = sample_from_centre(offset);
-    if (params.aberration > 0.0 && distance > 0.0) {
-        vec2 moved = params.aberration / distance * offset;
-        value.r = sample_from_centre(offset - moved).r;
-        value.b = sample_from_centre(offset + moved).b;
-    }
-    vec4 above = above_threshold(value);
+    vec4 above = above_threshold(colours_from_centre(offset));
     return vec4(min(above.rgb, vec3(params.maximum)), above.a);
 }
 
 // The place of this pixel, from the centre, in texels.
 #define FROM_CENTRE (vec2(PIXEL) + 0.5 - 0.5 * vec2(textureSize(source, 0)))
+
+// What a halo samples for a place, and what it shows of it. The direction must be exact, since red and
+// blue are moved along it also where the sample is near the centre.
+vec2 halo_offset(vec2 place)
+{
+    float distance = length(place), radius = params.radius * float(textureSize(source, 0).y);
+    return distance > 0.0 ? (distance - radius) / distance * place : vec2(0.0);
+}
+
+float halo_factor(vec2 place)
+{
+    float distance = length(place) / float(textureSize(source, 0).y);
+    return 1.0 - smoothstep(0.0, 1.0, abs(distance - params.radius) / params.width);
+}
 
 // What a ghost shows of its sample for a place: its tints, less towards the border.
 vec4 ghost_factor(int ghost, vec2 place)
@@ -47,4 +85,16 @@ float vignette(vec2 place)
     vec2 corner = 2.0 * place / vec2(textureSize(source, 0));
     float squared = dot(corner, corner);
     return mix(1.0, min(squared * squared, 1.0), params.vignette);
+}
+
+// A halo has no ghosts.
+bool is_halo()
+{
+    return params.count == 0;
+}
+
+// What a halo or a ghost samples for a place.
+vec2 flare_offset(int ghost, vec2 place)
+{
+    return is_halo() ? halo_offset(place) : params.ghosts[ghost].w * place;
 }

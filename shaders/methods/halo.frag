@@ -15,9 +15,5 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 
 vec4 shade()
 {
-    vec2 place = FROM_CENTRE;
-    float height = float(textureSize(source, 0).y), distance = length(place) / height;
-    float ring = 1.0 - smoothstep(0.0, 1.0, abs(distance - params.radius) / params.width);
-    vec2 inward = distance > 0.0 ? params.radius / distance * place : vec2(0.0);
-    return stored(ring * seen_from_centre(place - inward));
+    return stored(halo_factor(FROM_CENTRE) * seen_from_centre(halo_offset(FROM_CENTRE)));
 }

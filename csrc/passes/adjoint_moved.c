@@ -1,0 +1,190 @@
+// The adjoints of samples that are not on a grid: each texel gathers the cotangents of the pixels
+// that sample it, which the shader finds.
+#include "passes/adjoint.h"
+
+#include <math.h>
+
+// llvmpipe of Mesa 22.3 ends all loops of an invocation after 65535 iterations. The invocations
+// that it runs together take as many as the slowest of them in each loop; neighbours take about
+// as many.
+enum { MOST_ITERATIONS = 1 << 15 };
+
+// Twice the distance from a texel to a sample that it is part of, at most (adjoint_moved.frag).
+static const double SAMPLED_WIDTH = 2.0 * 1.503;
+
+// How many iterations a texel takes at most: at a distance from the centre, and for one row.
+struct gathering {
+    double (*iterations)(const struct gathering *gathering, double distance);
+    struct vkb_size size;
+    double centre_x, centre_y, of_row;
+    const struct flare *flare;
+};
+
+// The values of SUMMED_ROWS, and the size of the image of sums.
+struct sums {
+    int x, y, width, height, rows, columns;
+    struct vkb_size size;
+};
+
+#define SET_SUMS(params, sums) \
+    ((params)->summed_x = (sums)->x, (params)->summed_y = (sums)->y, \
+     (params)->summed_width = (sums)->width, (params)->summed_height = (sums)->height, \
+     (params)->summed_rows = (sums)->rows, (params)->summed_columns = (sums)->columns)
+
+// The texels of an axis that are no further away than the radius: the first one, and their number.
+static void set_range(double centre, double radius, uint32_t side, int *first, int *count)
+{
+    const double low = fmax(ceil(centre - radius), 0.0);
+    const double high = fmin(floor(centre + radius), side - 1.0);
+
+    *first = low <= high ? (int)low : 0;
+    *count = low <= high ? (int)(high - low) + 1 : 0;
+}
+
+// Finds the block of texels that take too many iterations, if there is one. False: the image of
+// their sums would be too large.
+static bool find_sums(const struct gathering *gathering, uint32_t max_side, struct sums *sums)
+{
+    const struct vkb_size size = gathering->size;
+    double radius = 2.0;
+
+    *sums = (struct sums){.rows = 1, .columns = 1};
+    if (gathering->of_row * size.height <= MOST_ITERATIONS)
+        return true;
+    while (radius < 2.0 * max_side && gathering->iterations(gathering, radius) > MOST_ITERATIONS)
+        radius *= 1.25;
+    set_range(gathering->centre_x, radius, size.width, &sums->x, &sums->width);
+    set_range(gathering->centre_y, radius, size.height, &sums->y, &sums->height);
+    if (sums->width == 0 || sums->height == 0) {
+        sums->width = sums->height = 0;
+        return true;
+    }
+    sums->rows = (int)fmax(MOST_ITERATIONS / gathering->of_row, 1.0);
+    const int groups = ((int)size.height + sums->rows - 1) / sums->rows;
+    sums->columns = (int)fmin(ceil(sqrt(groups)), (double)max_side / sums->width);
+    if (sums->columns == 0)
+        return false;
+    sums->size.width = (uint32_t)(sums->columns * sums->width);
+    sums->size.height = (uint32_t)((groups - 1) / sums->columns + 1) * (uint32_t)sums->height;
+    return sums->size.height <= max_side
+        && (uint64_t)sums->size.width * sums->size.height <= (uint64_t)size.width * size.height;
+}
+
+// Brings what the row gathers, for which another one adds up groups of rows, if there are sums.
+static bool bring_summed(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                         const struct sums *sums, uint32_t image, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+
+    row.reads[row.read_count++] = row.reads[0];
+    if (sums->width > 0) {
+        uint32_t partial;
+        row.constants.stage = STAGE_FIRST;
+        if (!vkb_add_apart(adjoint, &row, sums->size, &partial, error))
+            return false;
+        row.constants.stage = STAGE_LAST;
+        row.reads[row.read_count - 1] = partial;
+    }
+    return vkb_bring(adjoint, &row, image, error);
+}
+
+// What bounds the work of a halo or a ghost.
+struct flare {
+    const struct vkb_flare_params *params;
+    double scale, reach;       // of the samples; of the pixels from the centre
+    double longer, shorter;    // sides of the image
+    double parts, more_parts;  // of the pixels: those of all colours; those of red and blue, too
+};
+
+// A part of the pixels is a strip around the texel's line, between two radii. The loops over a row
+// and its sides take three iterations, and the ends of its pixels four.
+static double iterations_of_part(double reach, double distance, double thickness)
+{
+    const double across = reach * SAMPLED_WIDTH / 2.0 / distance + 1.0;
+    const double between = fmin(thickness, reach), rows = 3.0 * across + between + 2.0;
+
+    return 7.0 * rows + 2.0 * acos(-1.0) * across * between;
+}
+
+static double flare_iterations(const struct gathering *gathering, double distance)
+{
+    const struct flare *flare = gathering->flare;
+    const double longer = flare->longer, shorter = flare->shorter;
+    const double aberration = flare->params->aberration;
+    // By how much the distances differ by which red and blue are moved: these depend on the
+    // direction.
+    const double angle = 2.0 * asin(fmin(0.5 * SAMPLED_WIDTH / distance, 1.0));
+    const double slope = longer * (longer * longer - shorter * shorter) / (2.0 * shorter * shorter);
+    const double spread = aberration * fmin(longer - shorter, angle * slope);
+
+    if (distance > flare->scale * flare->reach + aberration * longer + SAMPLED_WIDTH)
+        return 0.0;
+    return flare->parts
+             * iterations_of_part(flare->reach, distance, SAMPLED_WIDTH / flare->scale + 2.0)
+         + flare->more_parts
+               * iterations_of_part(flare->reach, distance,
+                                    (SAMPLED_WIDTH + spread) / flare->scale + 2.0);
+}
+
+// Of a row between two radii: a chord of the outer circle that touches the inner one, at most.
+static double iterations_of_row(const struct flare *flare, double width)
+{
+    const double spread = flare->params->aberration * (flare->longer - flare->shorter);
+    const double thickness =
+        fmin((3.0 * SAMPLED_WIDTH + spread) / flare->scale + 2.0, flare->reach);
+    const double chord = 2.0 * sqrt(2.0 * flare->reach * thickness) + 7.0;
+    const double parts = flare->parts + flare->more_parts;
+
+    // The parts of a colour have no pixel in common, but for the margins of their radii.
+    return fmin(parts * chord, (flare->more_parts > 0.0 ? 3.0 : 1.0) * (width + 28.0));
+}
+
+static struct flare flare_of(const struct vkb_pass_row *row, struct vkb_size size)
+{
+    const struct vkb_flare_params *params = &row->params.flare;
+    const double width = size.width, height = size.height, most = 0.5 * hypot(width, height) + 1.0;
+    const bool halo = params->count == 0;
+    // Those outwards and those inwards; of red there are two of each.
+    const double parts = halo ? 2.0 : 1.0;
+
+    return (struct flare){
+        .params = params,
+        .scale = halo ? 1.0 : fabs((double)params->ghosts[row->constants.levels][3]),
+        .reach = halo ? fmin(most, (params->radius + params->width) * height + 1.0) : most,
+        .longer = fmax(width, height),
+        .shorter = fmin(width, height),
+        .parts = parts,
+        .more_parts = params->aberration > 0.0f ? 3.0 * parts : 0.0,
+    };
+}
+
+bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t source,
+                     struct vkb_error *error)
+{
+    const struct vkb_image_row *image = &adjoint->graph->images[source];
+    const struct vkb_size size = {image->width, image->height};
+    const struct flare flare = flare_of(row, size);
+    const struct gathering gathering = {
+        .iterations = flare_iterations,
+        .size = size,
+        .centre_x = 0.5 * size.width - 0.5,
+        .centre_y = 0.5 * size.height - 0.5,
+        .of_row = iterations_of_row(&flare, size.width),
+        .flare = &flare,
+    };
+    struct sums sums;
+    uint32_t sampled;
+
+    if (!find_sums(&gathering, adjoint->max_side, &sums)) {
+        adjoint->too_large = true;
+        return true;
+    }
+    if (!vkb_add_apart(adjoint, row, size, &sampled, error))
+        return false;
+    struct vkb_pass_row moved = vkb_adjoint_row(&vkb_shader_adjoint_moved_frag, &sampled, 1);
+    moved.constants.levels = row->constants.levels;
+    moved.block = row->block;
+    moved.params = row->params;
+    SET_SUMS(&moved.params.flare, &sums);
+    return bring_summed(adjoint, &moved, &sums, source, error);
+}
