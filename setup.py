@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import runpy
 import shutil
 import struct
@@ -55,43 +56,6 @@ MOST_UNROLLED = 260_000
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
 FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
-# Shaders whose images are always words.
-WORDS_ALONE = {
-    "strip.comp",
-    "threshold.comp",
-    "blend.comp",
-    "filter_rows.comp",
-    "upsample.comp",
-    "upsample_final.comp",
-    "filter_columns.comp",
-    "gather_columns.comp",
-    "kawase_up.comp",
-    "halve_taps.comp",
-    "halve_grid.comp",
-    "reduce.comp",
-    "shrink.comp",
-    "kino_bright.comp",
-    "highlights.comp",
-    "scale.comp",
-    "streaks.comp",
-    "godot_rows.comp",
-    "hdrp_rows.comp",
-    "hdrp_columns.comp",
-    "adjoint_blend.comp",
-    "adjoint_threshold.comp",
-    "adjoint_strip.comp",
-}
-# Shaders whose images are always single floats.
-FLOATS_ALONE = {
-    "adjoint_taps.comp",
-    "adjoint_blend.comp",
-    "adjoint_threshold.comp",
-    "adjoint_strip.comp",
-}
-# Shaders that make the caller's array, besides those of the finished picture.
-PACKED = {"adjoint_strip.comp"}
-# Shaders that load single floats and store words of each format, too.
-WORDS_STORED = {"fft.comp"}
 CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
 
 
@@ -107,22 +71,26 @@ def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for each format that it may load from: for images as words, and for storage images,
-    unless only CPUs run it. If it can make the caller's array, it is also compiled for a target
-    of three channels, and if it can read the caller's image, for an image of three single floats.
+    is compiled for images as words, of each format. Lines of it say more: with `#pragma compile
+    floats` it is for single floats alone, with `#pragma compile images` also for storage images.
+    If it calls finished(), or has `#pragma compile packed`, it can make the caller's array, and is
+    also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can read the
+    caller's image, and is also compiled for an image of three single floats. If it uses
+    TARGET_BYTES, it also loads single floats and stores words of each format.
     """
     name = shader.name.replace(".", "_")
     text = shader.read_text()
     if '#include "variants/pixels.glsl"' in text:
+        marks = re.findall(r"^#pragma compile (\w+)$", text, re.MULTILINE)
         found = []
         for ours, glsl in FORMATS.items():
-            if shader.name in FLOATS_ALONE and ours != "rgba32float":
+            if "floats" in marks and ours != "rgba32float":
                 continue
-            if shader.name not in WORDS_ALONE:
+            if "images" in marks:
                 options = (f"-DSOURCE_FORMAT={glsl}",)
                 found.append(Module(f"{name}_{ours}", shader, options))
             words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
-            if shader.name in WORDS_STORED:
+            if "TARGET_BYTES" in text:
                 stored = ("-DWORDS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
                 found.append(Module(f"{shader.stem}_stored_words_{ours}", shader, stored))
             kinds = [("", ())]
@@ -130,7 +98,7 @@ def modules(shader: Path) -> list[Module]:
                 kinds.append(("rgb_", ("-DRGB",)))
             for kind, options in kinds:
                 found.append(Module(f"{shader.stem}_words_{kind}{ours}", shader, words + options))
-                if "finished(" in text or shader.name in PACKED:
+                if "finished(" in text or "packed" in marks:
                     packed = (*words, *options, "-DTARGET_CHANNELS=3")
                     found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
         return found

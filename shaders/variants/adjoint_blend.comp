@@ -1,6 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#pragma compile floats
 // The cotangents of a composite's scene or bloom, for images as words (see adjoint_composite.frag).
 #include "lib/block.glsl"
 

@@ -1,6 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#pragma compile images
+#pragma compile floats
 // The transpose of a filter (see adjoint_filter.frag) in blocks: an invocation loads each pixel once that
 // texels next to each other are read by. The table has an entry for
 // each block of four texels: the first column or row of pixels that read these, and where their weights

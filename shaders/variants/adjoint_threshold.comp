@@ -1,6 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#pragma compile floats
 // The cotangents of the threshold pass, for images as words of the same size (see
 // adjoint_threshold.frag).
 #include "lib/block.glsl"

@@ -1,6 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#pragma compile images
 // Downsampling in the pyramid to exactly half the size. The 13 taps are between texels, so they are
 // the sum of two separable kernels, (1 1 1 1) / 4 and (1 1 2 2 1 1) / 8 along each axis, each with
 // half of the weight. An invocation writes a strip from top to bottom and loads each texel once.
