@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from vkbloom.glare.base import check_glare
@@ -187,9 +186,7 @@ GLARES: Final[Mapping[str, NamedGlare]] = {
 
 #: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
 #: ``docs/glare.md`` list what they are, with their sources.
-glares: Mapping[str, tuple[Glare, ...]] = MappingProxyType(
-    Named("glare", {name: one.stages for name, one in GLARES.items()})
-)
+glares: Mapping[str, tuple[Glare, ...]] = Named("glare", GLARES, lambda one: one.stages)
 
 
 def read_glare(glare: object) -> tuple[Glare, ...]:

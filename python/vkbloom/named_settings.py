@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from vkbloom.registry import METHODS
-from vkbloom.suggestions import NamedLate
+from vkbloom.suggestions import Named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -186,6 +186,4 @@ PRESETS: Final[Mapping[str, Preset]] = {
 
 #: Name to settings. ``vkbloom presets`` and ``docs/presets.md`` list what they are, with their
 #: sources.
-presets: Mapping[str, Settings] = NamedLate(
-    "preset", {name: one.make for name, one in PRESETS.items()}
-)
+presets: Mapping[str, Settings] = Named("preset", PRESETS, lambda one: one.make())

@@ -6,9 +6,11 @@ later has options, controls, axes, fits and JSON like the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, Final, Protocol
+
+from vkbloom.suggestions import Named
 
 __all__ = ["METHODS", "STAGES", "Methods", "Reference", "Registry"]
 
@@ -26,40 +28,30 @@ class Reference(Protocol):
     gain: Any
 
 
-class Registry(Mapping[str, type[Any]]):
+def _imported(source: str | type[Any]) -> type[Any]:
+    if isinstance(source, type):
+        return source
+    module, _, kind = source.partition(":")
+    return getattr(import_module(module), kind)  # type: ignore[no-any-return]
+
+
+class Registry(Named[type[Any]]):
     """Classes by name. Those of the package are imported on first use, since some import much.
 
     `places`: "module:Class" in `package`, by name.
     """
 
-    def __init__(self, package: str, places: Mapping[str, str]) -> None:
-        self._sources: dict[str, str | type[Any]] = {
-            name: f"{package}.{place}" for name, place in places.items()
-        }
-
-    def __getitem__(self, name: str) -> type[Any]:
-        source = self._sources[name]
-        if isinstance(source, type):
-            return source
-        module, _, kind = source.partition(":")
-        return getattr(import_module(module), kind)  # type: ignore[no-any-return]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._sources)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._sources
-
-    def __len__(self) -> int:
-        return len(self._sources)
+    def __init__(self, kind: str, package: str, places: Mapping[str, str]) -> None:
+        sources = {name: f"{package}.{place}" for name, place in places.items()}
+        super().__init__(kind, sources, _imported)
 
     def is_added(self, name: str) -> bool:
         """Return whether the class was added at run time."""
-        return isinstance(self._sources.get(name), type)
+        return isinstance(self._entries.get(name), type)
 
     def class_named(self, name: str) -> type[Any] | None:
         """Return the class with this name in Python; None if there is none."""
-        for key, source in self._sources.items():
+        for key, source in self._entries.items():
             own = source.partition(":")[2] if isinstance(source, str) else source.__name__
             if own == name:
                 return self[key]
@@ -71,33 +63,34 @@ class Methods(Registry):
 
     _references: Final[dict[str, Reference]]
 
-    def __init__(self, package: str, places: Mapping[str, str]) -> None:
-        super().__init__(package, places)
+    def __init__(self, kind: str, package: str, places: Mapping[str, str]) -> None:
+        super().__init__(kind, package, places)
         self._references = {}
 
     def register(self, kind: type[Any], reference: Reference | None = None) -> None:
         """Add a class under its `method`, or replace one that was added."""
         name = kind.method
-        if isinstance(self._sources.get(name), str):
+        if isinstance(self._entries.get(name), str):
             raise ValueError(f"method: {name!r} is a method of vkbloom; give another name")
         self.unregister(name)
-        self._sources[name] = kind
+        self._entries[name] = kind
         if reference is not None:
             self._references[name] = reference
 
     def unregister(self, name: str) -> None:
         """Remove a class that was added, if it is there."""
-        if isinstance(self._sources.get(name), type):
-            del self._sources[name]
+        if isinstance(self._entries.get(name), type):
+            del self._entries[name]
+            self._made.pop(name, None)
             self._references.pop(name, None)
 
     def has_reference(self, name: str) -> bool:
         """Return whether the method is there in NumPy."""
-        return isinstance(self._sources.get(name), str) or name in self._references
+        return isinstance(self._entries.get(name), str) or name in self._references
 
     def reference(self, name: str) -> Reference:
         """Return a method in NumPy; raise KeyError if there is none."""
-        if isinstance(self._sources.get(name), str):
+        if isinstance(self._entries.get(name), str):
             module: Any = import_module(f"vkbloom.reference.{name}")
             return module  # type: ignore[no-any-return]
         return self._references[name]
@@ -105,6 +98,7 @@ class Methods(Registry):
 
 #: The methods. Their order is that of ``VKB_METHODS`` in the core.
 METHODS: Final = Methods(
+    "method",
     "vkbloom.methods",
     {
         "separable": "separable:Separable",
@@ -124,6 +118,7 @@ METHODS: Final = Methods(
 )
 #: The stages of glare.
 STAGES: Final = Registry(
+    "glare",
     "vkbloom.glare",
     {
         "streaks": "streaks:Streaks",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
-__all__ = ["Named", "NamedLate", "did_you_mean", "lacking", "nearest", "unknown"]
+__all__ = ["Named", "did_you_mean", "lacking", "nearest", "unknown"]
 
 T = TypeVar("T")
+E = TypeVar("E")
 
 
 # A shorter name is part of many others.
@@ -60,43 +61,34 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
     return f"{what} {name!r}{near} available: {', '.join(known) or 'none'}"
 
 
-class Named(dict[str, T]):
+class Named(Mapping[str, T]):
     """Objects by their published names; the error for an unknown name suggests one.
 
     - `kind`: What the objects are.
+    - `entries`: What each object is made of, when it is first asked for.
     """
 
-    def __init__(self, kind: str, entries: Mapping[str, T]) -> None:
-        super().__init__(entries)
+    def __init__(self, kind: str, entries: Mapping[str, E], make: Callable[[E], T]) -> None:
         self._kind = kind
-
-    def __missing__(self, name: object) -> T:
-        raise KeyError(unknown(f"unknown {self._kind}", name, self))
-
-
-class NamedLate(Mapping[str, T]):
-    """Objects by their published names, as `Named`; each is made when it is first asked for."""
-
-    def __init__(self, kind: str, makers: Mapping[str, Callable[[], T]]) -> None:
-        self._kind = kind
-        self._makers = makers
+        self._entries: dict[str, Any] = {**entries}
+        self._make: Callable[[Any], T] = make
         self._made: dict[str, T] = {}
 
     def __getitem__(self, name: str) -> T:
-        if name not in self._makers:
+        if name not in self._entries:
             raise KeyError(unknown(f"unknown {self._kind}", name, self))
         if name not in self._made:
-            self._made.setdefault(name, self._makers[name]())
+            self._made.setdefault(name, self._make(self._entries[name]))
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._makers
+        return name in self._entries
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._makers)
+        return iter(self._entries)
 
     def __len__(self) -> int:
-        return len(self._makers)
+        return len(self._entries)
 
     def __repr__(self) -> str:
         return repr(dict(self))
