@@ -1,5 +1,7 @@
 #include "run/exports.h"
 
+#include "run/list.h"
+
 // The most idle memory that is kept, the latest first: seven 4K images of half floats.
 #define KEPT_BYTES ((uint64_t)512 << 20)
 #define GRANULE    ((uint64_t)64 << 10)
@@ -90,25 +92,6 @@ static struct vkb_export *create_export(struct vkb_exports *exports, uint64_t si
     return NULL;
 }
 
-static void push(struct vkb_export **list, struct vkb_export *one)
-{
-    one->previous = NULL;
-    one->next = *list;
-    if (one->next)
-        one->next->previous = one;
-    *list = one;
-}
-
-static void unlink_export(struct vkb_export **list, struct vkb_export *one)
-{
-    if (one->previous)
-        one->previous->next = one->next;
-    else
-        *list = one->next;
-    if (one->next)
-        one->next->previous = one->previous;
-}
-
 // The smallest that is up to an eighth too large and that no stream uses any more.
 static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t size)
 {
@@ -127,7 +110,7 @@ static void drop_oldest(struct vkb_exports *exports)
 
     while (oldest->next)
         oldest = oldest->next;
-    unlink_export(&exports->idle, oldest);
+    VKB_UNLINK(&exports->idle, oldest);
     exports->idle_size -= oldest->size;
     destroy_export(exports, oldest);
 }
@@ -138,13 +121,13 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
     struct vkb_export *one = find_idle(exports, size);
 
     if (one) {
-        unlink_export(&exports->idle, one);
+        VKB_UNLINK(&exports->idle, one);
         exports->idle_size -= one->size;
     } else if (!(one = create_export(exports, size, error))) {
         return NULL;
     }
     one->filled = one->drawn = 0;
-    push(&exports->taken, one);
+    VKB_PUSH(&exports->taken, one);
     return one;
 }
 
@@ -216,14 +199,14 @@ static void free_closed(struct vkb_exports *exports)
 
 void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
 {
-    unlink_export(&exports->taken, one);
+    VKB_UNLINK(&exports->taken, one);
     if (!exports->device) {
         destroy_export(exports, one);
         free_closed(exports);
         return;
     }
     vkb_cuda_mark(exports->cuda, &one->memory);
-    push(&exports->idle, one);
+    VKB_PUSH(&exports->idle, one);
     exports->idle_size += one->size;
     while (exports->idle_size > KEPT_BYTES)
         drop_oldest(exports);

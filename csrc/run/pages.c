@@ -1,5 +1,7 @@
 #include "run/pages.h"
 
+#include "run/list.h"
+
 // The most idle memory that is kept, the latest first: a little more than three 4K images of half
 // floats.
 #define KEPT_BYTES ((size_t)256 << 20)
@@ -56,25 +58,6 @@ static void destroy_run(const struct vkb_device *device, struct vkb_page_run *ru
     vkb_free(run);
 }
 
-static void push(struct vkb_page_run **list, struct vkb_page_run *run)
-{
-    run->previous = NULL;
-    run->next = *list;
-    if (run->next)
-        run->next->previous = run;
-    *list = run;
-}
-
-static void unlink_run(struct vkb_page_run **list, struct vkb_page_run *run)
-{
-    if (run->previous)
-        run->previous->next = run->next;
-    else
-        *list = run->next;
-    if (run->next)
-        run->next->previous = run->previous;
-}
-
 // A run that is up to an eighth too large fits, so that sizes that vary a little share runs.
 static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size)
 {
@@ -92,12 +75,12 @@ struct vkb_page_run *vkb_pages_take(struct vkb_pages *pages, size_t size, struct
     struct vkb_page_run *run = find_idle(pages, size);
 
     if (run) {
-        unlink_run(&pages->idle, run);
+        VKB_UNLINK(&pages->idle, run);
         pages->idle_size -= run->size;
     } else if (!(run = create_run(pages->device, size, error))) {
         return NULL;
     }
-    push(&pages->taken, run);
+    VKB_PUSH(&pages->taken, run);
     return run;
 }
 
@@ -107,7 +90,7 @@ static void drop_oldest(struct vkb_pages *pages)
 
     while (oldest->next)
         oldest = oldest->next;
-    unlink_run(&pages->idle, oldest);
+    VKB_UNLINK(&pages->idle, oldest);
     pages->idle_size -= oldest->size;
     destroy_run(pages->device, oldest);
 }
@@ -121,13 +104,13 @@ static void free_closed(struct vkb_pages *pages)
 
 void vkb_pages_give_back(struct vkb_pages *pages, struct vkb_page_run *run)
 {
-    unlink_run(&pages->taken, run);
+    VKB_UNLINK(&pages->taken, run);
     if (!pages->device) {
         destroy_run(NULL, run);
         free_closed(pages);
         return;
     }
-    push(&pages->idle, run);
+    VKB_PUSH(&pages->idle, run);
     pages->idle_size += run->size;
     while (pages->idle_size > KEPT_BYTES)
         drop_oldest(pages);

@@ -1,5 +1,7 @@
 #include "run/resident.h"
 
+#include "run/list.h"
+
 struct vkb_residents {
     const struct vkb_device *device;  // NULL: closed
     struct vkb_resident *first;
@@ -47,12 +49,8 @@ struct vkb_resident *vkb_resident_add(struct vkb_residents *residents, struct vk
 {
     struct vkb_resident *resident = vkb_alloc(error, 1, sizeof *resident);
 
-    if (!resident)
-        return NULL;
-    resident->next = residents->first;
-    if (resident->next)
-        resident->next->previous = resident;
-    residents->first = resident;
+    if (resident)
+        VKB_PUSH(&residents->first, resident);
     return resident;
 }
 
@@ -60,12 +58,7 @@ void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *
 {
     if (residents->device)
         destroy_images(residents->device, resident);
-    if (resident->previous)
-        resident->previous->next = resident->next;
-    else
-        residents->first = resident->next;
-    if (resident->next)
-        resident->next->previous = resident->previous;
+    VKB_UNLINK(&residents->first, resident);
     vkb_free(resident);
     free_closed(residents);
 }
