@@ -54,8 +54,7 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
 
     choose_sizes(&levels);
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
-                              error))
+        if (!vkb_levels_down(&levels, level, error))
             return false;
         const struct vkb_pass_row row =
             level ? vkb_scaled_down_row(&levels, false, from, levels.downs[level])

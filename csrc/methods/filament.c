@@ -85,8 +85,7 @@ bool vkb_add_filament(const struct vkb_settings *settings, const struct vkb_bloo
     if (!add_halvings(&levels, &reduced, error))
         return false;
     for (uint32_t level = 0; level < levels.count; ++level)
-        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
-                              error)
+        if (!vkb_levels_down(&levels, level, error)
             || !(level ? add_down(&levels, level, error)
                        : add_reduction(&levels, reduced, levels.downs[0], error)))
             return false;

@@ -54,8 +54,7 @@ bool vkb_add_godot(const struct vkb_settings *settings, const struct vkb_bloom_s
         size = vkb_halved(size);
         if (!add_step(&levels, level, &step, error)
             || !add_blur(&levels, DIRECTION_HORIZONTAL, level == 0, from, step, error)
-            || !vkb_levels_image(&levels, "down_%u", level, levels.sizes[level],
-                                 &levels.downs[level], error)
+            || !vkb_levels_down(&levels, level, error)
             || !add_blur(&levels, DIRECTION_VERTICAL, level == 0, step, levels.downs[level], error))
             return false;
     }

@@ -36,8 +36,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     if (!vkb_graph_add_pass(graph, &prefilter, error))
         return false;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &levels.downs[level],
-                              error))
+        if (!vkb_levels_down(&levels, level, error))
             return false;
         struct vkb_pass_row row =
             vkb_pyramid_row(&levels, &vkb_shader_box_down_frag, from, levels.downs[level]);

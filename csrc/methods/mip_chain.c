@@ -7,8 +7,7 @@ static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error
 {
     const uint32_t from = level ? levels->downs[level - 1] : levels->source->glow;
 
-    if (!vkb_levels_image(levels, "down_%u", level, levels->sizes[level], &levels->downs[level],
-                          error))
+    if (!vkb_levels_down(levels, level, error))
         return false;
     const bool firefly_filter = levels->settings->values.firefly_filter && level == 0;
     const struct vkb_pass_row row =

@@ -25,7 +25,7 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
     levels.count = wanted < most ? wanted : most;
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
         levels.sizes[level] = size;
-        if (!vkb_levels_image(&levels, "down_%u", level, size, &levels.downs[level], error))
+        if (!vkb_levels_down(&levels, level, error))
             return false;
         size = vkb_halved(size);
         struct vkb_pass_row row =

@@ -41,7 +41,7 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
 
     for (; levels.count < count; size = vkb_halved(size))
         levels.sizes[levels.count++] = size;
-    if (!vkb_levels_image(&levels, "down_%u", 0, levels.sizes[0], &levels.downs[0], error))
+    if (!vkb_levels_down(&levels, 0, error))
         return false;
     struct vkb_pass_row row =
         vkb_prefilter_row(&levels, &vkb_shader_urp_prefilter_frag, source->glow, levels.downs[0]);
@@ -88,7 +88,7 @@ static bool add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t f
 
     return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
         && add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step, error)
-        && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
+        && vkb_levels_down(levels, level, error)
         && add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, levels->downs[level], error);
 }
 

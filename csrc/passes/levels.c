@@ -61,6 +61,12 @@ bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_
     return add_image(levels, levels->source->format, name, number, size, true, image, error);
 }
 
+bool vkb_levels_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
+{
+    return vkb_levels_image(levels, "down_%u", level, levels->sizes[level], &levels->downs[level],
+                            error);
+}
+
 bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
                      struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
@@ -212,7 +218,7 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
 
     return vkb_levels_step(levels, "down_%u_across", level, size, &step, error)
         && add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step, error)
-        && vkb_levels_image(levels, "down_%u", level, size, &levels->downs[level], error)
+        && vkb_levels_down(levels, level, error)
         && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 

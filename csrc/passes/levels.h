@@ -43,7 +43,10 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
 bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
                       struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
-// The same for an intermediate image, which is not a framebuffer.
+// Adds the image of a level, `levels->downs[level]`.
+bool vkb_levels_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error);
+
+// As vkb_levels_image, for an intermediate image, which is not a framebuffer.
 bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
