@@ -327,12 +327,8 @@ static bool add_end(const struct glare *glare, uint32_t light, uint32_t *bloom,
         return false;
     struct vkb_pass_row row =
         vkb_fetching_row(&glare->levels, &vkb_shader_blender_end_frag, light, *bloom);
-    const struct vkb_sampling sampling = vkb_sampling_into(glare->levels.graph, *bloom);
     row.block = VKB_BLOCK_blender_end;
     row.params.blender_end = (struct vkb_blender_end_params){
-        .target_width = sampling.width,
-        .target_height = sampling.height,
-        .limit = sampling.limit,
         .saturation = glare->settings->values.saturation,
         .factors = {{
             (float)(glare->gain * tint[0]),
@@ -341,6 +337,7 @@ static bool add_end(const struct glare *glare, uint32_t light, uint32_t *bloom,
             (float)(glare->gain * (tint[0] + tint[1] + tint[2]) / 3.0),
         }},
     };
+    VKB_SET_TARGET(&row, blender_end, &glare->levels.graph->images[*bloom]);
     return vkb_graph_add_pass(glare->levels.graph, &row, error);
 }
 

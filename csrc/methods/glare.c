@@ -292,19 +292,16 @@ static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_gl
     if (!vkb_graph_add_image(levels->graph, &picture, &dirt, error)
         || !vkb_levels_step(levels, "dirty_light", 0, levels->source->final, &dirty, error))
         return false;
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, dirty);
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, *light, dirty);
     row.reach = INFINITY;  // the picture has no bands of rows
     row.reads[1] = dirt;
     row.read_count = 2;
     row.block = VKB_BLOCK_dirt;
     row.params.dirt = (struct vkb_dirt_params){
-        .target_width = sampling.width,
-        .target_height = sampling.height,
-        .limit = sampling.limit,
         .base = values->lerp ? 1.0f - values->strength : 0.0f,
         .share = values->strength,
     };
+    VKB_SET_TARGET(&row, dirt, &levels->graph->images[dirty]);
     *light = dirty;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

@@ -40,7 +40,6 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
 static bool add_kawase(const struct vkb_levels *levels, const struct vkb_shader *fragment,
                        uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
 
     row.block = VKB_BLOCK_kawase;
@@ -48,9 +47,7 @@ static bool add_kawase(const struct vkb_levels *levels, const struct vkb_shader 
     // The threshold pass has applied it.
     row.params.kawase.threshold = 0.0f;
     row.params.kawase.knee = 0.0f;
-    row.params.kawase.target_width = sampling.width;
-    row.params.kawase.target_height = sampling.height;
-    row.params.kawase.limit = sampling.limit;
+    VKB_SET_TARGET(&row, kawase, &levels->graph->images[to]);
     row.reach += row.params.kawase.offset;
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

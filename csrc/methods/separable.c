@@ -84,16 +84,13 @@ static bool add_rounding(uint32_t from, uint32_t to, struct vkb_graph *graph,
 {
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[to].name, &vkb_shader_threshold_frag, to);
-    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
 
     row.constants.threshold_mode = THRESHOLD_NONE;
     row.constants.sampling = SAMPLING_TEXEL;
     row.reads[0] = from;
     vkb_apply_mask(&row, VKB_NO_IMAGE);
     row.block = VKB_BLOCK_threshold;
-    row.params.threshold.target_width = sampling.width;
-    row.params.threshold.target_height = sampling.height;
-    row.params.threshold.limit = sampling.limit;
+    VKB_SET_TARGET(&row, threshold, &graph->images[to]);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

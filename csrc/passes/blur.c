@@ -37,7 +37,6 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
                                  const struct vkb_blur *blur, uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fullscreen_row(name, &vkb_shader_blur_frag, to);
-    const struct vkb_sampling sampling = vkb_sampling_into(graph, to);
     const bool same_size = vkb_same_size(graph, from, to);
     const bool vertical = blur->direction == DIRECTION_VERTICAL;
     const double step = vertical ? blur->step_y : blur->step_x;
@@ -53,9 +52,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     row.block = VKB_BLOCK_blur;
     params->step_x = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.step_x;
     params->step_y = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.step_y;
-    params->target_width = sampling.width;
-    params->target_height = sampling.height;
-    params->limit = sampling.limit;
+    VKB_SET_TARGET(&row, blur, &graph->images[to]);
     // In one direction the gain is part of the weights, so that variants need not apply it.
     params->gain = blur->direction == DIRECTION_BOTH ? (float)blur->gain : 1.0f;
     for (uint32_t i = 0; i < moved.count; ++i) {

@@ -97,12 +97,9 @@ struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
 
     row.block = VKB_BLOCK_pyramid;
-    row.params.pyramid.target_width = sampling.width;
-    row.params.pyramid.target_height = sampling.height;
-    row.params.pyramid.limit = sampling.limit;
+    VKB_SET_TARGET(&row, pyramid, &levels->graph->images[to]);
     return row;
 }
 
@@ -168,7 +165,6 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
 {
     const struct vkb_settings *settings = levels->settings;
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
 
     row.constants.thresholded = settings->thresholded;
     row.block = VKB_BLOCK_prefilter;
@@ -177,9 +173,7 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
         row.params.prefilter.threshold = 0.0f;
         row.params.prefilter.knee = 0.0f;
     }
-    row.params.prefilter.target_width = sampling.width;
-    row.params.prefilter.target_height = sampling.height;
-    row.params.prefilter.limit = sampling.limit;
+    VKB_SET_TARGET(&row, prefilter, &levels->graph->images[to]);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
     return row;
 }
@@ -329,7 +323,6 @@ bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double g
 bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
                        uint32_t to, struct vkb_error *error)
 {
-    const struct vkb_sampling sampling = vkb_sampling_into(levels->graph, to);
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_gather_frag, levels->downs[0], to);
 
@@ -343,8 +336,6 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
     row.band_rows = VKB_BAND_SAME_PLACE;
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
-    row.params.gather.target_width = sampling.width;
-    row.params.gather.target_height = sampling.height;
-    row.params.gather.limit = sampling.limit;
+    VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

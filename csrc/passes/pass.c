@@ -29,17 +29,6 @@ void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask)
     row->read_count = 2;
 }
 
-struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target)
-{
-    const struct vkb_image_row *row = &graph->images[target];
-
-    return (struct vkb_sampling){
-        .width = (int)row->width,
-        .height = (int)row->height,
-        .limit = vkb_formats[row->format].limit,
-    };
-}
-
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 {
     const struct vkb_image_row *first = &graph->images[a], *second = &graph->images[b];

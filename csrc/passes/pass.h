@@ -46,12 +46,14 @@ bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
                    enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
                    struct vkb_error *error);
 
-// The values of SAMPLING_ROWS for a pass that writes `target`.
-struct vkb_sampling {
-    int width, height;
-    float limit;
-};
-struct vkb_sampling vkb_sampling_into(const struct vkb_graph *graph, uint32_t target);
+// Sets what block B has of SAMPLING_ROWS for a pass that writes `image`.
+#define VKB_SET_TARGET(row, B, image) \
+    do { \
+        const struct vkb_image_row *const set_target = (image); \
+        (row)->params.B.target_width = (int)set_target->width; \
+        (row)->params.B.target_height = (int)set_target->height; \
+        (row)->params.B.limit = vkb_formats[set_target->format].limit; \
+    } while (0)
 
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 

@@ -38,7 +38,6 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
 {
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[glow].name, &vkb_shader_threshold_frag, glow);
-    const struct vkb_sampling sampling = vkb_sampling_into(graph, glow);
 
     row.constants.threshold_mode = mode;
     // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
@@ -55,9 +54,7 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
         vkb_params_read(row.block, &settings->values, &row.params);
     if (mode == THRESHOLD_HARD && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)
         row.params.threshold.threshold = between_levels(row.params.threshold.threshold);
-    row.params.threshold.target_width = sampling.width;
-    row.params.threshold.target_height = sampling.height;
-    row.params.threshold.limit = sampling.limit;
+    VKB_SET_TARGET(&row, threshold, &graph->images[glow]);
     return vkb_graph_add_pass(graph, &row, error);
 }
 

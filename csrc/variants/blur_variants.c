@@ -86,7 +86,6 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const struct vkb_sampling sampling = vkb_sampling_into(&choice->plain, pass->targets[0]);
     // In 8 bits the sampler filters the float lines, if the device supports that.
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
@@ -116,9 +115,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.reads[0] = lines;
     row.read_count = 1;
     row.block = VKB_BLOCK_threshold;
-    row.params.threshold.target_width = sampling.width;
-    row.params.threshold.target_height = sampling.height;
-    row.params.threshold.limit = sampling.limit;
+    VKB_SET_TARGET(&row, threshold, &choice->plain.images[pass->targets[0]]);
     return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
