@@ -322,18 +322,21 @@ static bool order_stream(const struct exported_object *self, void *stream, struc
     return done;
 }
 
-// stream() -> the renderer's stream, ordered after the device; None: the memory is complete.
-static PyObject *get_stream(PyObject *object, PyObject *unused)
+static PyObject *complete(PyObject *object, PyObject *unused)
 {
     struct exported_object *self = exported_of(object);
     struct vkb_error error = {0};
 
     (void)unused;
-    if (!self->run->drawn)
-        Py_RETURN_NONE;
-    return order_stream(self, NULL, &error)
-             ? PyLong_FromVoidPtr(vkb_cuda_stream(self->exports->cuda))
-             : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    bool done = order_stream(self, NULL, &error);
+    if (done && self->run->drawn) {
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_finish(self->exports->cuda, &error);
+        Py_END_ALLOW_THREADS
+        if (done)
+            self->run->drawn = 0;
+    }
+    return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
 static bool read_shape(PyObject *shape, struct shared *shared)
@@ -360,19 +363,14 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
     PyObject *shape;
     int code, bits, versioned;
     Py_ssize_t offset;
-    long long stream;
+    unsigned long long stream;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!iipnL:capsule", &PyTuple_Type, &shape, &code, &bits,
+    if (!PyArg_ParseTuple(arguments, "O!iipnK:capsule", &PyTuple_Type, &shape, &code, &bits,
                           &versioned, &offset, &stream))
         return NULL;
-    if (!order_stream(self, stream > 0 ? (void *)(uintptr_t)stream : NULL, &error))
+    if (!order_stream(self, (void *)(uintptr_t)stream, &error))
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    if (stream < 0) {
-        Py_BEGIN_ALLOW_THREADS
-        vkb_exports_settle(self->exports);
-        Py_END_ALLOW_THREADS
-    }
     struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
     if (!shared)
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -526,9 +524,8 @@ static PyObject *get_ordinal(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"capsule", make_capsule, METH_VARARGS,
      "capsule(shape, code, bits, versioned, offset, stream) -> a capsule of DLPack. The stream "
-     "waits for the device; -1: this call does."},
-    {"stream", get_stream, METH_NOARGS,
-     "stream() -> the renderer's stream, which waits for the device; None: it need not."},
+     "waits for the device; 0: the renderer's."},
+    {"complete", complete, METH_NOARGS, "complete(). Waits until the device has drawn to it."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
     {"write", write_bytes, METH_O, "write(array). Copies an array of the host there."},
     {"clone", clone_export, METH_VARARGS,

@@ -403,6 +403,11 @@ bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void 
                                      &semaphore, &point, 1, stream ? stream : cuda->stream)));
 }
 
+bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    return enter(cuda, error) && leave(cuda, CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
 void vkb_cuda_settle(struct vkb_cuda *cuda)
 {
     struct vkb_error ignored;

@@ -38,7 +38,9 @@ bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
 // Makes a stream wait for it; NULL: the own one.
 bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
                    struct vkb_error *error);
-// Waits until the context has done all work. May overlap with other calls.
+// Waits until the own stream has done all work. Both may overlap with other calls.
+bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error);
+// The same of all streams of the context.
 void vkb_cuda_settle(struct vkb_cuda *cuda);
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);

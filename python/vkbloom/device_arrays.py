@@ -194,6 +194,8 @@ class DeviceArray:
         assert not isinstance(memory, np.ndarray)
         if copy:
             memory, offset = memory.clone(self.nbytes, offset), 0
+        if stream == -1:
+            memory.complete()
         versioned_capsule = max_version is not None and max_version[0] >= 1
         return memory.capsule(
             self.shape,
@@ -201,7 +203,7 @@ class DeviceArray:
             8 * self.dtype.itemsize,
             versioned_capsule,
             offset,
-            _LEGACY if stream is None else stream,
+            _LEGACY if stream is None else max(stream, 0),
         )
 
     @property
@@ -209,12 +211,14 @@ class DeviceArray:
         """The array for Numba and others, version 3."""
         if isinstance(self._memory, np.ndarray):
             raise AttributeError("__cuda_array_interface__: the array is on the host")
+        # Not every consumer looks at the stream, so none is left to wait for.
+        self._memory.complete()
         return {
             "shape": self.shape,
             "typestr": self.dtype.str,
             "data": (self._memory.address + self._offset, False),
             "strides": None,
-            "stream": self._memory.stream(),
+            "stream": None,
             "version": 3,
         }
 
