@@ -226,12 +226,13 @@
     INPUT(B, float, limit)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of the
-// sides; the share of the samples that jitter leaves.
+// sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
     INPUT(B, float, left) \
+    SUMMED_ROWS(B, INPUT) \
     INPUT(B, float, limit)
 
 // The light of the deferred system.

@@ -42,6 +42,7 @@ BUDGET: Final[dict[str, int]] = {
     "grid/test_grid_cluster.py": 30,
     "grid/test_grid_parts.py": 30,
     "grid/test_grid_store.py": 45,
+    "methods/test_adjoint_glare.py": 40,
     "methods/test_adjoint_passes.py": 40,
     "methods/test_apply.py": 40,
     "methods/test_convolution.py": 25,

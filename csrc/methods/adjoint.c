@@ -42,6 +42,8 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
         {&vkb_shader_ghosts_frag, vkb_transpose_flare, NULL},
         {&vkb_shader_halo_frag, vkb_transpose_flare, NULL},
         {&vkb_shader_dirt_frag, vkb_transpose_dirt, NULL},
+        {&vkb_shader_simple_star_comp, vkb_transpose_star, NULL},
+        {&vkb_shader_sun_beams_frag, vkb_transpose_sun_beams, NULL},
     };
 
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)

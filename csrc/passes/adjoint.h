@@ -96,7 +96,8 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_tran
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
 // Glare.
-vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt;
+vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star,
+    vkb_transpose_sun_beams;
 
 // Brings the cotangents of what a convolution's prefilter of bright colours makes of the glow.
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,

@@ -1,4 +1,4 @@
-// The adjoints of glare: rays of streaks, ghosts and halo, dirt, and the prefilter of a
+// The adjoints of glare: rays of streaks, ghosts and halo, stars, dirt, and the prefilter of a
 // convolution.
 #include "passes/adjoint.h"
 
@@ -113,6 +113,22 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
             return false;
     }
     return true;
+}
+
+// Blender's recursive filter. Its pixels depend on those before them, the transpose's on those
+// after them.
+bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const uint32_t cotangents = vkb_brought(adjoint, pass);
+    struct vkb_pass_row row = *pass;
+
+    if (pass->constants.add_own && !bring_all(adjoint, cotangents, pass->reads[1], error))
+        return false;
+    row.shader = &vkb_shader_adjoint_star_comp;
+    row.reads[0] = cotangents;
+    row.read_count = 1;
+    return vkb_bring(adjoint, &row, pass->reads[0], error);
 }
 
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,

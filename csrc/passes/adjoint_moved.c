@@ -17,7 +17,8 @@ struct gathering {
     double (*iterations)(const struct gathering *gathering, double distance);
     struct vkb_size size;
     double centre_x, centre_y, of_row;
-    const struct flare *flare;
+    const struct flare *flare;  // or
+    double most, parts;         // of sun beams: the distance of a sample; the parts of its pixels
 };
 
 // The values of SUMMED_ROWS, and the size of the image of sums.
@@ -187,4 +188,54 @@ bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row
     moved.params = row->params;
     SET_SUMS(&moved.params.flare, &sums);
     return bring_summed(adjoint, &moved, &sums, source, error);
+}
+
+// Sun beams: four pixels of a strip behind the texel in an iteration.
+static double beam_iterations(const struct gathering *gathering, double distance)
+{
+    const double x = gathering->centre_x, y = gathering->centre_y;
+    const double width = gathering->size.width, height = gathering->size.height;
+    const double reach =
+        hypot(fmax(fabs(x), fabs(width - x)), fmax(fabs(y), fabs(height - y))) + 1.0;
+    const double outer = fmin(distance + gathering->most + SAMPLED_WIDTH, reach);
+    const double across = outer * SAMPLED_WIDTH / 2.0 / distance + 1.0;
+    const double rows = fmin(3.0 * across + outer + 2.0, height);
+
+    return gathering->parts * (8.0 * rows + across * outer / 2.0);
+}
+
+bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             struct vkb_error *error)
+{
+    const uint32_t source = pass->reads[0], cotangents = vkb_brought(adjoint, pass);
+    const struct vkb_image_row *image = &adjoint->graph->images[source];
+    const struct vkb_sun_beams_params *params = &pass->params.sun_beams;
+    const double left = params->left;
+    const struct gathering gathering = {
+        .iterations = beam_iterations,
+        .size = {image->width, image->height},
+        .centre_x = params->sun_x * (double)image->width - 0.5,
+        .centre_y = params->sun_y * (double)image->height - 0.5,
+        .of_row = image->width / 4.0 + 14.0,
+        .most = params->most + 2.0 + (left > 0.0 && left < 1.0 ? 2.0 / left : 0.0),
+        .parts = left < 1.0 ? 2.0 : 1.0,
+    };
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beams_frag, &cotangents, 1);
+    struct sums sums;
+    uint32_t shares;
+
+    if (!find_sums(&gathering, adjoint->max_side, &sums)) {
+        adjoint->too_large = true;
+        return true;
+    }
+    row.block = VKB_BLOCK_sun_beams;
+    row.params.sun_beams = *params;
+    SET_SUMS(&row.params.sun_beams, &sums);
+    struct vkb_pass_row first = row;
+    first.constants.stage = STAGE_GREY;
+    first.reads[first.read_count++] = cotangents;
+    if (!vkb_add_apart(adjoint, &first, gathering.size, &shares, error))
+        return false;
+    row.reads[0] = shares;
+    return bring_summed(adjoint, &row, &sums, source, error);
 }

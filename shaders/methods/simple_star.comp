@@ -6,57 +6,31 @@
 
 UNIFORM_BLOCK(STAR_BLOCK);
 #include "lib/storage.glsl"
+#include "lib/star_line.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
 layout(set = 0, binding = 3) uniform writeonly image2D target;
 
-ivec2 size, first, towards;
-int count;
-
-// The first pixel of a line: on the side that it leaves, then at the bottom.
-ivec2 start_of(int line)
+vec4 fetch(Line line, int at)
 {
-    int side = params.step_x < 0 ? size.x - 1 : 0;
-    if (params.step_x == 0)
-        return ivec2(line, size.y - 1);
-    if (line < size.y)
-        return ivec2(side, line);
-    int along = line - size.y + 1;
-    return ivec2(params.step_x < 0 ? side - along : along, size.y - 1);
-}
-
-vec4 fetch(int at)
-{
-    return at >= 0 && at < count ? texelFetch(source, first + at * towards, 0) : vec4(0.0);
+    return at >= 0 && at < line.count ? texelFetch(source, line.first + at * line.towards, 0)
+                                      : vec4(0.0);
 }
 
 void main()
 {
-    int line = int(gl_GlobalInvocationID.x);
+    Line line = line_of(int(gl_GlobalInvocationID.x), textureSize(source, 0));
     vec4 mixed[4];
-    ivec2 place;
 
-    size = textureSize(source, 0);
-    towards = ivec2(params.step_x, params.step_y);
-    int lines = (towards.x != 0 ? size.y : 0) + (towards.y != 0 ? size.x : 0);
-    if (line >= lines - (towards.x != 0 && towards.y != 0 ? 1 : 0))
-        return;
-    first = start_of(line);
-    int across = towards.x > 0 ? size.x - first.x : towards.x < 0 ? first.x + 1 : size.y;
-    count = towards.y != 0 ? min(across, first.y + 1) : across;
-    if (params.backwards != 0) {
-        first += (count - 1) * towards;
-        towards = -towards;
-    }
-    for (int at = 0; at < count; ++at) {
+    for (int at = 0; at < line.count; ++at) {
         int slot = at % params.distance;
-        vec4 ends = fetch(at + params.distance);
+        vec4 ends = fetch(line, at + params.distance);
         if (at >= params.distance)
             ends += mixed[slot];
-        mixed[slot] = stored((1.0 - params.fade) * fetch(at) + 0.5 * params.fade * ends);
-        place = first + at * towards;
+        mixed[slot] = stored((1.0 - params.fade) * fetch(line, at) + 0.5 * params.fade * ends);
+        ivec2 place = line.first + at * line.towards;
         vec4 value = mixed[slot];
         if (ADD_OWN != 0)
             value = stored(value + texelFetch(before, place, 0));

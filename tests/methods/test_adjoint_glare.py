@@ -10,7 +10,7 @@ import pytest
 
 from tests.methods.reference_cases import random_image
 from tests.methods.test_adjoint_passes import check
-from vkbloom import Ghosts, Halo, Pyramid, Renderer, reference
+from vkbloom import BlenderGlare, Ghosts, Halo, Pyramid, Renderer, reference
 from vkbloom.core_access import core_of
 from vkbloom.gradients.passes import DeviceGradients
 from vkbloom.sources import Inputs
@@ -121,3 +121,56 @@ def test_what_needs_too_many_sums_comes_from_the_reference(renderer: Renderer) -
     found = renderer.vjp(image, settings)[1](cotangents)
     assert not isinstance(found, DeviceGradients)
     check(found, reference.vjp(image, settings)[1](cotangents), "image")
+
+
+#: Inside of the image, at its edges, outside, and far away.
+SUNS = (0.5, 0.3, 0.123, 0.0, 1.0, -0.4, 1.7, -16.0)
+
+
+def blender(random: np.random.Generator, type: Any) -> BlenderGlare:
+    given: dict[str, Any] = {
+        "quality": str(random.choice(["high", "medium", "low"])),
+        "threshold": 0.3 if random.random() < 0.5 else None,
+        "alpha": str(random.choice(["keep", "blur"])),
+    }
+    if type == "simple_star":
+        given["iterations"] = int(random.integers(2, 6))
+        given["fade"] = float(random.choice([0.75, 0.9, 1]))
+        given["diagonal"] = bool(random.integers(2))
+    else:
+        given["size"] = float(random.choice([0.1, 0.5, 1]))
+        # With more, the places of the few samples have larger roundings, in the frames too.
+        given["jitter"] = float(random.choice([0, 0, 0.3, 0.7, 1]))
+        given["sun_position"] = tuple(map(float, random.choice(SUNS, 2)))
+    return BlenderGlare(type=type, **given)
+
+
+@pytest.mark.usefixtures("software")
+@pytest.mark.parametrize("type", ["simple_star", "sun_beams"])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_stars_and_beams_are_transposed(
+    monkeypatch: pytest.MonkeyPatch, variant: str, type: str
+) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
+    random = np.random.default_rng(VARIANTS.index(variant))
+    with Renderer("software", validation=True) as renderer:
+        for seed in range(12):
+            settings = blender(random, type)
+            height, width = map(int, random.choice(SIDES, 2))
+            channels = 4 if settings.alpha == "blur" else 3
+            image = random_image(height, width, channels=channels, seed=seed).astype(np.float32)
+            _, found, cotangents = both(renderer, settings, image, "bloom")
+            check(found, reference.vjp(image, settings)[1](cotangents), "image")
+
+
+def test_many_pixels_are_behind_a_texel_near_the_sun(renderer: Renderer) -> None:
+    """They are added up in groups of rows."""
+    settings = BlenderGlare(type="sun_beams", threshold=None, size=1.0, sun_position=(0.4, 0.3))
+    image = random_image(500, 251, channels=3, seed=1).astype(np.float32)
+    source = Inputs(image).source((image,))
+    floats = settings.replace(format="rgba32float")
+    plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+    assert plan
+    assert sum(name.startswith("adjoint_beams") for _, name, *_ in plan.passes) == 3
+    frame, found, cotangents = both(renderer, settings, image, "bloom")
+    check_adjoint(frame, found, image, cotangents["bloom"])
