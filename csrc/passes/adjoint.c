@@ -1,6 +1,7 @@
 #include "passes/adjoint.h"
 
 #include <stdio.h>
+#include <string.h>
 
 // A filter whose texels are read by no more pixels than this is one pass, not one for each axis.
 static const double MOST_IN_ONE_PASS = 20.0;
@@ -111,6 +112,9 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
     row.block = VKB_BLOCK_adjoint_filter;
     row.params.adjoint_filter.gain = (float)filter->gain;
     row.params.adjoint_filter.share = 1.0f;
+    row.params.adjoint_filter.exact = filter->exact;
+    if (filter->exact == EXACT_DOUBLE)
+        memcpy(row.params.adjoint_filter.taps[0], filter->up, sizeof filter->up);
     return row;
 }
 
@@ -140,6 +144,7 @@ static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *fi
     uint32_t start, between;
 
     first.gain = 1.0;
+    first.exact = 0;
     struct vkb_pass_row row =
         filter_row(adjoint, &first, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
     struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
@@ -151,9 +156,22 @@ static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *fi
         && bring_along(adjoint, filter, !rows, between, image, error);
 }
 
+// Whether the filter brings the cotangents themselves, to which nothing is added.
+static bool brings_same(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                        uint32_t image)
+{
+    return filter->kernels == 1 && filter->gain == 1.0 && vkb_axis_is_identity(&filter->x)
+        && vkb_axis_is_identity(&filter->y) && adjoint->brought[image] == VKB_NO_IMAGE
+        && image != adjoint->glow && !vkb_is_given(&adjoint->graph->images[image]);
+}
+
 bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                       uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
+    if (brings_same(adjoint, filter, image)) {
+        adjoint->brought[image] = cotangents;
+        return true;
+    }
     struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
     struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
     uint32_t start_x, start_y;

@@ -4,6 +4,7 @@
 #include "passes/levels.h"
 
 #include <math.h>
+#include <string.h>
 
 static void set_line(const struct vkb_blur_params *params, int radius, double step,
                      struct vkb_axis *axis)
@@ -75,6 +76,7 @@ bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
     vkb_filter_thirteen(&filter, params->step_x, params->step_y);
+    filter.exact = vkb_halves(pass) ? EXACT_HALF : 0;
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
@@ -204,6 +206,10 @@ bool vkb_transpose_up(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pa
         return vkb_fail(error, VKB_ERROR_GENERAL, "adjoint: pass %s has an unknown filter",
                         pass->name);
     filter.gain = params->coarse;
+    if (vkb_doubles(pass)) {
+        filter.exact = EXACT_DOUBLE;
+        memcpy(filter.up, params->taps[0], sizeof filter.up);
+    }
     if (!vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[0], error))
         return false;
     if (!pass->constants.add_own)

@@ -211,6 +211,13 @@ bool vkb_is_factor(const struct vkb_pass_row *pass)
             || pass->constants.composite == COMPOSITE_MIX);
 }
 
+// Also in place of images that the row does not read.
+static void replace_read(struct vkb_pass_row *row, uint32_t from, uint32_t to)
+{
+    for (uint32_t i = 0; i < row->read_count; ++i)
+        row->reads[i] = row->reads[i] == from ? to : row->reads[i];
+}
+
 // Reads the cotangents of a composite without a curve in place of what it brings to the bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
@@ -223,9 +230,7 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     const float intensity = pass->constants.bloom == BLOOM_LIT ? 1.0f : params->intensity;
     row->params.adjoint_filter.gain *= intensity * exp2f(params->exposure);
     row->constants.by = BY_BLOOM;
-    // Also in place of images that the row does not read.
-    for (uint32_t i = 0; i < row->read_count; ++i)
-        row->reads[i] = row->reads[i] == brought ? pass->reads[3] : row->reads[i];
+    replace_read(row, brought, pass->reads[3]);
     row->reads[2] = pass->reads[0];
 }
 
@@ -294,6 +299,36 @@ bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
     const uint32_t height = target->height / (uint32_t)row.constants.radix_1;
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// Between levels of exactly half and twice the size, in tiles: along both axes at once, also where
+// the plain passes are one for each axis, of which this is the last one.
+bool vkb_add_adjoint_levels(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
+    const int32_t exact = filter ? pass->params.adjoint_filter.exact : 0;
+    struct vkb_pass_row row;
+
+    *fits = exact != 0;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    if (row.constants.direction != DIRECTION_BOTH) {
+        const struct vkb_pass_row *first = vkb_writer_of(&choice->plain, row.reads[0]);
+        replace_read(&row, row.reads[0], first->reads[0]);
+    }
+    row.constants.direction = 0;
+    row.constants.levels = 0;
+    row.gains_if_finite = true;
+    read_composite(&choice->plain, &row);
+    if (exact == EXACT_HALF)
+        vkb_make_dispatch(&row, &vkb_shader_adjoint_halve_comp, ADJOINT_HALVE_COLUMNS,
+                          ADJOINT_HALVE_ROWS);
+    else
+        vkb_make_dispatch(&row, &vkb_shader_adjoint_double_comp, ADJOINT_DOUBLE_COLUMNS,
+                          ADJOINT_DOUBLE_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 

@@ -7,9 +7,6 @@
 #include <string.h>
 
 static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
-static const struct vkb_shader *const double_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(double_comp);
-static const struct vkb_shader *const double_final_shaders[VKB_FORMAT_COUNT] =
-    VKB_BY_FORMAT(double_final_comp);
 static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(halve_taps);
@@ -35,21 +32,21 @@ static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pas
     if (choice->variants == VKB_VARIANTS_CPU) {
         vkb_make_words(row, halve_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
     } else {
-        vkb_make_dispatch(row, halve_shaders[format], ROW_INVOCATIONS * HALVE_COLUMNS, HALVE_ROWS);
+        vkb_make_dispatch(row, halve_shaders[format], HALVE_INVOCATIONS * HALVE_COLUMNS,
+                          HALVE_ROWS);
         row->reading = VKB_READING_LOADED;
     }
 }
 
+// The same; a GPU does it in tiles.
 static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                          const struct vkb_shader *const *shaders,
-                          const struct vkb_shader *const *words, uint32_t columns,
-                          enum vkb_format format)
+                          const struct vkb_shader *tiles, const struct vkb_shader *const *words,
+                          uint32_t columns, enum vkb_format format)
 {
     if (choice->variants == VKB_VARIANTS_CPU) {
         vkb_make_words(row, words[format], columns, DOUBLE_WORDS_ROWS);
     } else {
-        vkb_make_dispatch(row, shaders[format], ROW_INVOCATIONS * DOUBLE_COLUMNS, DOUBLE_ROWS);
-        row->reading = VKB_READING_LOADED;
+        vkb_make_dispatch(row, tiles, DOUBLE_TILE_COLUMNS, DOUBLE_TILE_ROWS);
     }
 }
 
@@ -60,6 +57,16 @@ static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass
     return choice->variants != VKB_VARIANTS_CPU
         || (vkb_fits_words(choice, pass)
             && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]));
+}
+
+static bool loads_to_double(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass)
+{
+    const uint32_t invocations = DOUBLE_TILE_COLUMNS * DOUBLE_TILE_RUNS;
+
+    return choice->variants == VKB_VARIANTS_CPU
+             ? loads(choice, pass)
+             : choice->device->limits.maxComputeWorkGroupInvocations >= invocations;
 }
 
 // If a threshold pass writes the larger level, adds a fused pass that reads the image itself. It
@@ -302,7 +309,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_format format = plain->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
-    *fits = vkb_doubles(pass) && loads(choice, pass);
+    *fits = vkb_doubles(pass) && loads_to_double(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -310,7 +317,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
         .add_own = pass->constants.add_own,
         .alpha = pass->constants.alpha,
     };
-    make_doubling(choice, &row, double_shaders, double_words,
+    make_doubling(choice, &row, &vkb_shader_double_tile_comp, double_words,
                   DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size), format);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -332,12 +339,12 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
          && plain->images[pass->reads[0]].format == format
          && plain->images[pass->reads[1]].format == format
          && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
-         && loads(choice, pass);
+         && loads_to_double(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    make_doubling(choice, &row, double_final_shaders, double_final_words,
+    make_doubling(choice, &row, &vkb_shader_double_tile_final_comp, double_final_words,
                   DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
     row.fused = true;
     row.reads[0] = up->reads[0];

@@ -49,6 +49,8 @@ vkb_variant_add vkb_add_lines, vkb_add_transform;
 // Adjoint passes: of images as words; transposed filters, in blocks of texels or fused with the
 // composite's.
 vkb_variant_add vkb_add_adjoint_words, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
+// Transposed filters between levels of exactly half and twice the size, in tiles.
+vkb_variant_add vkb_add_adjoint_levels;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;
 

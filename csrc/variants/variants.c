@@ -39,12 +39,6 @@ struct variant {
     uint32_t least_pixels;  // of the target
 };
 
-// On a GPU, strips are slow in small images, since one invocation writes a complete strip. On an
-// H200, halving to 512 x 512 takes 29 us in strips and 56 pixel by pixel; to 256 x 256 it takes 25
-// and 18. Doubling to 1024 x 1024 takes 33 and 45; to 512 x 512, 29 and 15. In a batch of 16 on an
-// H100, halving to 256 x 256 takes 53 and 141, and doubling to 512 x 512 takes 98 and 82.
-enum { HALVE_STRIPS = 1 << 17, DOUBLE_STRIPS = 1 << 19 };
-
 // A filter as two passes instead of one is slow in small images, since each pass takes time to
 // start.
 enum { TWO_PASSES = 1 << 12 };
@@ -79,12 +73,13 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_bloom_tiles, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_tiles, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_levels, 0},
     {VKB_VARIANTS_GPU, "blocks", vkb_add_adjoint_filter, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_groups, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},
-    {VKB_VARIANTS_GPU, "halved", vkb_add_halved, HALVE_STRIPS},
-    {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, DOUBLE_STRIPS},
-    {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, DOUBLE_STRIPS},
+    {VKB_VARIANTS_GPU, "halved", vkb_add_halved, 0},
+    {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, 0},
+    {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels, 0},
 };
 
@@ -104,15 +99,12 @@ static bool add_variant(const struct vkb_variant_choice *choice, const struct vk
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint64_t pixels = (uint64_t)target->width * target->height;
-    // Of a batch, strips that halve take all images together.
-    const uint32_t layers = choice->plain.layers ? choice->plain.layers : 1;
 
     for (size_t i = 0; i < sizeof variants_table / sizeof variants_table[0]; ++i) {
         const uint32_t first = choice->graph->pass_count;
         bool fits = false;
         if (variants_table[i].variants != choice->variants
-            || pixels * (variants_table[i].add == vkb_add_halved ? layers : 1)
-                   < variants_table[i].least_pixels)
+            || pixels < variants_table[i].least_pixels)
             continue;
         if (!variants_table[i].add(choice, pass, &fits, error))
             return false;

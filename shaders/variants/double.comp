@@ -1,7 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#pragma compile images
 // Upsampling in the pyramid to exactly twice the size of the smaller level.
 #include "lib/block.glsl"
 

@@ -4,11 +4,7 @@
 // computes a pixel from the pixel of `own` and the upsampled sum.
 #include "lib/doubling.glsl"
 
-#ifdef WORDS
 const int COLUMNS = WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
-#else
-const int COLUMNS = DOUBLE_COLUMNS, ROWS = DOUBLE_ROWS;
-#endif
 // Columns of the smaller level that are loaded for a row. A pixel at an odd position starts one
 // texel later.
 const int LOADED = COLUMNS / 2 + 4;

@@ -1,7 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#pragma compile images
 // The last upsampling of the bloom, to exactly twice the size, fused with the composite.
 #include "lib/block.glsl"
 

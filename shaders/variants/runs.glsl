@@ -4,9 +4,13 @@
 //   COLUMNS  the pixels that store() writes (a constant)
 //   LOADED   the pixels of load_run() (a constant)
 //
-// and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
+// and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl. INVOCATIONS are those of a workgroup,
+// ROW_INVOCATIONS by default.
 
-layout(local_size_x = ROW_INVOCATIONS) in;
+#ifndef INVOCATIONS
+#define INVOCATIONS ROW_INVOCATIONS
+#endif
+layout(local_size_x = INVOCATIONS) in;
 READ_IMAGE(1, source);
 WRITE_IMAGE(2);
 

@@ -199,6 +199,50 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             assert np.array_equal(again["image"], found["image"])
 
 
+#: Levels of which all, some or none have exactly half the size: several tiles, less than one, and
+#: sides of one texel. The passes are those between levels that are exact.
+LEVELS = (
+    (Pyramid(levels=4), (64, 288, 3), "halve halve halve halve double double double double"),
+    (Pyramid(levels=1, radius=0.5), (36, 140, 3), "halve double"),
+    (Pyramid(levels=2, radius=0, tonemap="aces"), (20, 252, 3), "halve halve double double"),
+    (
+        Pyramid(levels=2, alpha="blur", level_weights=(0.3, 0.9), threshold=0.4, knee=0.5),
+        (34, 250, 4),
+        "halve double",
+    ),
+    (Pyramid(levels=3, composite="mix", intensity=0.4), (4, 8, 3), "halve halve double double"),
+    (Pyramid(levels=1), (2, 2, 4), "halve double"),
+    (Pyramid(levels=2), (2, 70, 3), "halve double"),
+    (Pyramid(levels=2), (33, 65, 3), "halve double"),
+    (Pyramid(levels=2), (35, 65, 3), ""),
+)
+
+
+@pytest.mark.usefixtures("software")
+def test_levels_are_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
+    random = np.random.default_rng(1)
+    with Renderer("software") as renderer:
+        for settings, size, passes in LEVELS:
+            image = (random.random(size, np.float32) ** 2) * 1.5
+            cotangents = {"final": random.standard_normal(size, np.float32)}
+            # A finite image has another pipeline.
+            for value in (0.5, np.nan):
+                image[0, 0, 1] = value
+                found = renderer.vjp(image, settings)[1](cotangents)
+                check(found, reference.vjp(image, settings)[1](cotangents), "image")
+                again = renderer.vjp(image, settings)[1](cotangents)
+                assert np.array_equal(again["image"], found["image"])
+            source = Inputs(image).source((cotangents["final"],))
+            floats = settings.replace(format="rgba32float")
+            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+            assert plan
+            shaders = sorted(shader for _, shader, *_ in plan.passes)
+            tiles = ("adjoint_double_comp", "adjoint_halve_comp")
+            exact = [shader.split("_")[1] for shader in shaders if shader in tiles]
+            assert exact == sorted(passes.split()), (size, shaders)
+
+
 #: Several strips, less than one, and less than a kernel.
 STRIPS = (
     (Separable(threshold=0.5, knee=0.5), (35, 261, 3)),

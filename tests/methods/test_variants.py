@@ -294,7 +294,7 @@ def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Render
 def test_large_images_in_the_variant_of_gpus(
     monkeypatch: pytest.MonkeyPatch, unfused: Renderer
 ) -> None:
-    # GPUs use strips only for large images.
+    # Tiles within the levels, and at all their edges.
     monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
     image = hdr_picture(1028, 772, 4, "uint8")
     settings = Pyramid(levels=2)

@@ -1,0 +1,23 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// Upsampling in the pyramid to exactly twice the size of the smaller level, for GPUs.
+#include "lib/block.glsl"
+
+UNIFORM_BLOCK(PYRAMID_BLOCK);
+#include "lib/storage.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D smaller;
+layout(set = 0, binding = 2) uniform sampler2D own;
+layout(set = 0, binding = 3) uniform writeonly image2D target;
+
+#define HAS_OWN (ADD_OWN != 0)
+
+vec4 shade(vec4 level, vec4 sum, ivec2 pixel)
+{
+    if (ADD_OWN != 0)
+        sum += params.own * level;
+    return stored(sum);
+}
+
+#include "variants/double_tile.glsl"
