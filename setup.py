@@ -222,7 +222,8 @@ def compiled_once(compiler: Any) -> Callable[..., list[str]]:
     """
     compile_all = compiler.compile
     volk = Path(volk_folder())
-    read = [*sorted(Path("csrc").rglob("*.h")), SPIRV / "spirv.h", volk / "volk.h", volk / "volk.c"]
+    read = [*sorted(Path("csrc").rglob("*.h")), SHADERS / "params.h", SPIRV / "spirv.h"]
+    read += [volk / "volk.h", volk / "volk.c"]
     headers = b"".join(path.read_bytes() for path in read)
     program = (getattr(compiler, "compiler_so", ""), compiler.include_dirs, sys.version)
 
