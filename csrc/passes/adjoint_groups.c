@@ -201,8 +201,9 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     row.constants.radix_1 = 1;
     row.block = VKB_BLOCK_prefilter;
     take_params(pass, &row.params.prefilter);
-    // Its groups are texels then.
-    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, pass->reads[0], pass->targets[0]))
+    // Its groups are texels then. The shader reads the mask in the same way.
+    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, reads[0], pass->targets[0])
+        && vkb_same_size(adjoint->graph, reads[1], pass->targets[0]))
         row.constants.sampling = SAMPLING_TEXEL;
     return (stacked ? bring_stacked : bring_each)(adjoint, pass, &row, count, error)
         && vkb_bring_mask(adjoint, pass, &row, error);

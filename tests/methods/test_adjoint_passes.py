@@ -294,6 +294,7 @@ def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
 #: Methods whose first passes read the mask.
 MASKED = (
     BEVY,
+    KinoBloom(radius=1.0, bloom_scale=0.5),
     PygfxBloom(levels=1, karis_average=True),
     FilamentBloom(resolution=16, levels=1),
     FilamentBloom(resolution=16, levels=1, threshold=0.3),
