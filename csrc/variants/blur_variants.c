@@ -115,7 +115,8 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.reads[0] = lines;
     row.read_count = 1;
     row.block = VKB_BLOCK_threshold;
-    VKB_SET_TARGET(&row, threshold, &choice->plain.images[pass->targets[0]]);
+    // Not of `plain`: a new image may have moved these.
+    VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
     return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
