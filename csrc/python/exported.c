@@ -328,13 +328,17 @@ static PyObject *complete(PyObject *object, PyObject *unused)
     struct vkb_error error = {0};
 
     (void)unused;
-    bool done = order_stream(self, NULL, &error);
-    if (done && self->run->drawn) {
+    VKB_LOCK(vkb_memory);
+    const bool waits = self->run->drawn;
+    bool done = vkb_export_drawn(self->run, NULL, &error);
+    VKB_UNLOCK(vkb_memory);
+    if (done && waits) {
         Py_BEGIN_ALLOW_THREADS
         done = vkb_cuda_finish(self->exports->cuda, &error);
         Py_END_ALLOW_THREADS
-        if (done)
-            self->run->drawn = 0;
+        VKB_LOCK(vkb_memory);
+        self->run->drawn = done ? 0 : self->run->drawn;
+        VKB_UNLOCK(vkb_memory);
     }
     return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
