@@ -53,15 +53,17 @@ enum {
     HANDLE_TIMELINE_FD = 9,
 };
 
+union shared_handle {
+    int descriptor;
+    struct {
+        void *handle;
+        const void *name;
+    } other;
+};
+
 struct memory_handle {
     int type;
-    union {
-        int descriptor;
-        struct {
-            void *handle;
-            const void *name;
-        } other;
-    } handle;
+    union shared_handle handle;
     unsigned long long size;
     unsigned flags, reserved[16];
 };
@@ -73,13 +75,7 @@ struct memory_buffer {
 
 struct semaphore_handle {
     int type;
-    union {
-        int descriptor;
-        struct {
-            void *handle;
-            const void *name;
-        } other;
-    } handle;
+    union shared_handle handle;
     unsigned flags, reserved[16];
 };
 
