@@ -218,26 +218,33 @@ LEVELS = (
 )
 
 
+def shaders_of_transpose(
+    renderer: Renderer, settings: Any, size: tuple[int, ...], random: np.random.Generator
+) -> list[str]:
+    """Check the derivatives by an image, and their bits from run to run; return the shaders."""
+    image = (random.random(size, np.float32) ** 2) * 1.5
+    cotangents = {"final": random.standard_normal(size, np.float32)}
+    # A finite image has another pipeline.
+    for value in (0.5, np.nan):
+        image[0, 0, 1] = value
+        found = renderer.vjp(image, settings)[1](cotangents)
+        check(found, reference.vjp(image, settings)[1](cotangents), "image")
+        again = renderer.vjp(image, settings)[1](cotangents)
+        assert np.array_equal(again["image"], found["image"])
+    source = Inputs(image).source((cotangents["final"],))
+    floats = settings.replace(format="rgba32float")
+    plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+    assert plan
+    return [shader for _, shader, *_ in plan.passes]
+
+
 @pytest.mark.usefixtures("software")
 def test_levels_are_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
     random = np.random.default_rng(1)
     with Renderer("software") as renderer:
         for settings, size, passes in LEVELS:
-            image = (random.random(size, np.float32) ** 2) * 1.5
-            cotangents = {"final": random.standard_normal(size, np.float32)}
-            # A finite image has another pipeline.
-            for value in (0.5, np.nan):
-                image[0, 0, 1] = value
-                found = renderer.vjp(image, settings)[1](cotangents)
-                check(found, reference.vjp(image, settings)[1](cotangents), "image")
-                again = renderer.vjp(image, settings)[1](cotangents)
-                assert np.array_equal(again["image"], found["image"])
-            source = Inputs(image).source((cotangents["final"],))
-            floats = settings.replace(format="rgba32float")
-            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
-            assert plan
-            shaders = sorted(shader for _, shader, *_ in plan.passes)
+            shaders = sorted(shaders_of_transpose(renderer, settings, size, random))
             tiles = ("adjoint_double_comp", "adjoint_halve_comp")
             exact = [shader.split("_")[1] for shader in shaders if shader in tiles]
             assert exact == sorted(passes.split()), (size, shaders)
@@ -259,20 +266,7 @@ def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatc
     random = np.random.default_rng(1)
     with Renderer("software") as renderer:
         for settings, size in STRIPS:
-            image = (random.random(size, np.float32) ** 2) * 1.5
-            cotangents = {"final": random.standard_normal(size, np.float32)}
-            # A finite image has another pipeline.
-            for value in (0.5, np.nan):
-                image[0, 0, 1] = value
-                found = renderer.vjp(image, settings)[1](cotangents)
-                check(found, reference.vjp(image, settings)[1](cotangents), "image")
-                again = renderer.vjp(image, settings)[1](cotangents)
-                assert np.array_equal(again["image"], found["image"])
-            source = Inputs(image).source((cotangents["final"],))
-            floats = settings.replace(format="rgba32float")
-            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
-            assert plan
-            shaders = [shader for _, shader, *_ in plan.passes]
+            shaders = shaders_of_transpose(renderer, settings, size, random)
             assert shaders == ["adjoint_strip_words_rgba32float"]
 
 
