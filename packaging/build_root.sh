@@ -14,7 +14,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$(dirname "$root")"
 mmdebstrap --mode=root --variant=minbase --quiet \
     --aptopt='Acquire::Check-Valid-Until "false"' \
-    --include=ca-certificates,g++,make,ninja-build,bison,flex,patch,pkg-config,glslang-tools,xz-utils \
+    --include=ca-certificates,g++,make,ninja-build,bison,flex,patch,pkg-config,xz-utils \
     --include="llvm-$LLVM-dev,zlib1g-dev,libzstd-dev,libffi-dev,libssl-dev,g++-aarch64-linux-gnu" \
     --customize-hook='upload /usr/share/keyrings/debian-archive-keyring.gpg /etc/apt/sources.gpg' \
     --customize-hook="cat >\"\$1/etc/apt/sources.list.d/sources.list\" <<-END
