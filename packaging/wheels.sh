@@ -3,7 +3,7 @@
 # vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64, into dist/; each wheel twice in two
 # folders, which must give equal files; as root on a system with mmdebstrap. The root that they are
 # built in is made once, in build/wheels; so are Mesa and glslang, in all folders. SPIR-V is made here,
-# once, by the versions of glslang and spirv-opt in packaging/versions.sh: the root has none.
+# once, by the versions of glslang and spirv-opt in packaging/versions.sh.
 # STEPS: the scripts to run, MACHINES: which ones to build for; by default all.
 set -eu
 cd "$(dirname "$0")/.."
@@ -32,8 +32,8 @@ needs "SPIRV-Tools $SPIRV_TOOLS (apt install spirv-tools, on Debian 12)" \
     "$(spirv-opt --version 2>&1 | grep -F " v$SPIRV_TOOLS ")"
 needs "7 GB of free disk in $PWD" \
     "$(test "$(df -P -k . | awk 'END { print $4 }')" -lt 7000000 || echo yes)"
-needs "a new root, with arm64's packages (rm -r $work)" \
-    "$(test -d "$root" && test ! -d "$root/opt/aarch64" || echo yes)"
+needs "a new root, without spirv-opt (rm -r $work)" \
+    "$(test -d "$root" && test ! -d "$root/opt/glslang" || echo yes)"
 test -z "$missing" || { echo "make wheels needs:$missing" >&2; exit 2; }
 
 test -d "$root" || packaging/build_root.sh "$root"

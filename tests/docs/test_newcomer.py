@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.docs.test_docs import ROOT, blocks
+from tests.docs.pages import ROOT, blocks
 
 pytest.importorskip("OpenImageIO")
 
