@@ -4,11 +4,12 @@
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
-# make wheels: builds the wheels of vkbloom, its driver and its compiler for x86-64 and aarch64 into dist/
-#   (docs/releasing.md); as root.
+# make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for
+#   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
-# make try-core: builds the core's wheel with what this system has, and tries it in a fresh environment.
+# make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
+#   tries it in a fresh environment.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
 # make test-aarch64: runs the fast part of the tests with the aarch64 wheels of dist/ under QEMU; as root.
