@@ -106,7 +106,8 @@ def points() -> None:
         print(f"  passes run {made.attrs['passes_run']}, saved {made.attrs['passes_saved']}")
         print(f"  memory: {spread(samples)}")
         with vkbloom.Renderer(ADAPTER) as renderer:
-            spots = random.Random(1).sample(list(np.ndindex(*made["done"].shape)), 50)
+            every = list(np.ndindex(*made["done"].shape))
+            spots = random.Random(1).sample(every, min(50, len(every)))
             for spot in spots:
                 chosen: dict[str, Any] = {
                     n: float(v[i]) for (n, v), i in zip(values.items(), spot, strict=True)
