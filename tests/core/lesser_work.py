@@ -59,7 +59,7 @@ def use_handles(renderer: Renderer) -> None:
 
 def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
     """Apply a bloom whose first level is as wide as the device's limit."""
-    image = picture(1100, 1, 3, "float32")
+    image = picture(330, 1, 3, "float32")
     frames = renderer.apply(image, settings)
     width = frames["down_0"].shape[1]
     assert width >= 4096
