@@ -32,7 +32,11 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         metavar="ufo|PATH",
         help=f"The lit mesh: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
     )
-    @click.option("--glow", type=click.Path(), help="The glowing mesh: a glTF file.")
+    @click.option(
+        "--glow",
+        type=click.Path(),
+        help="The glowing mesh: a glTF file. Without it, materials that emit glow.",
+    )
     @click.option(
         "--skybox",
         "sky",
