@@ -393,7 +393,7 @@ def _from_interface(image: Any, name: str) -> _Array:
     if about.get("mask") is not None:
         raise ValueError(f"{name}: a mask of __cuda_array_interface__ is not taken")
     try:
-        dtype = np.dtype(typestr).name if typestr[0] in "<|=" else typestr
+        dtype = np.dtype(typestr).name if np.dtype(typestr).isnative else typestr
     except TypeError:
         dtype = typestr
     if dtype not in _FORMATS:
