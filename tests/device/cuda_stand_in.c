@@ -20,6 +20,8 @@ enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
 static _Atomic long contexts, streams, events, memories, mappings, host_bytes, current;
 // Each thread has its own stack of contexts.
 static _Thread_local long current_here;
+static _Thread_local int capture_mode_here;
+static void *captured;
 
 struct memory_handle {
     int type;
@@ -247,6 +249,22 @@ EXPORT int cuStreamSynchronize(void *stream)
 EXPORT int cuStreamWaitEvent(void *stream, void *event, unsigned flags)
 {
     return stream && event && !flags ? SUCCESS : INVALID_VALUE;
+}
+
+// The stream of the host that STAND_IN_CAPTURED names is captured into a graph.
+EXPORT int cuStreamIsCapturing(void *stream, int *status)
+{
+    *status = stream && stream == captured;
+    return SUCCESS;
+}
+
+EXPORT int cuThreadExchangeStreamCaptureMode(int *mode)
+{
+    const int before = capture_mode_here;
+
+    capture_mode_here = *mode;
+    *mode = before;
+    return SUCCESS;
 }
 
 EXPORT int cuEventCreate(void **event, unsigned flags)
