@@ -291,6 +291,13 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "sKnKp:snapshot", &what, &address, &size, &after, &waits))
         return NULL;
+    // Before memory is taken, which would make the capture invalid.
+    struct vkb_exports *exports = use_exports(renderer, &error);
+    done = exports && vkb_cuda_require_no_capture(exports->cuda, (void *)(uintptr_t)after, &error);
+    if (exports)
+        vkb_release_exports(exports);
+    if (!done)
+        return vkb_raise(state, &error);
     struct exported_object *self = new_exported(renderer, size);
     if (!self)
         return NULL;
