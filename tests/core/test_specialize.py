@@ -11,6 +11,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -249,7 +250,15 @@ def test_changed_modules_are_read_within_their_bounds(tmp_path: Path) -> None:
     files = [f"csrc/{name}.c" for name in (*SOURCES, "graph/layers")]
     options = ["-std=c11", "-O1", "-g", "-Icsrc", "-I.", "-Ibuild/spirv", "-DVK_NO_PROTOTYPES"]
     options += ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"]
-    command = [*compiler(), *options, "tests/core/spirv_mutations.c", *files, "-o", program, "-lm"]
+    command: list[Any] = [
+        *compiler(),
+        *options,
+        "tests/core/spirv_mutations.c",
+        *files,
+        "-o",
+        program,
+        "-lm",
+    ]
     if subprocess.run(command, cwd=ROOT, check=False, capture_output=True).returncode:
         pytest.skip("the compiler has no sanitizers, or the core was not built here")
     small = sorted({code for code, _ in modules()}, key=len)[: examples(12)]
