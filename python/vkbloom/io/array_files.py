@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.argument_types import checked
-from vkbloom.checks import check_index, import_extra
+from vkbloom.checks import check_index, import_extra, native_order
 from vkbloom.io import displayed, image_reading, safe_writing
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.expansion import check_expansion
@@ -315,8 +315,7 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
         raise ValueError(
             f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
         )
-    kept = np.float32 if values.dtype.name == "float64" else values.dtype.newbyteorder("=")
-    return values.astype(kept, copy=False)
+    return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
 
 
 def _numbers(

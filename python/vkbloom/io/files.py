@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import import_extra
+from vkbloom.checks import import_extra, native_order
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.displayed import HDR_CURVES, with_names
@@ -204,7 +204,7 @@ def _write_image(
             spec.attribute(attribute, kind, value)
     if not (
         writer.open(str(temporary), spec)
-        and writer.write_image(np.ascontiguousarray(pixels))
+        and writer.write_image(np.ascontiguousarray(native_order(pixels)))
         and writer.close()
     ):
         raise safe_writing.write_error(writer, temporary, file)
@@ -237,7 +237,7 @@ def _write_exr(
     for index, (pixels, spec) in enumerate(zip(parts, specs, strict=True)):
         if index and not writer.open(str(temporary), spec, "AppendSubimage"):
             raise safe_writing.write_error(writer, temporary, file)
-        if not writer.write_image(np.ascontiguousarray(pixels)):
+        if not writer.write_image(np.ascontiguousarray(native_order(pixels))):
             raise safe_writing.write_error(writer, temporary, file)
     if not writer.close():
         raise safe_writing.write_error(writer, temporary, file)

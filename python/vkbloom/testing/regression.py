@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.checks import native_order
 from vkbloom.frames import Frames
 from vkbloom.testing import report_parts
 from vkbloom.testing.judging import Verdict, first_failure, judge
@@ -427,7 +428,7 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     for name, image in frames.items():
         if not isinstance(image, np.ndarray):
             raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
-        images[name] = image.astype(image.dtype.newbyteorder("="), copy=False)
+        images[name] = native_order(image)
     return images
 
 
