@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -120,9 +121,9 @@ class Program(click.Group):
                 _exit(INTERRUPTED, "interrupted")
             no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
             if any(one in str(error) for one in no_memory):
-                _exit(1, _described(MemoryError(str(error))))
+                _exit(1, described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
-                _exit(1, _described(error))
+                _exit(1, described(error))
             raise
         terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
         sys.exit(status)
@@ -165,8 +166,16 @@ def _is_from_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _described(error: BaseException) -> str:
+def described(error: BaseException) -> str:
+    """Return an error in one sentence, with the name of its file."""
+    if isinstance(error, click.ClickException):
+        return error.format_message()
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        folder = os.path.dirname(os.fsdecode(error.filename))
+        if error.errno == errno.ENOENT and folder and not os.path.lexists(folder):
+            while (above := os.path.dirname(folder)) and not os.path.lexists(above):
+                folder = above
+            return f"{error.filename}: there is no folder {folder}"
         return f"{error.filename}: {error.strerror}"
     text = str(error) or type(error).__name__
     if isinstance(error, MemoryError) and "memory is short" not in text:
@@ -177,7 +186,7 @@ def _described(error: BaseException) -> str:
 
 
 def _exit(status: int, message: str) -> NoReturn:
-    click.echo(f"vkbloom: {' '.join(message.split())}", err=True)
+    terminal.complain(message)
     sys.exit(status)
 
 
