@@ -22,8 +22,9 @@ from vkbloom.cli.glow_options import (
     note_step,
     refuse_glow_of_scene,
 )
+from vkbloom.cli.interrupts import INTERRUPTED
 from vkbloom.cli.live_options import live_options
-from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
+from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.terminal import tell_device
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading

@@ -18,6 +18,7 @@ from click.shell_completion import CompletionItem
 
 import vkbloom
 from vkbloom.cli import terminal
+from vkbloom.cli.interrupts import INTERRUPTED, raise_interrupts
 from vkbloom.free_memory import ADVICE, memory_left
 from vkbloom.registry import METHODS
 from vkbloom.suggestions import did_you_mean
@@ -40,9 +41,6 @@ COMMANDS: Final = (
     "doctor",
     "warm",
 )
-
-#: The status after Ctrl-C, as shells report it.
-INTERRUPTED: Final = 130
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -68,6 +66,7 @@ class Program(click.Group):
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"vkbloom.cli.{cmd_name}").command
+        raise_interrupts()
         if terminal.PRINTING_OPTIONS[0] not in command.params:
             command.params += terminal.PRINTING_OPTIONS
         return command
@@ -94,6 +93,22 @@ class Program(click.Group):
         ]
         # Not the group's own: it would list the commands again.
         return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
+    ) -> click.Context:
+        """Parse the words of a call; Ctrl-C is click.Abort, before click prints an empty line."""
+        try:
+            return super().make_context(info_name, args, *rest, **extra)
+        except KeyboardInterrupt:
+            raise click.Abort from None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; Ctrl-C is click.Abort."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise click.Abort from None
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
