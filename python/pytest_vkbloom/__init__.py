@@ -125,6 +125,7 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
     ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
     ...     assert not frames["final"][..., :3].any()
     """
+    __tracebackhide__ = True
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 
     with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:

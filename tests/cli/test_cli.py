@@ -95,6 +95,8 @@ def test_version_option_prints_the_version(option: str) -> None:
         ((), "Missing command"),
         (("rendr",), "No such command 'rendr'; did you mean 'render'?"),
         (("zzz",), "No such command 'zzz' (see"),
+        ((__file__, "out.jpg"), "is a file, not a command; did you mean program apply?"),
+        (("presets", "--gpu"), "No such option '--gpu' (see"),
         (("render",), "Missing option '-o'"),
         (("render", "-o", "x.png", "--nonsense"), "--nonsense"),
         (("render", "-o", "-"), "give --out a file or a folder"),

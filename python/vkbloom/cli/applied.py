@@ -184,11 +184,12 @@ class Run:
         first = next(filter(None, map(read, rest)), None)
         if first is None:
             return
+        renderer = self._renderer()
         with self._wrong_use_of_all():
-            self._renderer().plan(prepared(first), settings, attachments=wanted)
+            renderer.plan(prepared(first), settings, attachments=wanted)
         pictures = filter(None, itertools.chain([first], read_ahead(read, rest)))
         del first
-        results = rendered(self._renderer(), pictures, settings, wanted, prepared)
+        results = rendered(renderer, pictures, settings, wanted, prepared)
         hidden = self._hidden if self._several else True
         bar = tqdm(results, total=len(files), unit="image", leave=False, disable=hidden)
         with contextlib.closing(results):

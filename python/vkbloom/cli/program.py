@@ -76,6 +76,8 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that a call names, or say which one was meant."""
         if args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            if os.path.exists(args[0]):
+                ctx.fail(f"{args[0]} is a file, not a command; did you mean {ctx.info_name} apply?")
             ctx.fail(f"No such command {args[0]!r}{did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 

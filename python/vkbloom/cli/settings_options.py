@@ -27,6 +27,8 @@ PRESET_OF_PHOTOS: Final = "photo"
 _PRESET_OF_SCENES: Final = "tutorial"
 #: The presets that a call without --preset and --method may start from.
 DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
+#: Parameters that say what a call starts from.
+STARTS: Final = ("preset", "method", "stored")
 # Names of the commands' arguments for image files; explore and grid may be called without one.
 _IMAGES: Final = ("source", "sources", "images")
 
@@ -61,7 +63,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
     @fields.options(METHODS, "own", base=vkbloom.Settings)
     @click.option(
         "--settings",
-        "file",
+        "stored",
         metavar="FILE",
         type=click.Path(),
         help="A file of settings to start from: JSON, as the explorer saves it, or a picture that "
@@ -73,18 +75,18 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         *,
         preset: str | None,
         method: str | None,
-        file: str | None,
+        stored: str | None,
         added: tuple[vkbloom.Glare, ...],
         shared: dict[str, Any],
         own: dict[str, Any],
         **rest: object,
     ) -> object:
-        if file is not None and preset is not None:
+        if stored is not None and preset is not None:
             raise click.UsageError("--settings and --preset exclude each other; leave one out")
         start = Start(
             preset=preset,
             method=method,
-            stored=None if file is None else read_settings(file),
+            stored=None if stored is None else read_settings(stored),
             added=added,
             changes={**shared, **own},
             expands="expand" in rest and not rest.get("raw"),
@@ -92,7 +94,11 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         )
         if by_file:
             return command(settings=start.of, **rest)
-        settings, expand = start.of_all(_images_of(rest))
+        images = _images_of(rest)
+        # An axis of presets gives every image the same settings.
+        axes: Any = rest.get("axis_words", ())
+        has_presets = any(str(word).startswith("preset=") for word in axes)
+        settings, expand = start.of_all(images[:1] if has_presets else images)
         if "expand" in rest:
             rest["expand"] = expand
         return command(settings=settings, **rest)

@@ -14,6 +14,8 @@ from typing import BinaryIO, Final
 
 import click
 
+from vkbloom.io import safe_writing
+
 __all__ = ["PIPE", "as_file", "is_stream", "shown"]
 
 #: Stands for standard input and standard output.
@@ -25,13 +27,7 @@ _FOLDER: Final = "vkbloom.streams"
 
 def is_stream(name: str) -> bool:
     """Return whether a name stands for a pipe, a socket or a device."""
-    if name == PIPE:
-        return True
-    try:
-        mode = os.stat(name).st_mode
-    except (OSError, ValueError):
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+    return name == PIPE or safe_writing.is_stream(name)
 
 
 def shown(name: str) -> str:
