@@ -125,7 +125,6 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
     ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
     ...     assert not frames["final"][..., :3].any()
     """
-    __tracebackhide__ = True
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 
     with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:
@@ -133,7 +132,8 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
         info = renderer.info
         known = f"{info.name} {info.driver_info or info.driver}"
         if wanted is not None and wanted.lower() not in known.lower():
-            raise ValueError(f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}")
+            text = f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}"
+            pytest.fail(text, pytrace=False)
         yield renderer
 
 
