@@ -30,7 +30,8 @@ def answer() -> bool:
 def leave(*_: object) -> None:
     """End the process at once, as after Ctrl-C, while no file is open."""
     try:
-        os.write(2, b"vkbloom: interrupted\n")
+        # The first line break ends the line on which a terminal shows ^C.
+        os.write(2, b"\n" * os.isatty(2) + b"vkbloom: interrupted\n")
     finally:
         os._exit(INTERRUPTED)
 

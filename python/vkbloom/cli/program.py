@@ -132,6 +132,9 @@ class Program(click.Group):
         except click.ClickException as error:
             _exit(1, error.format_message())
         except click.Abort:
+            if sys.stderr is not None and sys.stderr.isatty():
+                # It ends the line on which a terminal shows ^C.
+                click.echo(err=True)
             _exit(INTERRUPTED, "interrupted")
         except Exception as error:
             if _is_from_interrupt(error):
