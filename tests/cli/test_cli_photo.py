@@ -278,6 +278,16 @@ class TestSettingsOfFiles:
         assert told in failed.stderr
 
 
+def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:
+    image = np.random.default_rng(0).random((12, 16, 3), np.float32)
+    file, out = vkbloom.write(tmp_path / "a.png", image), tmp_path / "g"
+    words = ["grid", str(file), "-o", str(out), "--axis", "intensity=0.5"]
+    assert CliRunner().invoke(program, words).exit_code == 0
+    made = out / "000_final.png"
+    assert apply(file, tmp_path / "b.png", "--settings", made).exit_code == 0
+    np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.png"), vkbloom.read(made))
+
+
 def test_images_of_a_grid_have_one_start(tmp_path: Path) -> None:
     image = np.random.default_rng(0).random((12, 16, 3), np.float32)
     files = [str(vkbloom.write(tmp_path / name, image)) for name in ("a.exr", "b.png")]
