@@ -313,6 +313,8 @@ def _shape_cure(shape: tuple[int, ...]) -> str:
         return "; convert grey to RGB: np.repeat(image, 3, axis=2)"
     if len(shape) == 3 and shape[0] in (3, 4) and shape[2] not in (0, 3, 4):
         return "; move the channels last: np.moveaxis(image, 0, -1)"
+    if len(shape) == 4 and shape[1] in (3, 4) and shape[3] not in (0, 3, 4):
+        return "; move the channels last: np.moveaxis(images, 1, -1)"
     return ""
 
 

@@ -186,4 +186,4 @@ PRESETS: Final[Mapping[str, Preset]] = {
 
 #: Name to settings. ``vkbloom presets`` and ``docs/presets.md`` list what they are, with their
 #: sources.
-presets: Mapping[str, Settings] = Named("preset", PRESETS, lambda one: one.make())
+presets: Named[Settings] = Named("preset", PRESETS, lambda one: one.make())

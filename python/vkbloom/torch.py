@@ -233,7 +233,10 @@ def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
     shape = tuple(image.shape)
     order = "(..., C, H, W)" if channels_first else "(..., H, W, C)"
     if len(shape) < 3 or shape[-3 if channels_first else -1] not in (3, 4):
-        raise ValueError(f"image: the shape {shape} is not {order} with 3 or 4 channels")
+        text = f"image: the shape {shape} is not {order} with 3 or 4 channels"
+        if len(shape) >= 3 and shape[-1 if channels_first else -3] in (3, 4):
+            text += f"; give channels_first={not channels_first}"
+        raise ValueError(text)
     if not image.is_floating_point():
         raise TypeError(f"image: {image.dtype} has no derivative; give floats of linear light")
     if image.dtype == torch.bfloat16:

@@ -99,7 +99,7 @@ def test_translate(renderer: vkbloom.Renderer) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--to", "kino"), "give what to translate: --preset NAME or --method NAME"),
+        (("--to", "kino"), "give what to translate: --preset NAME, --method NAME"),
         (("--preset", "kino"), "Missing option '--to'"),
         (("--preset", "kino", "--to", "pyramids"), "'pyramids'; did you mean 'pyramid'?"),
         (("--preset", "kino", "--to", "pyramid", "--vary", "levls"), "did you mean 'levels'?"),

@@ -165,7 +165,7 @@ def test_a_large_picture_is_reduced() -> None:
         (("-o", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
         (("--sheet", "a.png", "-o", "b.jpg"), 2, "--out: b.jpg does not end in .png"),
         (("--sheet", "none.png", "-o", "b.png"), 1, "none.png: No such file"),
-        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: No such file"),
+        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: there is no folder none"),
     ],
 )
 def test_wrong_use(words: tuple[str, ...], status: int, told: str) -> None:

@@ -388,7 +388,7 @@ def test_presets() -> None:
     assert presets["tutorial"] == Separable()
     assert presets["outline"] == Separable(first_tap=0, texel="x")
     with pytest.raises(TypeError):
-        presets["tutorial"] = Separable()  # type: ignore[index]
+        presets["tutorial"] = Separable()  # type: ignore[operator]
     for settings in presets.values():
         assert isinstance(settings, Settings)
 

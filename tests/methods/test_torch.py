@@ -125,6 +125,9 @@ def test_wrong_arguments_are_named(renderer: Renderer) -> None:
         vkbloom_torch.Bloom(SETTINGS, learn=("levels",))
     with pytest.raises(ValueError, match=r"image: the shape \(6, 5, 3\) is not \(..., C, H, W\)"):
         vkbloom_torch.bloom(image, SETTINGS, channels_first=True)
+    for shape, first in (((3, 6, 5), False), ((2, 4, 6, 5), False), ((6, 5, 3), True)):
+        with pytest.raises(ValueError, match=f"; give channels_first={not first}"):
+            vkbloom_torch.bloom(tensor(*shape), SETTINGS, channels_first=first)
     with pytest.raises(ValueError, match=r"mask: the shape \(5, 6\) is not \(6, 5\)"):
         vkbloom_torch.bloom(image, SETTINGS, mask=tensor(5, 6))
     with pytest.raises(TypeError, match="image: a tensor is needed, not list"):

@@ -13,7 +13,7 @@ from vkbloom.cli.fields import Command, NameOf
 from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.search_options import search_options
-from vkbloom.cli.settings_options import PRESET_OF_IMAGES
+from vkbloom.cli.settings_options import PRESET_OF_IMAGES, read_settings
 from vkbloom.cli.terminal import detail_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.registry import METHODS
@@ -37,6 +37,14 @@ from vkbloom.registry import METHODS
     help="A method whose defaults start a search; may be repeated.",
 )
 @click.option(
+    "--settings",
+    "files",
+    metavar="FILE",
+    multiple=True,
+    type=click.Path(),
+    help="A file of settings to start a search from, as for vkbloom apply; may be repeated.",
+)
+@click.option(
     "--framebuffer",
     metavar="NAME",
     default="final",
@@ -54,6 +62,7 @@ def command(
     target: str,
     presets: tuple[str, ...],
     kinds: tuple[str, ...],
+    files: tuple[str, ...],
     framebuffer: str,
     search: dict[str, Any],
     told: Callable[[Sequence[vkbloom.FitResult]], int],
@@ -70,6 +79,7 @@ def command(
     with a verdict (good, fair or poor) and the likely cause, such as a clipped target.
     """
     begun = [*(vkbloom.presets[name] for name in presets), *(METHODS[kind]() for kind in kinds)]
+    begun += [read_settings(file)[0] for file in files]
     begun = begun or [vkbloom.presets[PRESET_OF_IMAGES]]
     pixels, wanted = (
         read_picture(file, 0, input_colour, layer=layer).pixels for file in (image, target)

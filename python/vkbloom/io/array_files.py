@@ -17,7 +17,7 @@ from vkbloom.checks import check_index, import_extra, native_order
 from vkbloom.io import displayed, image_reading, safe_writing
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.expansion import check_expansion
-from vkbloom.io.image_writing import as_numbers, check_quality, described_as, put
+from vkbloom.io.image_writing import BITS, as_numbers, check_quality, described_as, put
 from vkbloom.io.images import PIXEL_TYPES, Picture, check_name, is_exr
 
 __all__ = ["divided", "has_straight", "multiplied", "premultiplied", "read", "write"]
@@ -28,9 +28,7 @@ _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
 # The file's number types for floats, in order of preference, by the requested bits.
 _FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
     None: ("half", "float", "uint8"),
-    8: ("uint8",),
-    16: ("uint16", "half"),
-    32: ("float",),
+    **BITS,
 }
 # Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")

@@ -21,11 +21,12 @@ from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.displayed import HDR_CURVES, with_names
 from vkbloom.io.images import PIXEL_TYPES, check_name, complete, is_exr
 from vkbloom.settings import Settings
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["load", "save"]
+__all__ = ["facts_of", "load", "save", "settings_facts"]
 
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
@@ -133,14 +134,36 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
         reader.seek_subimage(index, 0)
         spec = reader.spec()
         image_reading.check_plausible(spec, file)
-        said = {
-            attribute.name.removeprefix("vkbloom:"): str(attribute.value)
-            for attribute in spec.extra_attribs
-            if attribute.name.startswith("vkbloom:")
-        } or _described(spec.get_string_attribute("ImageDescription"))
+        said = _facts(spec)
         pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
         pixels = complete(pixels, reader, file)
     return pixels.reshape(spec.height, spec.width, spec.nchannels), said
+
+
+def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
+    """Return what vkbloom wrote into an image file: "settings" and others, as text."""
+    with image_reading.opened(path, "Reading settings") as reader:
+        return _facts(reader.spec())
+
+
+def settings_facts(settings: Settings, expand: float | None) -> dict[str, str]:
+    """Return what an image file holds of the settings that made it, for `facts_of`.
+
+    `expand`: What the highlights of the source were expanded up to.
+    """
+    facts = {
+        "Software": f"vkbloom {installed_version()}",
+        "vkbloom:settings": json.dumps(settings.to_dict()),
+    }
+    return facts if expand is None else {**facts, "vkbloom:expand": f"{expand:g}"}
+
+
+def _facts(spec: OpenImageIO.ImageSpec) -> dict[str, str]:
+    return {
+        attribute.name.removeprefix("vkbloom:"): str(attribute.value)
+        for attribute in spec.extra_attribs
+        if attribute.name.startswith("vkbloom:")
+    } or _described(spec.get_string_attribute("ImageDescription"))
 
 
 def _described(text: str) -> dict[str, str]:

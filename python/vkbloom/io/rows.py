@@ -132,6 +132,8 @@ def written_rows(
     saved: Saved,
     attributes: Mapping[str, str],
     quality: int | None,
+    *,
+    bits: int | None,
 ) -> Iterator[Callable[[Picture], tuple[str, ...]]]:
     """Yield a function that writes the next rows, and returns notes as `image_writing.save` does.
 
@@ -141,6 +143,7 @@ def written_rows(
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
     image_writing.check_quality(target, quality)
+    image_writing.check_bits(target, bits)
     displayed.check_saved(saved)
     told: dict[str, str | int] = {**attributes}
     if quality is not None:
@@ -154,7 +157,7 @@ def written_rows(
         if layout is None:
             is_hdr = displayed.is_hdr(saved)
             layout = image_writing.chosen_layout(
-                oiio, picture, writer, temporary, target, is_hdr=is_hdr
+                oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits
             )
         values, described, notes = image_writing.prepared(oiio, picture, layout, saved, target)
         if row == 0:

@@ -17,6 +17,8 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +36,7 @@ __all__ = [
     "check_complete",
     "check_extension",
     "holds",
+    "is_stream",
     "is_temporary",
     "put_in_place",
     "replacing",
@@ -116,8 +119,19 @@ def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Rename a temporary file to its final name, with the permissions of the file it replaces."""
+    """Rename a temporary file to its final name, with the permissions of the file it replaces.
+
+    The content is written to a pipe or a device, which is not replaced.
+    """
     target = _link_target(file)
+    if is_stream(target):
+        try:
+            with temporary.open("rb") as content, file.open("wb") as stream:
+                shutil.copyfileobj(content, stream)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        temporary.unlink()
+        return
     with contextlib.suppress(OSError):
         shutil.copymode(target, temporary)
     try:
@@ -168,6 +182,15 @@ def write_file(file: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def is_stream(path: str | os.PathLike[str]) -> bool:
+    """Return whether a name is that of a pipe, a socket or a device."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
 def is_temporary(path: Path) -> bool:
     """Return whether a file is one that a process writes before it is renamed."""
     return path.name.startswith(_TEMPORARY)
@@ -176,7 +199,9 @@ def is_temporary(path: Path) -> bool:
 def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
     """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
-    temporary = _link_target(file).with_name(f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}")
+    target = _link_target(file)
+    folder = Path(tempfile.gettempdir()) if is_stream(target) else target.parent
+    temporary = folder / f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}"
     try:
         with temporary.open("xb") as stream:
             fill(stream)

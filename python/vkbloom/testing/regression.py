@@ -290,6 +290,7 @@ class FrameRegression:
         self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
+        __tracebackhide__ = True
         if name is not None:
             check_name(name)
             return name
@@ -301,6 +302,7 @@ class FrameRegression:
         return self._name
 
     def _check_adapter(self, origin: Origin) -> None:
+        __tracebackhide__ = True
         wanted = self._mode.expect_adapter
         if wanted is None or origin.adapter is None:
             return
@@ -314,6 +316,7 @@ class FrameRegression:
 
         Raises ValueError if the driver has no hash, or no reference has the same hash.
         """
+        __tracebackhide__ = True
         origin = given.origin
         if not origin.driver_sha256:
             raise ValueError(
@@ -345,6 +348,7 @@ class FrameRegression:
             raise AssertionError(message)
 
     def _write(self, given: _Given) -> None:
+        __tracebackhide__ = True
         for framebuffer, image in given.images.items():
             if not given.tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
@@ -418,6 +422,7 @@ def name_of_test(test: str) -> str:
 
 def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     """Return framebuffers by name, in native byte order."""
+    __tracebackhide__ = True
     if isinstance(frames, np.ndarray):
         frames = {"image": frames}
     if not isinstance(frames, Mapping) or not frames:
@@ -434,6 +439,7 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
 
 def _check_alone(**tolerances: float | None) -> None:
     """Raise ValueError if a tolerance is given."""
+    __tracebackhide__ = True
     given = [name for name, value in tolerances.items() if value is not None]
     if given:
         raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")
