@@ -20,7 +20,8 @@ from vkbloom.bands import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
 from vkbloom.io import image_reading
-from vkbloom.io.array_files import divided, has_straight, premultiplied
+from vkbloom.io.alpha import divided
+from vkbloom.io.array_files import has_straight, premultiplied
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage

@@ -18,7 +18,6 @@ from vkbloom.cli.program import given
 from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
 from vkbloom.io.colour import check_space
-from vkbloom.io.displayed import has_hdr_curve
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
 
@@ -137,9 +136,7 @@ def is_photograph(source: str) -> bool:
         files = sorted(glob.glob(re.sub(r"%0?\d*d", "*", source)))
     for file in files:
         with suppress(OSError, ValueError), image_reading.opened(file, "Reading images") as reader:
-            spec = reader.spec()
-            is_hdr = has_hdr_curve(image_reading.points_of(spec))
-            return str(spec.format) in ("uint8", "uint16") and not is_hdr
+            return image_reading.is_photograph(reader)
     return False
 
 

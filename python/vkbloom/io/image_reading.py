@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
+from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, meaning_of
 from vkbloom.io.colour import linear
-from vkbloom.io.displayed import has_hdr_curve
+from vkbloom.io.containers import orientation_of
+from vkbloom.io.displayed import has_hdr_curve, of_code_points
 from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
     DTYPES,
@@ -25,6 +28,7 @@ from vkbloom.io.images import (
     complete,
     failure_of,
     is_kept,
+    warnings_of,
 )
 from vkbloom.io.png_gamma import png_gamma
 
@@ -37,10 +41,13 @@ __all__ = [
     "decode",
     "decode_file",
     "describe",
+    "hidden_notes",
+    "is_photograph",
     "listed_parts",
     "load",
     "of_layer",
     "opened",
+    "points_of",
     "readable_extensions",
     "size_of",
     "specials_note",
@@ -53,6 +60,10 @@ _LARGEST_AREA: Final = 1 << 28
 # PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
+# OpenImageIO's names of channels of which a file does not say what they are.
+_UNNAMED: Final = re.compile(r"channel\d+\Z|\Z")
+# The code point of an unspecified curve.
+_UNSPECIFIED: Final = 2
 # The most parts that are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
@@ -77,6 +88,11 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     if reader is None:
         reason = failure_of(oiio) or "unknown format"
         raise ValueError(f"{name}: is not a readable image: {reason}")
+    if reader.spec().get_string_attribute("tiff:ColorSpace") in ("CIELAB", "ICCLAB"):
+        # libtiff would convert to 8 bits without adapting the white of D50.
+        reader.close()
+        plain.attribute("oiio:RawColor", 1)
+        reader = oiio.ImageInput.open(name, plain)
     try:
         yield reader
     finally:
@@ -120,14 +136,20 @@ def _read(
     width, height = _covered(spec)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
-    data = complete(reader.read_image(subimage, 0, 0, spec.nchannels, wanted), reader, name)
-    pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
+    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
+    notes = warnings_of(reader, name)
+    pixels = np.asarray(complete(data, reader, name), dtype).reshape(
+        spec.height, spec.width, spec.nchannels
+    )
+    pixels = in_order(pixels, reader.format_name(), name)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    described = of_layer(replace(describe(reader, name), pixels=pixels), spec, layer)
+    described = describe(reader, name)
+    described = replace(described, pixels=pixels, notes=(*described.notes, *notes))
+    described = of_layer(described, spec, layer)
     pixels = described.pixels
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
@@ -149,12 +171,18 @@ def chosen_part(
     """Make the part to read the current one, and return its number and what it is."""
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
-    if subimage < 0 or not reader.seek_subimage(subimage, 0):
+    if subimage < 0 or not _seek(reader, subimage):
         count = 0
-        while reader.seek_subimage(count, 0):
+        while _seek(reader, count):
             count += 1
         raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
+    if spec.width < 1 or spec.height < 1:
+        raise ValueError(f"{name}: there are no pixels in this part of the file")
+    spec.attribute(
+        "Orientation",
+        orientation_of(name, reader.format_name(), spec.getattribute("Orientation")),
+    )
     if spec.deep or spec.depth > 1:
         raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
     if str(spec.format) not in DTYPES:
@@ -201,16 +229,25 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
 
 def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
     """Return the description of a file's current part; this may change the current part."""
+    notes = warnings_of(reader, name)
     spec = reader.spec()
     space, gamma = _stated_curve(reader, spec, name)
+    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
+    points, known = spec.getattribute("CICP"), points_of(spec)
+    if points is not None and known is None and points[1] != _UNSPECIFIED:
+        listed = " ".join(map(str, points))
+        notes.append(f"the code points {listed} of its colours are not known, and are ignored")
     # Before the reader goes to other parts.
     found = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
-        channels=tuple(spec.channelnames),
+        channels=tuple(
+            "" if channel == "A" and meaning is Meaning.NONE else channel
+            for channel in channels_of(spec, kind)
+        ),
         numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
         origin=(spec.x, spec.y),
         display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
-        associated=spec.alpha_channel >= 0 and not spec.get_int_attribute("oiio:UnassociatedAlpha"),
+        associated=meaning is Meaning.MULTIPLIED,
         space=space,
         gamma=gamma,
         attributes={
@@ -219,15 +256,38 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
-        code_points=points_of(spec),
+        code_points=known,
+        is_ultra_hdr=_is_ultra_hdr(reader, spec),
+        notes=tuple(notes),
     )
     return replace(found, parts=tuple(_parts(reader)))
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
-    """Return the code points of a file's colours, if it has them."""
+    """Return the code points of a file's colours, if it has them and they are known."""
     points = spec.getattribute("CICP")
-    return None if points is None else tuple(points)
+    return None if points is None or of_code_points(points) is None else tuple(points)
+
+
+def _is_ultra_hdr(reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec) -> bool:
+    """Whether OpenImageIO applies the gain map of a JPEG file."""
+    return reader.format_name() == "jpeg" and str(spec.format) == "half"
+
+
+def is_photograph(reader: OpenImageIO.ImageInput) -> bool:
+    """Whether a file holds integers for SDR, if only in its base image."""
+    spec = reader.spec()
+    is_integer = str(spec.format) in ("uint8", "uint16") and not has_hdr_curve(points_of(spec))
+    return is_integer or _is_ultra_hdr(reader, spec)
+
+
+def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
+    """Make a part the current one, if there is such a part."""
+    is_there: bool = reader.seek_subimage(subimage, 0)
+    if not is_there:
+        # Some readers leave an error, which would be taken for damaged pixels.
+        failure_of(reader)
+    return is_there
 
 
 def _stated_curve(
@@ -253,7 +313,7 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
     """Return the first part, from `subimage` on, that has a layer."""
     found: dict[str, None] = {}
     for index in range(max(subimage, 0), subimage + _MOST_PARTS):
-        if not reader.seek_subimage(index, 0):
+        if not _seek(reader, index):
             break
         layers = _layers(reader.spec())
         if layer in layers:
@@ -265,7 +325,7 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
 
 def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
     for index in range(_MOST_PARTS):
-        if not reader.seek_subimage(index, 0):
+        if not _seek(reader, index):
             return
         yield reader.spec().get_string_attribute("oiio:subimagename")
 
@@ -283,6 +343,17 @@ def specials_note(nan: int, infinite: int) -> str | None:
     return (
         f"has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, and stay in "
         "the picture"
+    )
+
+
+def hidden_notes(picture: Picture, largest: float | None = None) -> tuple[str, ...]:
+    """Return a note about colours where alpha is 0; `largest`: that of all bands of the picture."""
+    hidden = picture.hidden if largest is None else largest
+    if not hidden:
+        return ()
+    return (
+        f"has colours up to {hidden:.3g} where alpha is 0, which bloom like visible ones; "
+        'premultiplied colours with alpha "blur" (--alpha blur) leave them out',
     )
 
 
@@ -325,18 +396,30 @@ def decode(
     if numbers == "half":
         # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
-    notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
+    notes = [*stored.notes]
+    if left_out:
+        notes.append(f"left out the channels {', '.join(left_out)}")
     grey = len(chosen) < 3
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
+    has_alpha = values.shape[2] == 4
     taken_as = ""
     if not raw:
+        if stored.associated and has_alpha and values.dtype.kind == "u":
+            # 16 bits hold the quotients of 8 bits.
+            scale = 65535 // np.iinfo(values.dtype).max
+            values = divided(values.astype(np.uint16) * np.uint16(scale))
+            stored = replace(stored, associated=False)
         taken_as, values, said = linear(values, stored, colour)
         notes += said
         is_hdr = colour is None and has_hdr_curve(stored.code_points)
         if numbers in ("uint8", "uint16") and not is_hdr:
             values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
+    hidden = 0.0
+    if has_alpha and not stored.associated and (clear := values[:, :, 3] == 0).any():
+        one = 255 if raw else 1
+        hidden = max(float(np.nanmax(values[clear, :3], initial=0)) / one, 0.0)
     return Picture(
         pixels=np.ascontiguousarray(values),
         encoding=None if raw else "linear",
@@ -345,6 +428,7 @@ def decode(
         stored=stored,
         notes=tuple(notes),
         colour=taken_as,
+        hidden=hidden,
     )
 
 
@@ -372,8 +456,9 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
     if {"R", "G", "B"} <= places.keys():
         chosen = [places["R"], places["G"], places["B"], *alpha]
-    elif len(names) == 1 + len(alpha):
-        chosen = [index for index in range(len(names)) if index not in alpha] + alpha
+    elif len([name for name in names if name and not _UNNAMED.match(name)]) == 1 + len(alpha):
+        grey = [index for index in range(len(names)) if index not in alpha]
+        chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]
     elif len(layers) > 1:
         raise ValueError(
             f"the layers are {', '.join(filter(None, layers))}; name one as the layer to read"
@@ -383,7 +468,7 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
             f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
             "alpha"
         )
-    return chosen, [name for index, name in enumerate(names) if index not in chosen]
+    return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
 
 
 def _attributes_of_linear(

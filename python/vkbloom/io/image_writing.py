@@ -243,7 +243,7 @@ def chosen_layout(
 
     `is_hdr`: The curve needs more than 8 bits.
     """
-    for values in _layouts(picture, writer.supports("alpha") != 0):
+    for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in _DEEP if is_hdr else _PREFERENCES[picture.numbers]:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
                 return values.shape[2], numbers

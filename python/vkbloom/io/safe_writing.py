@@ -33,6 +33,7 @@ __all__ = [
     "Steps",
     "check_complete",
     "check_extension",
+    "has_alpha",
     "holds",
     "is_temporary",
     "put_in_place",
@@ -57,6 +58,7 @@ _MISSING: Final = dict.fromkeys(
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _READ_BYTES: Final = 64 << 20  # bytes read at a time
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
+_TRIED: Final = 32  # pixels on a side that every format can have
 _ZEROS: Final = 1 << 20  # bytes written at a time
 
 
@@ -84,22 +86,30 @@ def reserve(file: Path, size: int) -> Path:
     return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 
 
+def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
+    """Return whether a format keeps alpha. OpenImageIO says so of GIF, and writes it opaque."""
+    return writer.supports("alpha") != 0 and writer.format_name() != "gif"
+
+
 def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
     """Return whether a format supports a number of channels and a number type.
 
-    OpenImageIO knows this only for an open file. One pixel is written, because libpng prints a
-    message about a file without pixels.
+    OpenImageIO knows this only for a complete file: a small one is written and opened again.
     """
-    spec = oiio.ImageSpec(1, 1, channels, numbers)
+    spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
     writer = oiio.ImageOutput.create(str(temporary))
     is_kept = False
     if writer.open(str(temporary), spec):
         opened = writer.spec()
-        is_kept = (str(opened.format), opened.nchannels) == (numbers, channels)
-        writer.write_image(np.zeros((1, 1, channels), np.float32))
-        writer.close()
+        is_written = writer.write_image(np.zeros((_TRIED, _TRIED, channels), np.float32))
+        is_written = writer.close() and is_written
+        is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
+    if is_kept and (reader := oiio.ImageInput.open(str(temporary))) is not None:
+        # FITS takes halves for another type.
+        is_kept = str(reader.spec().format) == numbers
+        reader.close()
     return is_kept
 
 
