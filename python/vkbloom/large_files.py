@@ -326,6 +326,8 @@ class _Reading:
         notes.add(picture)
         if self._is_blended:
             picture = premultiplied(picture)
+        elif notes.file == self.source:
+            notes.hidden = max(notes.hidden, picture.hidden)
         if self._half and picture.pixels.dtype == np.float32:
             picture = replace(picture, pixels=picture.pixels.astype(np.float16))
         return picture
@@ -342,6 +344,7 @@ class _Notes:
     def __init__(self, file: str) -> None:
         self.file = file
         self._nan = self._infinite = 0
+        self.hidden = 0.0
         self._texts: dict[str, None] = {}
 
     def add(self, picture: Picture) -> None:
@@ -357,7 +360,7 @@ class _Notes:
         specials = image_reading.specials_note(self._nan, self._infinite)
         if specials is not None:
             yield f"{self.file} {specials}"
-        for text in self._texts:
+        for text in (*self._texts, *image_reading.hidden_notes(self.hidden)):
             yield f"{self.file}: {text}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
 from importlib.util import find_spec
 
@@ -20,6 +21,7 @@ def main() -> None:
     # File names may hold characters that the terminal's encoding cannot represent.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
+    signal.signal(signal.SIGTERM, _end)
     try:
         program()
     except SystemExit as error:
@@ -29,3 +31,12 @@ def main() -> None:
                 stream.flush()
             os._exit(INTERRUPTED)
         raise
+
+
+def _end(number: int, frame: object) -> None:
+    """Remove unfinished files, and end as a signal ends a process."""
+    writing = sys.modules.get("vkbloom.io.safe_writing")
+    if writing is not None:
+        writing.remove()
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)

@@ -238,14 +238,15 @@ class _Run:
         options = self._options
         is_piped = PIPE in (name, self._out)
         is_alone = options.attachments == "final" and not is_piped
-        return is_alone and is_large(name, options.subimage, options.layer)
+        with silenced():
+            return is_alone and is_large(name, options.subimage, options.layer)
 
     def large_file(self, name: str, target: str) -> None:
         """Add bloom to one file in bands of rows."""
         options = self._options
         if target != self._out:
             Path(target).parent.mkdir(exist_ok=True)
-        with tqdm(unit="row", leave=False, disable=self._hidden) as bar:
+        with silenced(), tqdm(unit="row", leave=False, disable=self._hidden) as bar:
 
             def show(done: int, total: int) -> None:
                 bar.total = total
@@ -316,6 +317,7 @@ class _Run:
                 layer=options.layer,
                 raw=options.raw,
                 expand=options.expand,
+                is_blended=options.is_blended,
             )
         except ValueError as error:
             # The user does not know the temporary folder of standard input.

@@ -102,8 +102,12 @@ def read_picture(
     layer: str | None = None,
     raw: bool = False,
     expand: float | None = None,
+    is_blended: bool = True,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents."""
+    """Read an image file, decode it for a renderer, and print notes about its contents.
+
+    `is_blended`: Whether its colours are multiplied by alpha afterwards.
+    """
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     if raw and stored.pixels.dtype != np.uint8:
@@ -115,7 +119,10 @@ def read_picture(
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
-    for text in picture.notes:
+    for text in (
+        *picture.notes,
+        *(() if is_blended else image_reading.hidden_notes(picture.hidden)),
+    ):
         note(f"{source}: {text}")
     return picture
 
@@ -135,7 +142,11 @@ def is_photograph(source: str) -> bool:
     elif not os.path.exists(source):
         files = sorted(glob.glob(re.sub(r"%0?\d*d", "*", source)))
     for file in files:
-        with suppress(OSError, ValueError), image_reading.opened(file, "Reading images") as reader:
+        with (
+            silenced(),
+            suppress(OSError, ValueError),
+            image_reading.opened(file, "Reading images") as reader,
+        ):
             return image_reading.is_photograph(reader)
     return False
 

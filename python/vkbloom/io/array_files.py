@@ -153,6 +153,7 @@ def read(
         pixels = multiplied(pixels) if premultiplied else divided(pixels)
     if not metadata:
         return pixels
+    hidden = 0.0 if premultiplied else picture.hidden
     facts: dict[str, Any] = {
         name: _plain(value) for name, (_, value) in picture.stored.attributes.items()
     }
@@ -161,7 +162,7 @@ def read(
         colour=picture.colour,
         alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
         parts=stored.parts,
-        notes=(*picture.notes, *(() if premultiplied else image_reading.hidden_notes(picture))),
+        notes=(*picture.notes, *image_reading.hidden_notes(hidden)),
     )
     return pixels, facts
 
@@ -358,7 +359,7 @@ def premultiplied(picture: Picture) -> Picture:
     """Return a picture whose colours are multiplied by alpha, if there is one."""
     if not has_straight(picture):
         return picture
-    return replace(picture, pixels=multiplied(picture.pixels))
+    return replace(picture, pixels=multiplied(picture.pixels), hidden=0.0)
 
 
 def _plain(value: Any) -> Any:

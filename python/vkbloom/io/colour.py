@@ -30,6 +30,8 @@ _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_sc
 _CURVES: Final[Mapping[str, str]] = {"gamma22": SPACES["gamma22"]}
 # Spaces of TIFF, whose numbers are not those of red, green and blue.
 _LAB: Final = ("CIELAB", "ICCLAB")
+# OpenImageIO's name of the space of every PNM file.
+_OF_PNM: Final = "Rec709"
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
 # Red, green, blue, white.
@@ -116,7 +118,9 @@ def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[A
         space = stored.space if is_known else f"gamma {stored.gamma:.4g}"
         made = _decoded(values, space, stored.gamma)
         return space, made, [f"the file says {space} of its colours; converted to linear Rec. 709"]
-    space = {name: plain for plain, name in SPACES.items()}.get(stored.space, stored.space)
+    # PNM's standard has the curve of BT.709. Programs write sRGB.
+    stated = "" if stored.space == _OF_PNM else stored.space
+    space = {name: plain for plain, name in SPACES.items()}.get(stated, stated)
     if space in ("", "srgb", "linear"):
         return space or "srgb", _decoded(values, space or "srgb"), []
     said = f"the file says {stored.space} of its colours"
@@ -157,7 +161,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
     notes: list[str] = []
     if stored.space == SPACES["srgb"]:
         notes.append("the file says srgb of its colours, which as floats are taken as linear")
-    elif stored.space not in ("", SPACES["linear"]):
+    elif stored.space not in ("", _OF_PNM, SPACES["linear"]):
         notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
     _, primaries = stored.attributes.get("chromaticities", (None, None))
     if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):

@@ -64,7 +64,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             if not is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
-                files.pop()[0].unlink()
+                safe_writing.remove(files.pop()[0])
                 beside = file.with_suffix(".exr")
                 files.append((safe_writing.reserve(beside, size), beside))
             _write_exr(oiio, frames, names, *files[-1])
@@ -72,7 +72,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             safe_writing.put_in_place(temporary, file)
     finally:
         for temporary, _ in files:
-            temporary.unlink(missing_ok=True)
+            safe_writing.remove(temporary)
     return [file for _, file in files]
 
 

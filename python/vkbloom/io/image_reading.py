@@ -346,9 +346,8 @@ def specials_note(nan: int, infinite: int) -> str | None:
     )
 
 
-def hidden_notes(picture: Picture, largest: float | None = None) -> tuple[str, ...]:
-    """Return a note about colours where alpha is 0; `largest`: that of all bands of the picture."""
-    hidden = picture.hidden if largest is None else largest
+def hidden_notes(hidden: float) -> tuple[str, ...]:
+    """Return a note about straight colours where alpha is 0, if the largest is not 0."""
     if not hidden:
         return ()
     return (

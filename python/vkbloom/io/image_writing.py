@@ -197,6 +197,8 @@ def put(
         and writer.write_image(np.ascontiguousarray(values))
         and writer.close()
     )
+    # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
+    is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
     if not is_written:
         raise safe_writing.write_error(writer, temporary, target)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
@@ -308,6 +310,9 @@ def _describe(
     stored, encoding = picture.stored, picture.encoding
     # OpenImageIO has no names for PQ and HLG with the primaries of Rec. 709.
     space = stored.space if encoding is None else SPACES.get(encoding, "")
+    if "CICP" in stored.attributes:
+        # Without a space, OpenImageIO adds PNG's chunks of sRGB. It has no name for some spaces.
+        space = "unknown"
     # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (to_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)

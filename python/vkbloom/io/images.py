@@ -249,10 +249,10 @@ def warnings_of(reader: Any, file: object) -> list[str]:
 
 
 def failure_of(source: Any) -> str:
-    """Return and clear the error of an OpenImageIO object; "" if there is none."""
+    """Return and clear the error of an OpenImageIO object in one line; "" if there is none."""
     try:
         text: str = source.geterror()
     except UnicodeDecodeError as error:
         # The message quotes bytes of a damaged file.
         text = error.object.decode(errors="replace")
-    return text.strip()
+    return "; ".join(dict.fromkeys(filter(None, map(str.strip, text.splitlines()))))

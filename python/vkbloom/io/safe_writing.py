@@ -6,7 +6,7 @@ A file is written to a temporary file beside it, which is renamed when it is com
 2. `reserve` the temporary file; `holds` tests on it what the format supports
 3. write it; `write_error` converts a failure of OpenImageIO
 4. `check_complete`, then `put_in_place`
-5. remove the temporary file if it still exists
+5. `remove` the temporary file if it still exists
 
 `replacing` does steps 2, 4 and 5 for one file, and `writing` also closes a writer for it.
 """
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
 
 import numpy as np
 
-from vkbloom.io.images import check_name
+from vkbloom.io.images import check_name, failure_of
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -37,6 +37,7 @@ __all__ = [
     "holds",
     "is_temporary",
     "put_in_place",
+    "remove",
     "replacing",
     "reserve",
     "write_error",
@@ -60,6 +61,9 @@ _READ_BYTES: Final = 64 << 20  # bytes read at a time
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
 _TRIED: Final = 32  # pixels on a side that every format can have
 _ZEROS: Final = 1 << 20  # bytes written at a time
+
+# Temporary files of this process.
+_unfinished: set[Path] = set()
 
 
 def check_extension(oiio: ModuleType, suffix: str) -> None:
@@ -106,23 +110,32 @@ def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> boo
         is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
-    if is_kept and (reader := oiio.ImageInput.open(str(temporary))) is not None:
-        # FITS takes halves for another type.
-        is_kept = str(reader.spec().format) == numbers
-        reader.close()
+    if is_kept:
+        reader = oiio.ImageInput.open(str(temporary))
+        # FITS takes halves for another type. JPEG XL's reader refuses files of under 128 bytes.
+        is_kept = reader is None or str(reader.spec().format) == numbers
+        failure_of(oiio)
     return is_kept
 
 
 def write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
     """Convert a writer's error to an exception."""
-    reason = writer.geterror().replace(str(temporary), file.name).strip() or "not written"
+    reason = failure_of(writer).replace(str(temporary), file.name) or "not written"
     return OSError(errno.EIO, reason, str(file))
 
 
 def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
     """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk."""
-    if not _is_readable(oiio, temporary):
-        raise OSError(errno.EIO, "not written completely; is the disk full?", str(file))
+    reason = _unreadable(oiio, temporary)
+    if reason is None:
+        return
+    reason = reason.replace(str(temporary), file.name)
+    if shutil.disk_usage(temporary.parent).free < _LARGEST_HEADER:
+        raise OSError(errno.ENOSPC, f"not written completely: {reason}", str(file))
+    # Some formats cannot hold a few pixels, or OpenImageIO cannot read such files.
+    raise OSError(
+        errno.EIO, f"cannot be read after writing: {reason}; try another format", str(file)
+    )
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
@@ -148,7 +161,7 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
         check_complete(oiio, temporary, file)
         put_in_place(temporary, file)
     finally:
-        temporary.unlink(missing_ok=True)
+        remove(temporary)
 
 
 @contextlib.contextmanager
@@ -175,7 +188,14 @@ def write_file(file: Path, content: bytes) -> None:
     try:
         put_in_place(temporary, file)
     finally:
+        remove(temporary)
+
+
+def remove(*files: Path) -> None:
+    """Remove temporary files that still exist; without arguments, all of this process."""
+    for temporary in files or [*_unfinished]:
         temporary.unlink(missing_ok=True)
+        _unfinished.discard(temporary)
 
 
 def is_temporary(path: Path) -> bool:
@@ -187,13 +207,14 @@ def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
     """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
     temporary = _link_target(file).with_name(f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}")
+    _unfinished.add(temporary)
     try:
         with temporary.open("xb") as stream:
             fill(stream)
     except BaseException as error:
         # BaseException includes Ctrl-C, which may arrive while a large file is written.
         with contextlib.suppress(OSError):
-            temporary.unlink()
+            remove(temporary)
         if isinstance(error, OSError):
             raise OSError(error.errno, error.strerror, str(file)) from error
         raise
@@ -223,11 +244,11 @@ def _link_target(file: Path) -> Path:
         raise OSError(error.errno, error.strerror, str(file)) from error
 
 
-def _is_readable(oiio: ModuleType, file: Path) -> bool:
+def _unreadable(oiio: ModuleType, file: Path) -> str | None:
+    """Return why a file cannot be read; None: it can."""
     reader = oiio.ImageInput.open(str(file))
     if reader is None:
-        oiio.geterror()
-        return False
+        return failure_of(oiio) or "unknown format"
     spec = reader.spec()
     # Some rows at a time, so that large files are not completely in memory.
     rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
@@ -243,6 +264,6 @@ def _is_readable(oiio: ModuleType, file: Path) -> bool:
             for y in range(spec.y, bottom, rows)
         )
     )
-    reader.geterror()
+    reason = failure_of(reader) or "the pixels are missing"
     reader.close()
-    return readable
+    return None if readable else reason
