@@ -20,7 +20,7 @@ from vkbloom.io.icc import Profile, from_lab, read_profile
 from vkbloom.io.images import SPACES, Colour, StoredImage
 from vkbloom.io.srgb import decode_srgb
 
-__all__ = ["check_space", "linear"]
+__all__ = ["LAB", "check_space", "linear"]
 
 _CONFIGURATION: Final = "ocio://default"
 _LINEAR: Final = SPACES["linear"]
@@ -28,8 +28,8 @@ _LINEAR: Final = SPACES["linear"]
 _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
 # Spaces with the curves of code points.
 _CURVES: Final[Mapping[str, str]] = {"gamma22": SPACES["gamma22"]}
-# Spaces of TIFF, whose numbers are not those of red, green and blue.
-_LAB: Final = ("CIELAB", "ICCLAB")
+#: Spaces of TIFF, whose numbers are not those of red, green and blue.
+LAB: Final = ("CIELAB", "ICCLAB")
 # OpenImageIO's name of the space of every PNM file.
 _OF_PNM: Final = "Rec709"
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
@@ -58,7 +58,7 @@ def linear(
     - `stored`: What the file says of its colours.
     - `colour`: The colour space, whatever the file says.
     """
-    if stored.space in _LAB:
+    if stored.space in LAB:
         made = _scaled(values)
         made[:, :, :3] = from_lab(values[:, :, :3], stored.space)
         return stored.space, made, []

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, meaning_of
-from vkbloom.io.colour import linear
+from vkbloom.io.colour import LAB, linear
 from vkbloom.io.containers import orientation_of
 from vkbloom.io.displayed import has_hdr_curve, of_code_points
 from vkbloom.io.expansion import expanded
@@ -85,19 +85,25 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
     reader = oiio.ImageInput.open(name, plain)
-    if reader is None:
-        reason = failure_of(oiio) or "unknown format"
-        raise ValueError(f"{name}: is not a readable image: {reason}")
-    if reader.spec().get_string_attribute("tiff:ColorSpace") in ("CIELAB", "ICCLAB"):
-        # libtiff would convert to 8 bits without adapting the white of D50.
-        reader.close()
+    reason = failure_of(oiio) if reader is None else ""
+    if _is_lab(reader, reason):
+        # libtiff converts to 8 bits without adapting the white of D50, or does not convert.
         plain.attribute("oiio:RawColor", 1)
         reader = oiio.ImageInput.open(name, plain)
+    if reader is None:
+        raise ValueError(f"{name}: is not a readable image: {reason or 'unknown format'}")
     try:
         yield reader
     finally:
         failure_of(reader)
         reader.close()
+
+
+def _is_lab(reader: OpenImageIO.ImageInput | None, reason: str) -> bool:
+    """Whether a file has L*, a* and b*, or may have; `reason`: why it cannot be opened."""
+    if reader is None:
+        return "PhotometricInterpretation" in reason
+    return reader.spec().get_string_attribute("tiff:ColorSpace") in LAB
 
 
 def readable_extensions() -> set[str]:
