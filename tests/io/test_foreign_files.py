@@ -102,6 +102,18 @@ def test_orientation(tmp_path: Path, name: str, store: Any, orientation: int) ->
     assert np.array_equal(as_rows(path), made)
 
 
+def test_exif_after_the_pixels_is_kept(tmp_path: Path) -> None:
+    exif = image.Exif()
+    exif[271] = "Maker"
+    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+    content = store_png(tmp_path / "a.png", PIXELS).read_bytes()
+    chunk = png_chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))
+    (tmp_path / "a.png").write_bytes(content[:-12] + chunk + content[-12:])
+    made, facts = vkbloom.read(tmp_path / "a.png", metadata=True)
+    assert made.shape == PIXELS.shape
+    assert (facts["Make"], facts["Exif:DateTimeOriginal"]) == ("Maker", "2020:01:02 03:04:05")
+
+
 def test_orientation_of_exif_goes_before_xmp(tmp_path: Path) -> None:
     exif = image.Exif()
     exif[274] = 3
@@ -255,6 +267,15 @@ def test_colours_under_alpha_0_are_told(tmp_path: Path) -> None:
         assert [note[:22] for note in facts["notes"]] == ["has colours up to 1 wh"] * (under == 255)
         _, facts = vkbloom.read(path, metadata=True, premultiplied=True)
         assert facts["notes"] == ()
+
+
+@pytest.mark.parametrize("brand", [b"avif", b"heic", b"mif1"])
+def test_heif_is_told(tmp_path: Path, brand: bytes) -> None:
+    (tmp_path / "a.avif").write_bytes(b"\0\0\0\x18ftyp" + brand + bytes(12))
+    with pytest.raises(
+        ValueError, match=r"a\.avif: .* without libheif, .*; convert the file to PNG"
+    ):
+        vkbloom.read(tmp_path / "a.avif")
 
 
 def test_a_file_without_pixels(tmp_path: Path) -> None:

@@ -13,7 +13,23 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["orientation_of", "png_chunks", "tiff_field"]
+__all__ = [
+    "HEIF_ADVICE",
+    "is_heif",
+    "late_exif",
+    "orientation_of",
+    "png_chunks",
+    "tiff_field",
+    "upright",
+]
+
+#: What to do with AVIF and HEIF.
+HEIF_ADVICE: Final = (
+    "this OpenImageIO is built without libheif, which reads AVIF and HEIF; convert the file to "
+    "PNG, HEIF by pillow-heif"
+)
+# Brands of ISO base media files: of ISO/IEC 23008-12 and of AVIF.
+_HEIF_BRANDS: Final = b"avif avis heic heix hevc heim heis hevx mif1 msf1".split()
 
 _PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 # The largest four-byte integer of PNG.
@@ -45,6 +61,17 @@ def orientation_of(path: str | os.PathLike[str], kind: str, stated: int | None) 
             found = _FINDERS[kind](stream)
             stated = stated if found is None else found
     return stated if stated is not None and 1 <= stated <= 8 else 1
+
+
+def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return pixels
 
 
 def png_chunks(stream: BinaryIO, wanted: tuple[bytes, ...]) -> Iterator[tuple[bytes, bytes | None]]:
@@ -134,6 +161,38 @@ def _of_png(stream: BinaryIO) -> int | None:
                     continue
             by_xmp = by_xmp or _of_xmp(text)
     return by_xmp
+
+
+def late_exif(path: str | os.PathLike[str]) -> bytes | None:
+    """Return a PNG file of one pixel with the Exif chunk that follows another's pixels, if any."""
+    is_late, exif = False, None
+    with open(path, "rb") as stream:
+        for kind, content in png_chunks(stream, (b"eXIf",)):
+            is_late |= kind == b"IDAT"
+            if is_late and content is not None:
+                exif = content
+    if exif is None:
+        return None
+    chunks = (
+        (b"IHDR", b"\0\0\0\1\0\0\0\1\x08\0\0\0\0"),
+        (b"eXIf", exif),
+        (b"IDAT", zlib.compress(bytes(2))),
+        (b"IEND", b""),
+    )
+    return _PNG_SIGNATURE + b"".join(
+        len(content).to_bytes(4, "big")
+        + kind
+        + content
+        + zlib.crc32(kind + content).to_bytes(4, "big")
+        for kind, content in chunks
+    )
+
+
+def is_heif(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file is AVIF or HEIF."""
+    with open(path, "rb") as stream:
+        head = stream.read(12)
+    return head[4:8] == b"ftyp" and head[8:] in _HEIF_BRANDS
 
 
 def _of_jpeg(stream: BinaryIO) -> int | None:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, meaning_of
 from vkbloom.io.colour import LAB, linear
-from vkbloom.io.containers import orientation_of
+from vkbloom.io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, upright
 from vkbloom.io.displayed import has_hdr_curve, of_code_points
 from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
@@ -91,7 +91,8 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
         plain.attribute("oiio:RawColor", 1)
         reader = oiio.ImageInput.open(name, plain)
     if reader is None:
-        raise ValueError(f"{name}: is not a readable image: {reason or 'unknown format'}")
+        reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
+        raise ValueError(f"{name}: is not a readable image: {reason}")
     try:
         yield reader
     finally:
@@ -160,7 +161,7 @@ def _read(
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
-        pixels = _upright(pixels[y : y + display[3], x : x + display[2]], orientation)
+        pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
         left, top = 0, 0
         display = (0, 0, pixels.shape[1], pixels.shape[0])
     return replace(
@@ -184,7 +185,8 @@ def chosen_part(
         raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
     if spec.width < 1 or spec.height < 1:
-        raise ValueError(f"{name}: there are no pixels in this part of the file")
+        more = f"; subimage {subimage + 1} is another" if _seek(reader, subimage + 1) else ""
+        raise ValueError(f"{name}: there are no pixels in this part of the file{more}")
     spec.attribute(
         "Orientation",
         orientation_of(name, reader.format_name(), spec.getattribute("Orientation")),
@@ -258,7 +260,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
-            for attribute in spec.extra_attribs
+            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
@@ -267,6 +269,17 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         notes=tuple(notes),
     )
     return replace(found, parts=tuple(_parts(reader)))
+
+
+def _late_attributes(kind: str, name: str) -> Iterator[Any]:
+    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
+    if kind != "png" or (exif := late_exif(name)) is None:
+        return
+    with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        file.write(exif)
+        file.flush()
+        with opened(file.name, "Reading images") as reader:
+            yield from reader.spec().extra_attribs
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
@@ -360,17 +373,6 @@ def hidden_notes(hidden: float) -> tuple[str, ...]:
         f"has colours up to {hidden:.3g} where alpha is 0, which bloom like visible ones; "
         'premultiplied colours with alpha "blur" (--alpha blur) leave them out',
     )
-
-
-def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
-    if orientation in (5, 6, 7, 8):
-        pixels = pixels.swapaxes(0, 1)
-    if orientation in (3, 4, 7, 8):
-        pixels = pixels[::-1]
-    if orientation in (2, 3, 6, 7):
-        pixels = pixels[:, ::-1]
-    return pixels
 
 
 def decode(
