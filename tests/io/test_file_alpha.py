@@ -92,22 +92,6 @@ def beside(pixels: NDArray[Any], *channels: int) -> NDArray[Any]:
     return np.concatenate([pixels, more[..., channels]], axis=-1)
 
 
-def palette_with_alpha(path: Path) -> None:
-    """Write indices beside alpha, of which OpenImageIO reads the colours."""
-    index = np.repeat(np.arange(4, dtype=np.uint8), 256).reshape(32, 32)
-    colours = np.zeros((3, 256), int)
-    colours[:, :4] = PALETTE.T.astype(int) * 257
-    tags = [(320, "H", 768, colours.ravel().tolist(), True)]
-    pixels = beside(index[..., None], 4)
-    tifffile.imwrite(
-        path, pixels, photometric="minisblack", extrasamples=["unassalpha"], extratags=tags
-    )
-    # PhotometricInterpretation 3.
-    grey, palette = (b"\6\1\3\0\1\0\0\0" + bytes([kind]) for kind in (1, 3))
-    path.write_bytes(path.read_bytes().replace(grey, palette))
-
-
-PALETTE = np.array([[9, 80, 200], [255, 0, 0], [0, 128, 64], [7, 7, 7]], np.uint8)
 GREY = STRAIGHT[..., [1, 1, 1, 3]]
 OPAQUE = (STRAIGHT[..., :3], False)
 # A name, what writes the file, what is in it, and whether its colours are multiplied.
@@ -196,7 +180,6 @@ ROWS: list[tuple[str, Callable[[Path], Any], NDArray[Any], bool]] = [
         MULTIPLIED[..., [1, 1, 1, 3]],
         True,
     ),
-    ("palette 2.tif", palette_with_alpha, np.repeat(PALETTE, 256, 0).reshape(32, 32, 3), False),
     (
         "grey 0 2.tif",
         tiff(

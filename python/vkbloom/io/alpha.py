@@ -58,7 +58,6 @@ _HEADER_BYTES: Final = 1 << 16
 _GREY_AND_ALPHA: Final = ("targa", "sgi", "jpeg2000", "jpegxl", "pnm", "psd", "rla", "fits")
 # White is 0, black is 0 (TIFF 6.0, PhotometricInterpretation).
 _GREY: Final = (0, 1)
-_PALETTE: Final = 3
 # Pixels to read at a time.
 _BAND_PIXELS: Final = 1 << 20
 
@@ -74,11 +73,7 @@ class Meaning(enum.Enum):
 def channels_of(spec: OpenImageIO.ImageSpec, kind: str) -> tuple[str, ...]:
     """Return the names of the channels."""
     names = tuple(spec.channelnames)
-    photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 2)
-    if kind == "tiff" and photometric == _PALETTE and len(names) == 3:
-        # Alpha beside the indices is left out, and green gets its name.
-        return "R", "G", "B"
-    if kind == "tiff" and photometric in _GREY:
+    if kind == "tiff" and spec.get_int_attribute("tiff:PhotometricInterpretation", 2) in _GREY:
         # OpenImageIO calls further samples green and blue.
         alpha = spec.alpha_channel
         more = range(1, len(names))
