@@ -248,7 +248,7 @@ def write(
         The array's dtype is not uint8, uint16 or a float.
     ValueError
         The array's shape or an argument is not one of the above; or the format cannot store the
-        array: JPEG and Radiance HDR have no alpha, OpenEXR has no integers.
+        array: JPEG, GIF and Radiance HDR have no alpha, OpenEXR has no integers.
     OSError
         The file cannot be written. The error names it, and no partial file is left.
     ModuleNotFoundError

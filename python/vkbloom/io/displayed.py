@@ -188,7 +188,11 @@ def with_names(
         known = ", ".join(_DISPLAYS)
         raise ValueError(f"view: files cannot name the colours of {name}; take one of {known}")
     if writer.supports("cicp"):
-        return False, {**kept, "CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        named: dict[str, tuple[Any, Any]] = {"CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        if points != _DISPLAYS["sRGB - Display"]:
+            # Without a space, OpenImageIO adds chunks of sRGB. It has no name for some spaces.
+            named["oiio:ColorSpace"] = (oiio.TypeDesc("string"), "unknown")
+        return False, {**kept, **named}
     if points == _DISPLAYS["sRGB - Display"]:
         return False, kept
     cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"

@@ -187,7 +187,7 @@ def _write_image(
     """Write one framebuffer to a file of any format; False if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(str(temporary))
-    if pixels.shape[2] == 4 and not writer.supports("alpha"):
+    if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
         opaque = 255 if pixels.dtype == np.uint8 else 1.0
         if not (pixels[:, :, 3] == opaque).all():
             return False

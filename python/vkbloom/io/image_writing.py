@@ -310,9 +310,6 @@ def _describe(
     stored, encoding = picture.stored, picture.encoding
     # OpenImageIO has no names for PQ and HLG with the primaries of Rec. 709.
     space = stored.space if encoding is None else SPACES.get(encoding, "")
-    if "CICP" in stored.attributes:
-        # Without a space, OpenImageIO adds PNG's chunks of sRGB. It has no name for some spaces.
-        space = "unknown"
     # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (to_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)
