@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import re
 import struct
+import tempfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any, BinaryIO, Final
 
@@ -18,6 +20,7 @@ __all__ = [
     "is_heif",
     "late_exif",
     "orientation_of",
+    "padded",
     "png_chunks",
     "tiff_field",
     "upright",
@@ -31,6 +34,9 @@ HEIF_ADVICE: Final = (
 # Brands of ISO base media files: of ISO/IEC 23008-12 and of AVIF.
 _HEIF_BRANDS: Final = b"avif avis heic heix hevc heim heis hevx mif1 msf1".split()
 
+# A codestream or a container (ISO/IEC 18181-2).
+_JPEG_XL: Final = (b"\xff\x0a", b"\0\0\0\x0cJXL \r\n\x87\n")
+_JPEG_XL_BYTES: Final = 128
 _PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 # The largest four-byte integer of PNG.
 _LARGEST_CHUNK: Final = 2**31 - 1
@@ -60,6 +66,9 @@ def orientation_of(path: str | os.PathLike[str], kind: str, stated: int | None) 
         with open(path, "rb") as stream:
             found = _FINDERS[kind](stream)
             stated = stated if found is None else found
+    if kind in ("dpx", "cineon") and stated in (5, 6, 7, 8):
+        # OpenImageIO exchanges width and height before it reads the lines.
+        raise ValueError(f"{os.fspath(path)}: {kind} with lines along the columns is not supported")
     return stated if stated is not None and 1 <= stated <= 8 else 1
 
 
@@ -72,6 +81,22 @@ def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     if orientation in (2, 3, 6, 7):
         pixels = pixels[:, ::-1]
     return pixels
+
+
+@contextmanager
+def padded(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Yield a file to open in place of a file: OpenImageIO needs 128 bytes of JPEG XL."""
+    name, content = os.fspath(path), b""
+    if os.path.isfile(name) and os.path.getsize(name) < _JPEG_XL_BYTES:
+        with open(name, "rb") as stream:
+            content = stream.read()
+    if not content.startswith(_JPEG_XL):
+        yield name
+        return
+    with tempfile.NamedTemporaryFile(suffix=".jxl") as file:
+        file.write(content.ljust(_JPEG_XL_BYTES, b"\0"))
+        file.flush()
+        yield file.name
 
 
 def png_chunks(stream: BinaryIO, wanted: tuple[bytes, ...]) -> Iterator[tuple[bytes, bytes | None]]:

@@ -15,7 +15,7 @@ import numpy as np
 from vkbloom.checks import import_extra
 from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, meaning_of
 from vkbloom.io.colour import LAB, linear
-from vkbloom.io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, upright
+from vkbloom.io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
 from vkbloom.io.displayed import has_hdr_curve, of_code_points
 from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
@@ -84,7 +84,8 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    reader = oiio.ImageInput.open(name, plain)
+    with padded(name) as file:
+        reader = oiio.ImageInput.open(file, plain)
     reason = failure_of(oiio) if reader is None else ""
     if _is_lab(reader, reason):
         # libtiff converts to 8 bits without adapting the white of D50, or does not convert.
@@ -285,6 +286,9 @@ def _late_attributes(kind: str, name: str) -> Iterator[Any]:
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
     """Return the code points of a file's colours, if it has them and they are known."""
     points = spec.getattribute("CICP")
+    if points is not None and spec.nchannels < 3:
+        # Grey has no primaries.
+        points = (1, *points[1:])
     return None if points is None or of_code_points(points) is None else tuple(points)
 
 

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
 
 import numpy as np
 
+from vkbloom.io.containers import padded
 from vkbloom.io.images import check_name, failure_of
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> boo
     writer.geterror()
     if is_kept:
         reader = oiio.ImageInput.open(str(temporary))
-        # FITS takes halves for another type. JPEG XL's reader refuses files of under 128 bytes.
+        # FITS takes halves for another type. OpenImageIO needs 128 bytes of JPEG XL.
         is_kept = reader is None or str(reader.spec().format) == numbers
         failure_of(oiio)
     return is_kept
@@ -246,7 +247,8 @@ def _link_target(file: Path) -> Path:
 
 def _unreadable(oiio: ModuleType, file: Path) -> str | None:
     """Return why a file cannot be read; None: it can."""
-    reader = oiio.ImageInput.open(str(file))
+    with padded(file) as name:
+        reader = oiio.ImageInput.open(name)
     if reader is None:
         return failure_of(oiio) or "unknown format"
     spec = reader.spec()
