@@ -17,6 +17,7 @@ import numpy as np
 from vkbloom.cli.program import given
 from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
+from vkbloom.io.alpha import hidden_notes
 from vkbloom.io.colour import check_space
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
@@ -119,10 +120,8 @@ def read_picture(
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
-    for text in (
-        *picture.notes,
-        *(() if is_blended else image_reading.hidden_notes(picture.hidden)),
-    ):
+    hidden = 0.0 if is_blended else picture.hidden
+    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
         note(f"{source}: {text}")
     return picture
 

@@ -45,7 +45,16 @@ from vkbloom.io.images import failure_of
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["Meaning", "channels_of", "divided", "in_order", "meaning_of", "multiplied"]
+__all__ = [
+    "Meaning",
+    "channels_of",
+    "divided",
+    "hidden_notes",
+    "in_order",
+    "light_of",
+    "meaning_of",
+    "multiplied",
+]
 
 # ExtraSamples of TIFF 6.0, and its value for colours that are multiplied by alpha.
 _EXTRA_SAMPLES: Final = 338
@@ -58,6 +67,8 @@ _HEADER_BYTES: Final = 1 << 16
 _GREY_AND_ALPHA: Final = ("targa", "sgi", "jpeg2000", "jpegxl", "pnm", "psd", "rla", "fits")
 # White is 0, black is 0 (TIFF 6.0, PhotometricInterpretation).
 _GREY: Final = (0, 1)
+# Hidden light of less than this share of the visible light does not show.
+_TRIFLE: Final = 0.05
 # Pixels to read at a time.
 _BAND_PIXELS: Final = 1 << 20
 
@@ -228,3 +239,26 @@ def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
         made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
     with np.errstate(over="ignore"):
         return made.astype(values.dtype)
+
+
+def light_of(values: NDArray[Any]) -> tuple[float, float]:
+    """Return the sum of colours where alpha is 0, and that of the others."""
+    hidden, total = (_sum_of(pixels) for pixels in (values[values[:, :, 3] == 0], values))
+    return hidden, total - hidden
+
+
+def _sum_of(pixels: NDArray[Any]) -> float:
+    colours = pixels[..., :3]
+    is_light = (colours > 0) & (colours < np.inf)
+    return float(np.sum(colours, where=is_light, dtype=np.float64))
+
+
+def hidden_notes(hidden: float, visible: float) -> tuple[str, ...]:
+    """Return a note about light where alpha is 0, as `Picture` has both, if it is no trifle."""
+    if hidden <= _TRIFLE * visible:
+        return ()
+    share = 100 * hidden / (hidden + visible)
+    return (
+        f"{share:.0f} % of its light lie where alpha is 0, and bloom like the visible ones; "
+        'premultiplied colours with alpha "blur" (--alpha blur) leave them out',
+    )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vkbloom.argument_types import checked
 from vkbloom.checks import check_index, import_extra
 from vkbloom.io import displayed, image_reading, safe_writing
-from vkbloom.io.alpha import divided, multiplied
+from vkbloom.io.alpha import divided, hidden_notes, multiplied
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.expansion import check_expansion
 from vkbloom.io.image_writing import as_numbers, check_quality, described_as, put
@@ -162,7 +162,7 @@ def read(
         colour=picture.colour,
         alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
         parts=stored.parts,
-        notes=(*picture.notes, *image_reading.hidden_notes(hidden)),
+        notes=(*picture.notes, *hidden_notes(hidden, picture.visible)),
     )
     return pixels, facts
 

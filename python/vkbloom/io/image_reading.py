@@ -11,9 +11,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, meaning_of
+from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom.io.colour import LAB, linear
 from vkbloom.io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
 from vkbloom.io.displayed import has_hdr_curve, of_code_points
@@ -41,7 +42,6 @@ __all__ = [
     "decode",
     "decode_file",
     "describe",
-    "hidden_notes",
     "is_photograph",
     "listed_parts",
     "load",
@@ -369,16 +369,6 @@ def specials_note(nan: int, infinite: int) -> str | None:
     )
 
 
-def hidden_notes(hidden: float) -> tuple[str, ...]:
-    """Return a note about straight colours where alpha is 0, if the largest is not 0."""
-    if not hidden:
-        return ()
-    return (
-        f"has colours up to {hidden:.3g} where alpha is 0, which bloom like visible ones; "
-        'premultiplied colours with alpha "blur" (--alpha blur) leave them out',
-    )
-
-
 def decode(
     stored: StoredImage,
     colour: Colour | None = None,
@@ -427,10 +417,9 @@ def decode(
         if numbers in ("uint8", "uint16") and not is_hdr:
             values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
-    hidden = 0.0
-    if has_alpha and not stored.associated and (clear := values[:, :, 3] == 0).any():
-        one = 255 if raw else 1
-        hidden = max(float(np.nanmax(values[clear, :3], initial=0)) / one, 0.0)
+    hidden = visible = 0.0
+    if has_alpha and not stored.associated:
+        hidden, visible = light_of(values)
     return Picture(
         pixels=np.ascontiguousarray(values),
         encoding=None if raw else "linear",
@@ -440,6 +429,7 @@ def decode(
         notes=tuple(notes),
         colour=taken_as,
         hidden=hidden,
+        visible=visible,
     )
 
 

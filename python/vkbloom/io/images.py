@@ -158,7 +158,7 @@ class Picture:
     - `notes`: Notes for the user about how the file was interpreted.
     - `colour`: The colour space from which colours were decoded: "linear", "srgb", the name of
       another space or of the file's profile; "" if the values were not decoded.
-    - `hidden`: The largest straight colour where alpha is 0.
+    - `hidden`, `visible`: The sum of straight colours where alpha is 0, and that of the others.
     """
 
     pixels: NDArray[Any]
@@ -169,6 +169,7 @@ class Picture:
     notes: tuple[str, ...] = ()
     colour: str = ""
     hidden: float = 0.0
+    visible: float = 0.0
 
     @classmethod
     def of_values(
