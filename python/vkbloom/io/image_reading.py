@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
