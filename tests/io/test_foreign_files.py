@@ -128,6 +128,23 @@ def test_exif_after_the_pixels_is_kept(tmp_path: Path) -> None:
     assert (facts["Make"], facts["Exif:DateTimeOriginal"]) == ("Maker", "2020:01:02 03:04:05")
 
 
+@pytest.mark.parametrize(
+    "exif",
+    [
+        b"",
+        b"no Exif",
+        b"II+\0\x08\0\0\0" + b"\xff" * 8,
+        b"II*\0\xff\xff\xff\xff",
+        b"MM\0*\0\0\0\x08\0\1\1\x12\0\3\xff\xff\xff\xff\0\6\0\0",
+    ],
+)
+def test_damaged_exif_after_the_pixels(tmp_path: Path, exif: bytes) -> None:
+    content = store_png(tmp_path / "a.png", PIXELS).read_bytes()
+    plain = vkbloom.read(tmp_path / "a.png")
+    (tmp_path / "a.png").write_bytes(content[:-12] + png_chunk(b"eXIf", exif) + content[-12:])
+    assert np.array_equal(vkbloom.read(tmp_path / "a.png"), plain)
+
+
 def test_orientation_of_exif_goes_before_xmp(tmp_path: Path) -> None:
     exif = image.Exif()
     exif[274] = 3

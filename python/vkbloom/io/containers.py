@@ -120,7 +120,7 @@ def tiff_field(stream: BinaryIO, tag: int, part: int = 0) -> NDArray[Any] | None
     """Return the numbers of a field of a TIFF directory; None: it is missing or damaged."""
     try:
         return _tiff_field(stream, tag, part)
-    except (struct.error, KeyError, ValueError):
+    except (struct.error, KeyError, OverflowError, ValueError):
         return None
 
 

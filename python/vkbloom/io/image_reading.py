@@ -6,7 +6,7 @@ import os
 import re
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -278,7 +278,8 @@ def _late_attributes(kind: str, name: str) -> Iterator[Any]:
     with tempfile.NamedTemporaryFile(suffix=".png") as file:
         file.write(exif)
         file.flush()
-        with opened(file.name, "Reading images") as reader:
+        # Damaged metadata do not matter to the pixels.
+        with suppress(ValueError), opened(file.name, "Reading images") as reader:
             yield from reader.spec().extra_attribs
 
 
