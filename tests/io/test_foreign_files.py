@@ -24,6 +24,7 @@ from tests.io.profiles import (
     to_xyz,
 )
 from vkbloom.io import rows
+from vkbloom.io.containers import orientation_of
 from vkbloom.io.image_reading import decode, is_photograph, opened
 from vkbloom.io.srgb import decode_srgb, encode_srgb
 
@@ -362,3 +363,10 @@ def test_small_jpeg_xl(tmp_path: Path, size: int, channels: int) -> None:
 def test_alpha_that_a_format_loses_is_refused(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(ValueError, match=r"no alpha; write array\[\.\.\., :3\]"):
         vkbloom.write(tmp_path / f"a.{suffix}", np.ones((2, 2, 4), np.float32))
+
+
+@pytest.mark.parametrize("stated", [None, "6", (6, 6), 0, 9, -1, 6.0])
+def test_an_orientation_that_is_none(tmp_path: Path, stated: Any) -> None:
+    path = tmp_path / "a.webp"
+    image.fromarray(PIXELS).save(path)
+    assert orientation_of(path, "webp", stated) == 1
