@@ -19,7 +19,8 @@ from vkbloom.bands import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
 from vkbloom.io import image_reading, image_writing
-from vkbloom.io.array_files import divided, has_straight, premultiplied
+from vkbloom.io.alpha import divided, hidden_notes
+from vkbloom.io.array_files import has_straight, premultiplied
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.files import settings_facts
 from vkbloom.io.glows import alike, grey_mask
@@ -339,6 +340,8 @@ class _Reading:
         notes.add(picture)
         if self._is_blended:
             picture = premultiplied(picture)
+        elif notes.file == self.source:
+            notes.add_light(picture)
         if self._half and picture.pixels.dtype == np.float32:
             picture = replace(picture, pixels=picture.pixels.astype(np.float16))
         return picture
@@ -361,12 +364,17 @@ class _Notes:
     def __init__(self, file: str) -> None:
         self.file = file
         self._nan = self._infinite = 0
+        self._hidden = self._visible = 0.0
         self._texts: dict[str, None] = {}
 
     def add(self, picture: Picture) -> None:
         self._nan += int(np.isnan(picture.values).sum())
         self._infinite += int(np.isinf(picture.values).sum())
         self._texts.update(dict.fromkeys(picture.notes))
+
+    def add_light(self, picture: Picture) -> None:
+        self._hidden += picture.hidden
+        self._visible += picture.visible
 
     def add_text(self, text: str) -> None:
         self._texts[text] = None
@@ -376,7 +384,7 @@ class _Notes:
         specials = image_reading.specials_note(self._nan, self._infinite)
         if specials is not None:
             yield f"{self.file} {specials}"
-        for text in self._texts:
+        for text in (*self._texts, *hidden_notes(self._hidden, self._visible)):
             yield f"{self.file}: {text}"
 
 

@@ -30,6 +30,7 @@ def main() -> None:
 
 def _run() -> None:
     import io  # noqa: PLC0415  all imports are made where Ctrl-C is answered
+    import signal  # noqa: PLC0415
     from importlib.util import find_spec  # noqa: PLC0415
 
     missing = [name for name in ("click", "rich", "tqdm") if find_spec(name) is None]
@@ -41,6 +42,7 @@ def _run() -> None:
     # File names may hold characters that the terminal's encoding cannot represent.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
+    signal.signal(signal.SIGTERM, _end)
     program()
 
 
@@ -55,3 +57,14 @@ def _flush() -> bool:
             is_written = False
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return is_written
+
+
+def _end(number: int, frame: object) -> None:
+    """Remove unfinished files, and end as a signal ends a process."""
+    import signal  # noqa: PLC0415  as in _run
+
+    writing = sys.modules.get("vkbloom.io.safe_writing")
+    if writing is not None:
+        writing.remove()
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)

@@ -240,6 +240,7 @@ class Run:
             layer=options.layer,
             raw=options.raw,
             expand=expand,
+            is_blended=is_blended,
         )
         return premultiplied(picture) if is_blended else picture
 

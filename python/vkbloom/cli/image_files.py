@@ -16,8 +16,8 @@ from vkbloom.cli.program import given
 from vkbloom.cli.streams import as_file, shown
 from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
+from vkbloom.io.alpha import hidden_notes
 from vkbloom.io.colour import check_space
-from vkbloom.io.displayed import has_hdr_curve
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
 
@@ -102,8 +102,12 @@ def read_picture(
     layer: str | None = None,
     raw: bool = False,
     expand: float | None = None,
+    is_blended: bool = True,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents."""
+    """Read an image file, decode it for a renderer, and print notes about its contents.
+
+    `is_blended`: Whether its colours are multiplied by alpha afterwards.
+    """
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     source = shown(source)
@@ -116,7 +120,8 @@ def read_picture(
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
-    for text in picture.notes:
+    hidden = 0.0 if is_blended else picture.hidden
+    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
         note(f"{source}: {text}")
     return picture
 
@@ -132,9 +137,7 @@ def is_photograph(source: str) -> bool:
         as_file(source) as file,
         image_reading.opened(file, "Reading images") as reader,
     ):
-        spec = reader.spec()
-        is_hdr = has_hdr_curve(image_reading.points_of(spec))
-        return str(spec.format) in ("uint8", "uint16") and not is_hdr
+        return image_reading.is_photograph(reader)
     return False
 
 

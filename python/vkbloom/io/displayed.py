@@ -49,6 +49,11 @@ _PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
 _CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
 #: Curves for displays of HDR.
 HDR_CURVES: Final = ("pq", "hlg")
+# Of files, in addition: the curve of Rec. ITU-R BT.709, which BT.601 and BT.2020 have, too.
+_READ_CURVES: Final = {
+    **{point: curve for curve, point in _CURVE_POINTS.items() if curve != "none"},
+    **dict.fromkeys((1, 6, 14, 15), "rec709"),
+}
 # Curves that readers know or assume without code points.
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
@@ -183,7 +188,11 @@ def with_names(
         known = ", ".join(_DISPLAYS)
         raise ValueError(f"view: files cannot name the colours of {name}; take one of {known}")
     if writer.supports("cicp"):
-        return False, {**kept, "CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        named: dict[str, tuple[Any, Any]] = {"CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        if points != _DISPLAYS["sRGB - Display"]:
+            # Without a space, OpenImageIO adds chunks of sRGB. It has no name for some spaces.
+            named["oiio:ColorSpace"] = (oiio.TypeDesc("string"), "unknown")
+        return False, {**kept, **named}
     if points == _DISPLAYS["sRGB - Display"]:
         return False, kept
     cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
@@ -193,8 +202,8 @@ def with_names(
 def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
     """Return primaries and curve of a file's code points; None: one of them is not known."""
     primaries = [name for name, point in _PRIMARY_POINTS.items() if point == points[0]]
-    curves = [name for name, point in _CURVE_POINTS.items() if point == points[1] != 2]
-    return (primaries[0], curves[0]) if primaries and curves else None
+    curve = _READ_CURVES.get(points[1])
+    return (primaries[0], curve) if primaries and curve else None
 
 
 @functools.cache

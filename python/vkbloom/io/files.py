@@ -65,7 +65,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             if not is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
-                files.pop()[0].unlink()
+                safe_writing.remove(files.pop()[0])
                 beside = file.with_suffix(".exr")
                 files.append((safe_writing.reserve(beside, size), beside))
             _write_exr(oiio, frames, names, *files[-1])
@@ -73,7 +73,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             safe_writing.put_in_place(temporary, file)
     finally:
         for temporary, _ in files:
-            temporary.unlink(missing_ok=True)
+            safe_writing.remove(temporary)
     return [file for _, file in files]
 
 
@@ -210,7 +210,7 @@ def _write_image(
     """Write one framebuffer to a file of any format; False if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(str(temporary))
-    if pixels.shape[2] == 4 and not writer.supports("alpha"):
+    if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
         opaque = 255 if pixels.dtype == np.uint8 else 1.0
         if not (pixels[:, :, 3] == opaque).all():
             return False

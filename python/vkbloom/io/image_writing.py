@@ -264,6 +264,8 @@ def put(
         and writer.write_image(np.ascontiguousarray(values))
         and writer.close()
     )
+    # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
+    is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
     if not is_written:
         raise safe_writing.write_error(writer, temporary, target)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
@@ -315,7 +317,7 @@ def chosen_layout(
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
         wanted = BITS[bits]
-    for values in _layouts(picture, writer.supports("alpha") != 0):
+    for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in wanted:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
                 return values.shape[2], numbers
