@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import vkbloom
-from vkbloom import testing
+from vkbloom import Renderer, testing
 from vkbloom.cli.program import program
 from vkbloom.own.compiler import find_compiler
+from vkbloom.testing.law_report import law_report
 from vkbloom.testing.programs import Program
 from vkbloom.verdicts import measuring
 
@@ -165,6 +166,34 @@ def test_a_preset() -> None:
     assert done.exit_code == 0, done.output
     assert found["laws"]["bounded_fireflies"]["held"] is False
     assert found["nearest_preset"]["name"] == "tutorial"
+
+
+FIREFLIES = {"unclamped"}
+#: Laws on colours and bright pixels that the formulas of engines break, and by what.
+BY_FORMULA = {
+    "jimenez2014": FIREFLIES,
+    "bevy_natural": FIREFLIES,
+    "unity_hdrp": FIREFLIES,
+    "photo": FIREFLIES,
+    # A limit for each channel, or a scale by the largest one.
+    "filament": {"unclamped", "colour"},
+    "godot_4_5": {"unclamped", "colour"},
+    "godot_4_6": {"unclamped", "colour"},
+    # A threshold of HSV's value, and colours of the ghosts and of the ends of the streaks.
+    "blender_simple_star": {"colour"},
+    "blender_ghosts": {"colour", "grey"},
+    "blender_streaks": {"colour", "grey"},
+    # Kernels whose channels differ.
+    "unreal_convolution": {"colour", "grey"},
+    "iris_6": {"grey"},
+}
+
+
+@pytest.mark.parametrize("name", vkbloom.presets)
+def test_presets_are_blamed_for_what_their_formulas_do(renderer: Renderer, name: str) -> None:
+    subject = measuring.of_settings(renderer, vkbloom.presets[name], (48, 48), None)
+    report = law_report(subject, ("unclamped", "colour", "grey", "channels", "finite"))
+    assert {row.name for row in report.rows if not row.held} == BY_FORMULA.get(name, set())
 
 
 PROGRAM = """\

@@ -110,6 +110,8 @@ def _unclamped(subject: Subject, limit: float) -> None:
 
 
 def _energy(subject: Subject, limit: float) -> None:
+    if subject.measured_gain > 0:
+        _lit(subject)
     point_spread.check_inside(point_spread.border_share(subject.pixel), subject.probe.size)
     energy = float(subject.pixel.sum(axis=(0, 1)).mean())
     figure("energy", energy)
