@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -297,3 +299,12 @@ def test_what_is_no_bloom() -> None:
 def test_results_that_are_not_finite() -> None:
     with pytest.raises(AssertionError, match="the bloom of finite values is finite"):
         testing.report(lambda image: image * np.nan, size=(16, 16))
+
+
+def test_the_page_lists_all_laws() -> None:
+    page = Path(__file__).parents[2] / "docs" / "check.md"
+    listed = re.findall(r"^\| `(\w+)` \|", page.read_text().split("## Programs")[0], re.MULTILINE)
+    assert listed == list(LAWS)
+    for law in LAWS.values():
+        assert law.formula
+        assert law.why

@@ -174,20 +174,16 @@ def command(
         except AssertionError as error:
             raise click.ClickException(f"{name}: {error}") from error
         if page is not None:
-            scene = showing.lit_scene(measuring.VIEW)
-            picture = subject.picture or subject.bloom
-            pictures = {"picture": picture(scene), "bloom": subject.bloom(scene)}
-            safe_writing.write_file(Path(page), showing.as_page(found, pictures).encode())
+            safe_writing.write_file(Path(page), showing.as_page(found).encode())
     if as_json:
         click.echo(json.dumps(showing.as_values(found), indent=2))
     else:
         click.echo(showing.as_text(found))
     if page is not None:
         say(f"wrote {page}", err=as_json)
-    broken = showing.broken(found.report)
-    for row in broken:
+    for row in showing.broken(found.report):
         note(f"{name}: required law {row.name}: {row.words}")
-    return 1 if broken else 0
+    return 1 if showing.broken(found.report) else 0
 
 
 def _check_choice(file: str | None, program: str | None, twin: str | None) -> None:

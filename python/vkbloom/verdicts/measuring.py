@@ -116,7 +116,7 @@ def of_program(
     subject = Subject(
         bloom=bloom,
         probe=fitting_probe(bloom, probe),
-        picture=program,
+        picture=program if less_input else None,
         gain=1.0 if gain is None else gain,
     )
     if program.bits is not None:

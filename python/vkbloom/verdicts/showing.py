@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vkbloom.fits.result import diagram
 from vkbloom.psf.sampled import samples
 from vkbloom.testing.law_report import LawReport, LawRow
-from vkbloom.verdicts.measuring import Measured
+from vkbloom.verdicts.measuring import VIEW, Measured
 from vkbloom.views.pictures import picture, png
 
 _STYLE: Final = (
@@ -110,9 +110,11 @@ def broken(report: LawReport) -> list[LawRow]:
     return [row for row in report.rows if row.name in report.required and not row.held]
 
 
-def as_page(found: Measured, pictures: dict[str, NDArray[Any]]) -> str:
+def as_page(found: Measured) -> str:
     """Return a page with tables, the point spread with its curve, and pictures."""
-    spread = found.spread
+    spread, subject = found.spread, found.subject
+    scene = lit_scene(VIEW)
+    pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = "".join(
         f'<tr><th scope="row">{html.escape(name)}</th>'
         f'<td class="n">{1000 * seconds:.3f} ms</td></tr>'
