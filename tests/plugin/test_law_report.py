@@ -264,6 +264,12 @@ def test_a_gain_that_is_promised() -> None:
     assert broken(testing.report(half, size=(32, 32), laws=("gain", "energy"))) == ["energy"]
 
 
+def test_a_light_below_the_rounding_is_not_judged() -> None:
+    probe = Probe(size=(64, 64), atol=0.018)
+    found = testing.report(lambda image: gaussian(image, 3.0), probe=probe)
+    assert {row(found, name).held for name in ("centroid_kept", "separable", "energy")} == {None}
+
+
 def test_images_of_grey_have_no_laws_of_colour() -> None:
     probe = Probe(size=(32, 32), channels=None, dtype="uint8")
     found = testing.report(lambda image: image, probe=probe)

@@ -75,7 +75,8 @@ def _separable(subject: Subject, limit: float) -> None:
 
 
 def _lit(subject: Subject) -> None:
-    if not subject.pixel.max() > 0:
+    spread, error = subject.pixel
+    if not spread.max(axis=(0, 1)).min() > error:
         raise ValueError("the bloom of a pixel is black, as after a median or a threshold")
 
 
@@ -112,8 +113,9 @@ def _unclamped(subject: Subject, limit: float) -> None:
 def _energy(subject: Subject, limit: float) -> None:
     if subject.measured_gain > 0:
         _lit(subject)
-    point_spread.check_inside(point_spread.border_share(subject.pixel), subject.probe.size)
-    energy = float(subject.pixel.sum(axis=(0, 1)).mean())
+    spread = subject.pixel[0]
+    point_spread.check_inside(point_spread.border_share(spread), subject.probe.size)
+    energy = float(spread.sum(axis=(0, 1)).mean())
     figure("energy", energy)
     promised = 1.0 if subject.gain is None else subject.gain
     off, allowed = abs(energy - promised), limit * max(promised, energy)

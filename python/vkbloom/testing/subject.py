@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Final
 
 from vkbloom.testing.moving_light import Stability, stability
-from vkbloom.testing.point_spread import point_spread
+from vkbloom.testing.point_spread import measured_spread, point_spread
 from vkbloom.testing.probe import Bloom, Image, Probe
 from vkbloom.testing.scaled_scene import ResolutionResponse, resolution_response
 
@@ -66,14 +66,15 @@ class Subject:
         return dataclasses.replace(probe, value=_LAMP) if dim else probe
 
     @cached_property
-    def pixel(self) -> Image:
-        """The point spread of the probe's brightest value."""
-        return point_spread(self.bloom, self.probe)
+    def pixel(self) -> tuple[Image, float]:
+        """The point spread of the probe's brightest value, and the error of its values."""
+        return measured_spread(self.bloom, self.probe)
 
     @cached_property
     def spread(self) -> Image:
         """The point spread of the lamp."""
-        return self.pixel if self.lamp is self.probe else point_spread(self.bloom, self.lamp)
+        lamp = self.lamp
+        return self.pixel[0] if lamp is self.probe else point_spread(self.bloom, lamp)
 
     @cached_property
     def stability(self) -> Stability:
