@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.fits.result import diagram
+from vkbloom.fits.translating import lights
 from vkbloom.psf.sampled import samples
 from vkbloom.testing.law_report import LawReport, LawRow
 from vkbloom.verdicts.measuring import VIEW, Measured
@@ -24,6 +24,7 @@ _STYLE: Final = (
     "td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
     "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
 )
+_OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
 #: Colours of rows in a terminal, as `law_report.COLOURS` in HTML.
 _COLOURS: Final = {"required": "red", "broken": "yellow", "untested": "bright_black"}
 
@@ -81,7 +82,10 @@ def as_values(found: Measured) -> dict[str, Any]:
             "settings": None if found.settings is None else found.settings.to_dict(),
             "size": found.size,
             "passes": [{"name": name, "seconds": s} for name, s in found.passes.items()],
-            "laws": {row.name: _values(row) for row in found.report.rows},
+            "laws": {
+                row.name: {name: getattr(row, name) for name in _OF_A_LAW}
+                for row in found.report.rows
+            },
             "gain": found.report.gain,
             "energy": spread.energy,
             "psf": {
@@ -113,7 +117,7 @@ def broken(report: LawReport) -> list[LawRow]:
 def as_page(found: Measured) -> str:
     """Return a page with tables, the point spread with its curve, and pictures."""
     spread, subject = found.spread, found.subject
-    scene = lit_scene(VIEW)
+    scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = "".join(
         f'<tr><th scope="row">{html.escape(name)}</th>'
@@ -155,30 +159,6 @@ def _width(name: str) -> int:
 
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
-
-
-def _values(row: LawRow) -> dict[str, Any]:
-    return {
-        "held": row.held,
-        "off": float(row.off),
-        "limit": float(row.limit),
-        "figures": row.figures,
-        "law": row.law,
-        "message": row.message,
-        "why": row.why,
-    }
-
-
-def lit_scene(size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the picture of the page: lights of several sizes and colours on dark grey."""
-    width, height = size
-    image = np.full((height, width, 3), 0.02, np.float32)
-    y, x = np.mgrid[:height, :width]
-    for number, value in enumerate(((9, 6, 3), (2, 5, 9), (8, 2, 2), (6, 6, 6))):
-        centre = ((0.2 + 0.2 * number) * width, (0.35 + 0.3 * (number % 2)) * height)
-        inside = np.hypot(x - centre[0], y - centre[1]) < height / (40 - 9 * number)
-        image[inside] = value
-    return image
 
 
 def _plain(value: Any) -> Any:
