@@ -32,18 +32,18 @@ class Law:
 
     - `test`: Takes the subject and the limit. Raises AssertionError if the law does not hold, and
       ValueError or TypeError if it cannot be tested.
-    - `limit`: What the test allows beyond the errors of values; by figure if there are several.
     - `formula`: The law in words or as a formula.
     - `why`: Why a bloom that is no fault may break the law.
+    - `limit`: What the test allows beyond the errors of values; by figure if there are several.
     - `explain`: Measures which it is, and returns words in place of `why`.
     - `applies`: Whether the law is tested where no laws are named.
     """
 
     name: str
     test: Callable[[Subject, Any], None]
-    limit: Any
     formula: str
     why: str
+    limit: Any = 0.0
     explain: Callable[[Subject, str], str] | None = None
     applies: Callable[[Subject], bool] = lambda _: True
 
@@ -302,7 +302,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "superposition",
             lambda subject, _: laws.assert_superposition(subject.bloom, subject.probe),
-            0.0,
             "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4",
             "A threshold, a clamp, a firefly filter and a median are not linear. They break this "
             "law on purpose.",
@@ -310,7 +309,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "gain",
             _gain,
-            0.0,
             "B(v) = gain v at every pixel of a flat image, with the gain that is promised, or with "
             "that of its middle",
             "With a threshold, the gain depends on the value. A method that reads black outside "
@@ -320,7 +318,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "symmetric",
             lambda subject, _: laws.assert_symmetric(subject.bloom, subject.probe),
-            0.0,
             "B(M a) = M B(a), where M swaps left and right, or top and bottom",
             "An even number of taps, a missing half texel and boxes of an odd number of pixels are "
             "not the same from both sides.",
@@ -328,7 +325,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "transposed",
             lambda subject, _: laws.assert_symmetric(subject.bloom, subject.probe, axes=("xy",)),
-            0.0,
             "B(M a) = M B(a), where M swaps rows and columns",
             "Blades, streaks and passes of different widths along x and y treat rows and columns "
             "differently.",
@@ -336,16 +332,15 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "centroid_kept",
             _centroid_kept,
-            0.01,
             "the centroid of the light of a pixel is that pixel",
             "A chain of halved images averages boxes of 2 x 2 pixels. The light of a pixel moves "
             "to the centre of its box, and back on average over all positions.",
-            _shift_explained,
+            limit=0.01,
+            explain=_shift_explained,
         ),
         Law(
             "separable",
             _separable,
-            0.0,
             "h(x, y) h(x0, y0) = h(x, y0) h(x0, y)",
             "A sum of several widths, such as the levels of a pyramid, is not a row times a "
             "column, even where each level is.",
@@ -353,7 +348,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "no_ringing",
             lambda subject, _: laws.assert_no_ringing(subject.bloom, subject.probe),
-            0.0,
             "across a step from black to bright, values rise, and stay between those of the flat "
             "images",
             "Negative weights ring, as in a sharpening filter. A method that reads black outside "
@@ -362,15 +356,14 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "bounded_fireflies",
             _bounded_fireflies,
-            1.0,
             "a bright pixel brightens others by the limit at most",
             "A linear bloom spreads a share of any brightness. Only a clamp, or an average "
             "weighted by 1 / (1 + luminance), limits it.",
+            limit=1.0,
         ),
         Law(
             "additive",
             _additive,
-            0.0,
             "F(a) = a + intensity G(a); where the bloom G is not known apart, F(a) >= a",
             "The bloom alone lacks the image. The composite mix takes light from bright pixels, "
             "and screen and a tone curve compress it.",
@@ -378,7 +371,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "unclamped",
             _unclamped,
-            0.0,
             "B(k a) >= k B(a), for k a of values up to 1024",
             "A clamp, a tone curve and a firefly filter limit bright pixels on purpose, and files "
             "and buffers of 8 bits end at 1.",
@@ -386,17 +378,16 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "energy",
             _energy,
-            0.02,
             "the bloom of a lit pixel has the light of the pixel, times the gain that is promised; "
             "1 if none is",
             "Light is lost where taps skip pixels, weights do not add up to 1, or the border reads "
             "black; with a threshold, a small light is another share of what is above it. A bloom "
             "of another strength promises another gain.",
+            limit=0.02,
         ),
         Law(
             "colour",
             _colour,
-            0.0,
             "all channels of a flat coloured image get the same gain",
             "A threshold or a clamp of each channel alone changes the hue. A tint or a coloured "
             "kernel does so on purpose.",
@@ -404,7 +395,6 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "grey",
             _grey,
-            0.0,
             "the bloom of a grey image is grey",
             "A coloured kernel, a tint and chromatic dispersion spread each channel differently on "
             "purpose.",
@@ -412,31 +402,29 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "channels",
             _channels,
-            0.0,
             "the bloom of light in one channel is in that channel",
             "A tint by a luminance, or a change of colour space, mixes channels on purpose.",
         ),
         Law(
             "stability",
             _stability,
-            moving_light.LIMITS,
             "while a light smaller than a pixel moves over 8 pixels, its bloom keeps energy, "
             "radius, the centroid of the image and the peak that a convolution has",
             "A chain of halved images whose filter skips pixels gives a small light another "
             "brightness at each position: it shimmers.",
+            limit=moving_light.LIMITS,
         ),
         Law(
             "resolution",
             _resolution,
-            {"radius": 0.1, "peak": 0.2},
             "radii and peak are the same share of the picture at four sizes",
             "A width in pixels, or a fixed number of levels, is another share of the picture at "
             "each size.",
+            limit={"radius": 0.1, "peak": 0.2},
         ),
         Law(
             "finite",
             _finite,
-            0.0,
             "NaN and infinity of a pixel do not reach others",
             "NaN and infinity spread through every average; a pass that reads them must replace "
             "them first.",
@@ -444,10 +432,10 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "reference",
             _reference,
-            1e-3,
             "each framebuffer is that of the reference, as a share of its largest value",
             "The reference computes something else, rounds differently, or reads other pixels at "
             "the border.",
+            limit=1e-3,
             applies=lambda subject: bool(subject.reference),
         ),
     )
