@@ -45,14 +45,17 @@ def _recoloured(image: Array, target: Array) -> float:
     brightness, contrast, gamma, white balance and saturation: Finlayson et al., "Color Correction
     Using Root-Polynomial Regression", IEEE Transactions on Image Processing 24(5), 2015.
     """
-    roots = np.sqrt(np.maximum(image.reshape(-1, 3), 0))
+    # Saturated pixels are not compared: there both are equal, whatever the colours were.
+    is_saturated = (target >= 1).any(axis=-1) & (target == image).all(axis=-1)
+    image, target = image[~is_saturated], target[~is_saturated]
+    roots = np.sqrt(np.maximum(image, 0))
     red, green, blue = roots.T
     products = (red * green, green * blue, blue * red)
     powers = (roots**power for power in range(1, 5))
     terms = np.column_stack([np.ones(len(roots)), *powers, *products])
     step = -(-len(terms) // _PIXELS)
-    weights = np.linalg.lstsq(terms[::step], target.reshape(-1, 3)[::step], rcond=None)[0]
-    return float(np.linalg.norm(terms @ weights - target.reshape(-1, 3)))
+    weights = np.linalg.lstsq(terms[::step], target[::step], rcond=None)[0]
+    return float(np.linalg.norm(terms @ weights - target))
 
 
 def likely_cause(
