@@ -19,6 +19,9 @@ _BLACK = 1e-6
 # The smallest alpha and the smallest light that 8 bits can hold.
 _LEAST = 1 / 255
 
+# Light that no display with 8 bits shows.
+_LEVEL = 1 / 255
+
 __all__ = [
     "brightest_of",
     "darkening",
@@ -126,9 +129,17 @@ def notes(frames: Frames, image: NDArray[Any]) -> Iterator[str]:
 
 
 def empty_stages(frames: Frames, settings: Settings) -> Iterator[str]:
-    """Yield a text for each stage of glare whose threshold leaves nothing."""
+    """Yield a text for each stage of glare whose threshold leaves nothing, or nothing visible."""
     for name, stage in _stages(settings):
-        if name in frames and not frames[name][:, :, :3].any():
+        if name not in frames:
+            continue
+        light = float(np.nan_to_num(frames[name][:, :, :3]).max(initial=0)) * stage.intensity
+        if 0 < light * 2**settings.exposure < _LEVEL:
+            yield (
+                f"{name} adds at most {light:.2g}, less than a level of 8 bits: little is above "
+                f"its threshold {stage.threshold:g}; use a lower one or a higher intensity"
+            )
+        elif not light and stage.intensity:
             halved = f" after {stage.halvings} halvings" * bool(stage.halvings)
             hint = ", in which small highlights vanish; use fewer" * bool(stage.halvings)
             yield (

@@ -419,6 +419,7 @@ def test_no_bloom_is_noted(tmp_path: Path, words: list[str], said: str | None) -
         ),
         ("streaks:threshold=2,halvings=0+ghosts", "streaks is zero everywhere: no value is"),
         ("streaks+streaks:threshold=0.5,halvings=2", "streaks_1 is zero everywhere"),
+        ("streaks:threshold=0.1,halvings=0,intensity=0.0001", "streaks adds at most "),
         ("streaks:threshold=0.5,halvings=0", None),
         ("streaks:halvings=3", None),
     ],

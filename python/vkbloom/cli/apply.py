@@ -130,10 +130,10 @@ def command(
 
     Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
     with Rec. 709 colours. Files of floats are linear. OUT has the number type of IN, or the closest
-    one of its format. Integers are encoded to sRGB and clipped to 0..1. Floats (as in OpenEXR and
-    Radiance HDR) are written linear. Alpha does not change, unless --alpha is given. OUT is
-    replaced when the new file is complete. Of several images, those that fail are listed at the
-    end, and the exit status is 1. See docs/command-line.md.
+    one of its format. Integers are encoded to sRGB and clipped to 0..1; colours above 1 keep their
+    hue. Floats (as in OpenEXR and Radiance HDR) are written linear. Alpha does not change, unless
+    --alpha is given. OUT is replaced when the new file is complete. Of several images, those that
+    fail are listed at the end, and the exit status is 1. See docs/command-line.md.
     """
     options = Options(**given)
     inputs, target = _arguments(sources, out)

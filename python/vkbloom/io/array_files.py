@@ -206,8 +206,9 @@ def write(
         another name. An existing file is replaced when the new one is complete.
     array : ndarray, shape (H, W), (H, W, 1), (H, W, 2), (H, W, 3) or (H, W, 4)
         Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written unchanged. Floats are
-        linear light: encoded and clipped to 0..1 in files of integers (PNG, JPEG, ...), unchanged
-        in files of floats (OpenEXR, Radiance HDR, TIFF).
+        linear light: encoded in files of integers (PNG, JPEG, ...), unchanged in files of floats
+        (OpenEXR, Radiance HDR, TIFF). Files of integers end at 1: colours with a component above 1
+        are divided by their largest component, which keeps their hue; negative ones become 0.
     encoding : {"srgb", "gamma22", "linear", "pq", "hlg", "none"}, optional
         The curve of the file's colours, for floats. Default: "srgb" for files of integers and
         "linear" for files of floats. "pq" and "hlg" are those of Rec. ITU-R BT.2100, with 203
@@ -286,7 +287,7 @@ def write(
         picture = Picture.of_values(values, numbers, None, _typed(oiio, metadata or {}))
         if is_float:
             curve = encoding or ("srgb" if is_integer else "linear")
-            values, what = displayed.converted(oiio, values, saved, curve)
+            values, what = displayed.converted(oiio, values, saved, curve, is_integer=is_integer)
             picture = described_as(oiio, picture, target, what)
         put(
             oiio,

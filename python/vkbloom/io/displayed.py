@@ -29,6 +29,7 @@ __all__ = [
     "has_hdr_curve",
     "is_hdr",
     "of_code_points",
+    "scaled_to_1",
     "with_names",
 ]
 
@@ -56,6 +57,8 @@ _READ_CURVES: Final = {
 }
 # Curves that readers know or assume without code points.
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
+# Curves whose values end at 1 in files of integers.
+_ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
 _CHROMATICITIES: Final = {
     "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
@@ -115,11 +118,12 @@ def is_hdr(saved: Saved) -> bool:
 
 
 def converted(
-    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str
+    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
 ) -> tuple[NDArray[Any], tuple[str, str] | str]:
     """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
 
     - `curve`: That of `saved`, or the file's own.
+    - `is_integer`: Whether the file ends at 1, so that colours above it are `scaled_to_1`.
     - Returns: The values, and their primaries and curve or their display. With the curve "none"
       values do not change.
     """
@@ -131,7 +135,26 @@ def converted(
         return _with_colours(values, made), display
     if curve != "none" and saved.primaries != "rec709":
         values = _between(oiio, values, "rec709", saved.primaries).astype(values.dtype)
+    if is_integer and curve in _ENDING_AT_1:
+        values = scaled_to_1(values)
     return encoded(values, curve), (saved.primaries, curve)
+
+
+def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
+    """Return linear floats (H, W, C), colours with a component above 1 divided by the largest one.
+
+    A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
+    problem", IEEE Transactions on Image Processing 12(12), 2003. A clip of each component makes
+    bright orange yellow, and cream white.
+    """
+    count = values.shape[2] - (values.shape[2] in (2, 4))
+    peak = values[:, :, :count].max(axis=2, keepdims=True)
+    is_over = np.isfinite(peak) & (peak > 1)
+    if not is_over.any():
+        return values
+    made = values.copy()
+    made[:, :, :count] /= np.where(is_over, peak, values.dtype.type(1))
+    return made
 
 
 def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:

@@ -201,7 +201,7 @@ def prepared(
         if saved.view is not None and not integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
         curve = saved.curve or ("srgb" if integer else "linear")
-        values, what = displayed.converted(oiio, values, saved, curve)
+        values, what = displayed.converted(oiio, values, saved, curve, is_integer=integer)
     try:
         described = described_as(oiio, picture, target, what)
     except ValueError as error:
