@@ -102,8 +102,9 @@ def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
     for extreme in (near.max(axis=-1, keepdims=True), near.min(axis=-1, keepdims=True)):
         least = rounding * (1 + 10 * np.abs(extreme))
         near = np.where(np.abs(near - extreme) <= least, extreme, near)
-    result = saturated(rgb + (near - values), saturation)
-    return result + (saturated(values, value_of(saturation)) - value_of(result))
+    result: Array = saturated(rgb + (near - values), saturation)
+    result = result + (saturated(values, value_of(saturation)) - value_of(result))
+    return result
 
 
 def _means(image: Array, factor: int) -> Array:
@@ -172,12 +173,14 @@ def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
 def _smooth_min(values: Array, end: float, width: float) -> Array:
     """Return min(value, end) - h^2 width / 4 with h = max(1 - |value - end| / width, 0).
 
-    The quadratic smooth minimum of Inigo Quilez, "Smooth minimum".
+    The quadratic smooth minimum of Inigo Quilez, "Smooth minimum". Where h is above 0, this is a
+    parabola, which has no kink at the end.
     """
     smaller: Array = np.minimum(values, end)
     if width > 0:
-        h = np.maximum(width - np.abs(values - end), 0) / width
-        smaller = smaller - h * h * width / 4
+        beyond = values - end
+        parabola = (values + end) / 2 - width / 4 - beyond * beyond / (4 * width)
+        smaller = np.where(np.abs(beyond) < width, parabola, smaller)
     return smaller
 
 
