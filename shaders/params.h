@@ -208,10 +208,12 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel.
+// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its adjoint
+// are equal where they differ by no more than the rounding.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
+    INPUT(B, float, rounding) \
     VEC4S(B, factors, 1)
 
 // Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows from

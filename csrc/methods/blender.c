@@ -327,9 +327,13 @@ static bool add_end(const struct glare *glare, uint32_t light, uint32_t *bloom,
         return false;
     struct vkb_pass_row row =
         vkb_fetching_row(&glare->levels, &vkb_shader_blender_end_frag, light, *bloom);
+    const int type = glare->settings->choices[VKB_CHOICE_type];
+    const bool convolved = type == TYPE_FOG_GLOW || type == TYPE_KERNEL;
     row.block = VKB_BLOCK_blender_end;
     row.params.blender_end = (struct vkb_blender_end_params){
         .saturation = glare->settings->values.saturation,
+        // Transforms round each channel differently (reference/blender.py).
+        .rounding = convolved ? 1e-6f : 0.0f,
         .factors = {{
             (float)(glare->gain * tint[0]),
             (float)(glare->gain * tint[1]),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
 
     from vkbloom import _core
@@ -16,8 +19,8 @@ class Image:
     """A copy of an image on a renderer's device, made by `Renderer.upload`.
 
     The renderer that made it accepts it in place of an image, in `apply`, `apply_many`,
-    `apply_each`, `plan` and `grid`. Its pixels are uploaded once and are not compared with other
-    images. Its memory is released when this object is collected or the renderer is closed.
+    `apply_each`, `vjp`, `plan` and `grid`. Its pixels are uploaded once and are not compared with
+    other images. Its memory is released when this object is collected or the renderer is closed.
 
     Attributes
     ----------
@@ -45,22 +48,22 @@ class Image:
     0.0
     """
 
-    __slots__ = ("__weakref__", "_source", "dtype", "emission", "mask", "shape")
+    __slots__ = ("__weakref__", "_inputs", "_source", "dtype", "emission", "mask", "shape")
 
     def __init__(
         self,
         source: _core.Source,
         shape: tuple[int, int, int],
         dtype: np.dtype[Any],
-        *,
-        mask: bool = False,
-        emission: bool = False,
+        inputs: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self._source = source
         self.shape = shape
         self.dtype = dtype
-        self.mask = mask
-        self.emission = emission
+        self.mask = "mask" in inputs
+        self.emission = "emission" in inputs
+        # Mask and emission, and of an image of CUDA its copy. They do not change.
+        self._inputs = inputs
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("an Image cannot be copied or pickled; it is on one renderer's device")

@@ -25,6 +25,7 @@ from vkbloom.kept_arrays import KeptArrays, shared
 from vkbloom.settings import Settings, Shading, check_settings, check_shading
 from vkbloom.sources import (
     batch_sources,
+    checked_inputs,
     image_kind,
     image_source,
     is_image,
@@ -547,7 +548,7 @@ class Renderer:
 
     def vjp(
         self,
-        image: NDArray[Any],
+        image: NDArray[Any] | Image,
         settings: Settings | None = None,
         *,
         mask: NDArray[Any] | None = None,
@@ -580,8 +581,8 @@ class Renderer:
         Raises
         ------
         ValueError, TypeError
-            As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
-            which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
+            As for `apply`; or the method was loaded from a file of passes, which has no
+            derivative. From `pullback`: there is no such framebuffer, or a cotangent
             has another shape or dtype, or is not finite. Its result raises ValueError for names
             that have no derivative, such as "levels".
         OutOfMemoryError, DeviceLostError, ValidationError, Error
@@ -796,23 +797,20 @@ class Renderer:
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
-        source = image_source(image, mask, emission, self._core)
+        inputs = checked_inputs(image, mask, emission, self._core)
+        source = inputs.source()
         shape, dtype = source.kind
         if source.exported:
             # It is a copy already, but for what is on the host.
-            mask, emission = (
-                one if one is None or on_cuda(one) else np.array(one) for one in (mask, emission)
-            )
-            source = image_source(image, mask, emission, self._core)
-        else:
-            source = self._core.upload(source, None, False)
-        return Image(
-            source,
-            shape,
-            np.dtype(dtype),
-            mask=mask is not None,
-            emission=emission is not None,
-        )
+            inputs = inputs.kept()
+            return Image(inputs.source(), shape, np.dtype(dtype), inputs.named())
+        uploaded = self._core.upload(source, None, False)
+        # `vjp` reads the pixels of the image from the device.
+        named = inputs.named()
+        beside: dict[str, Any] = {
+            name: np.array(named[name]) for name in ("mask", "emission") if name in named
+        }
+        return Image(uploaded, shape, np.dtype(dtype), beside)
 
     @checked
     def render_many(

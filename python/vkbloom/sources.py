@@ -12,7 +12,7 @@ from vkbloom.image import Image
 from vkbloom.settings import check_shading
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     import numpy as np
     from numpy.typing import NDArray
@@ -31,6 +31,7 @@ __all__ = [
     "scene_arguments",
     "scene_source",
     "take_batch",
+    "uploaded_inputs",
 ]
 
 
@@ -124,6 +125,12 @@ def image_source(
                 )
         return image._source
     return checked_inputs(image, mask, emission, core, name, waits=waits).source()
+
+
+def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:
+    """Return an uploaded image with its mask and emission; `pixels` reads it from the device."""
+    given = image._inputs
+    return Inputs(**given) if "image" in given else Inputs(pixels(), **given)
 
 
 def take_batch(images: Any, core: _core.Renderer) -> Taken:

@@ -16,24 +16,13 @@ Examples
 
 from __future__ import annotations
 
-import functools
-import threading
-import weakref
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, cast
+from typing import Any
 
-import numpy as np
-
-from vkbloom.checks import check_mask, import_extra
-from vkbloom.core_access import core_of
-from vkbloom.device_arrays import DeviceArray, merged, take
-from vkbloom.gradients import pull_each, pullback_of
-from vkbloom.reference import apply as reference_apply
-from vkbloom.reference import vjp as reference_vjp
-from vkbloom.reference.derivatives import check_cotangents, differentiable
+from vkbloom.checks import import_extra
+from vkbloom.gradients.operators import number_of, replaced, text_of
+from vkbloom.reference.derivatives import differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
-from vkbloom.sources import Inputs, checked_inputs
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
@@ -156,7 +145,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         super().__init__()
         self._start = check_settings(settings, of_image=True)
         self._names = (learn,) if isinstance(learn, str) else tuple(learn)
-        self._renderer = renderer
+        self._renderer = _check_renderer(renderer)
         self._channels_first = channels_first
         known = differentiable(self._start)
         for name in self._names:
@@ -165,6 +154,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
                     f"learn: {name!r} of the method {self._start.method} has no derivative; those "
                     f"with one are {', '.join(known)}"
                 )
+        self._ranges = {name: field_info(self._start, name).range for name in self._names}
         # The names of parameters have no dots.
         self.learned = torch.nn.ParameterDict(
             {name.replace(".", "_"): torch.tensor(known[name]) for name in self._names}
@@ -173,7 +163,8 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     @property
     def settings(self) -> Settings:
         """The settings with what was learned."""
-        return _replaced(self._start, dict(zip(self._names, self._values(), strict=True)))
+        values = [_held(self._parameter(name), self._ranges[name]) for name in self._names]
+        return replaced(self._start, dict(zip(self._names, values, strict=True)))
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
@@ -188,14 +179,34 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
             channels_first=self._channels_first,
         )
 
+    def _parameter(self, name: str) -> Any:
+        return self.learned[name.replace(".", "_")]
+
     def _values(self) -> list[Any]:
         """Return the parameters, moved into the ranges of their fields."""
-        parameters = [self.learned[name.replace(".", "_")] for name in self._names]
+        parameters = [self._parameter(name) for name in self._names]
         with torch.no_grad():
             for name, parameter in zip(self._names, parameters, strict=True):
-                if (ends := field_info(self._start, name).range) is not None:
-                    parameter.clamp_(*ends)
+                held = _held(parameter, self._ranges[name])
+                # A write, also of an equal value, makes what earlier calls have saved unusable.
+                # (Compiled code saves copies, and cannot depend on values.)
+                if torch.compiler.is_compiling() or not torch.equal(held, parameter):
+                    parameter.copy_(held)
         return parameters
+
+
+def _held(value: Any, ends: tuple[float, float] | None) -> Any:
+    """Return a value, or the nearest end of its range."""
+    return value.detach() if ends is None else value.detach().clamp(*ends)
+
+
+def _check_renderer(renderer: object) -> Renderer | None:
+    if renderer is None or isinstance(renderer, Renderer):
+        return renderer
+    raise TypeError(
+        f"renderer: {renderer!r} is not a Renderer; give an open one, such as "
+        "vkbloom.Renderer('software')"
+    )
 
 
 def _call(
@@ -210,9 +221,10 @@ def _call(
 ) -> Any:
     """Run the operator; `values` are tensors of fields."""
     for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
-        if tensor is not None and not isinstance(tensor, torch.Tensor):
+        if not isinstance(tensor, torch.Tensor) and (tensor is not None or name == "image"):
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
     _check(image, mask, emission, channels_first)
+    _check_renderer(renderer)
     if channels_first:
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
@@ -222,8 +234,8 @@ def _call(
         emission,
         [*values.values()],
         ",".join(values),
-        _text(settings),
-        _number(renderer),
+        text_of(settings),
+        number_of(renderer),
     )
     return final.movedim(-1, -3) if channels_first else final
 
@@ -237,6 +249,8 @@ def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
         if len(shape) >= 3 and shape[-1 if channels_first else -3] in (3, 4):
             text += f"; give channels_first={not channels_first}"
         raise ValueError(text)
+    if 0 in shape[-3:]:
+        raise ValueError(f"image: the shape {shape} is not {order} with sides of at least 1")
     if not image.is_floating_point():
         raise TypeError(f"image: {image.dtype} has no derivative; give floats of linear light")
     if image.dtype == torch.bfloat16:
@@ -255,293 +269,3 @@ def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
     for name, tensor in (("mask", mask), ("emission", emission)):
         if tensor is not None and tensor.device != image.device:
             raise ValueError(f"{name}: its device {tensor.device} is not the image's")
-
-
-@functools.lru_cache(64)
-def _text(settings: Settings) -> str:
-    """Return settings as the text that an operator can take."""
-    return settings.to_json()
-
-
-@functools.lru_cache(64)
-def _settings(text: str) -> Settings:
-    return Settings.from_json(text)
-
-
-@functools.lru_cache(64)
-def _in_floats(text: str) -> Settings:
-    """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
-    return _settings(text).replace(format="rgba32float")
-
-
-def _replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
-    """Return settings with the values of tensors."""
-    return settings.replace(
-        **{name: _field_value(value.detach().cpu().tolist()) for name, value in values.items()}
-    )
-
-
-def _field_value(value: Any) -> Any:
-    return tuple(map(_field_value, value)) if isinstance(value, list) else value
-
-
-#: Renderers by the number that the operator takes; `_OWN` is the one of this module.
-_RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
-_OWN: Final = 0
-_opening: Final = threading.Lock()
-
-
-@functools.cache
-def _own_renderer() -> Renderer:
-    return Renderer()
-
-
-@functools.cache
-def _renderer_on(index: int) -> Renderer:
-    """Return this module's renderer on the GPU with PyTorch's number."""
-    return Renderer(f"uuid:{torch.cuda.get_device_properties(index).uuid}")
-
-
-def _renderer(number: int, image: Any = None) -> Renderer:
-    """Return the renderer with that number; for tensors of CUDA, this module's is on their GPU."""
-    if number != _OWN:
-        return _RENDERERS[number]
-    with _opening:
-        return _own_renderer() if image is None else _renderer_on(image.device.index)
-
-
-def _number(renderer: Renderer | None) -> int:
-    if renderer is None:
-        return _OWN
-    _RENDERERS[id(renderer)] = renderer
-    return id(renderer)
-
-
-def _each(  # noqa: PLR0917
-    image: Any, mask: Any, emission: Any, values: Sequence[Any], names: str, text: str
-) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
-    """Yield the index, the arrays and the settings of each image of a batch."""
-    given = {"image": image, "mask": mask, "emission": emission}
-    arrays = {
-        name: part.detach().cpu().contiguous().numpy()
-        for name, part in given.items()
-        if part is not None
-    }
-    settings = _replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
-    for index in np.ndindex(tuple(image.shape[:-3])):
-        yield index, {name: part[index] for name, part in arrays.items()}, settings
-
-
-def _split(names: str) -> list[str]:
-    return names.split(",") if names else []
-
-
-def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
-    """Return the derivatives: of the reference for float64, else of the renderer."""
-    if arrays["image"].dtype == np.float64:
-        return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
-    pullback = pullback_of(_renderer(renderer), checked_inputs(**arrays), settings)
-    return pullback(check_cotangents({"final": cotangent}, {"final": cotangent}))
-
-
-def _pulled_on_device(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    settings: Settings,
-    number: int,
-) -> Iterator[Any]:
-    """Yield the derivatives of each image, with those by images as tensors of the GPU."""
-    renderer = _renderer(number, image)
-    core = core_of(renderer)
-    masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
-    images, emissions, cotangents = (
-        None if one is None else take(_batch(one), name, core, (4,))
-        for name, one in (("image", image), ("emission", emission), ("cotangent", cotangent))
-    )
-    assert images
-    assert cotangents
-    sequence = (
-        (
-            Inputs(
-                images.at(index),
-                emissions.at(index) if emissions else None,
-                None if masks is None else check_mask(masks[index], masks.shape[1:]),
-            ),
-            {"final": cotangents.at(index)},
-        )
-        for index in range(images.shape[0])
-    )
-    yield from pull_each(renderer, settings, sequence, "cuda")
-
-
-def _batch(tensor: Any) -> Any:
-    return tensor.detach().reshape(-1, *tensor.shape[-3:])
-
-
-def _operator(name: str, parameters: str, result: str) -> Any:
-    """Declare an operator, whose types PyTorch cannot read from annotations of `Any`."""
-    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor[] values, "
-    schema += f"str names, str settings, int renderer) -> {result}"
-    return torch.library.custom_op(name, mutates_args=(), schema=schema)
-
-
-@_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]
-def _bloom(  # noqa: PLR0917
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    settings: str,
-    renderer: int,
-) -> Any:
-    if image.is_cuda and image.dtype != torch.float64:
-        return _on_device(image, mask, emission, values, names, settings, renderer)
-    final = np.empty(image.shape, _dtype(image))
-    for index, arrays, one in _each(image, mask, emission, values, names, settings):
-        given = dict(arrays)
-        pixels = given.pop("image")
-        if pixels.dtype == np.float64:
-            final[index] = reference_apply(pixels, one, **given)["final"]
-        else:
-            frames = _renderer(renderer).apply(
-                pixels, one.replace(format="rgba32float"), attachments="final", **given
-            )
-            final[index] = frames["final"]
-    return torch.from_numpy(final).to(image.device)
-
-
-def _on_device(  # noqa: PLR0917
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    text: str,
-    number: int,
-) -> Any:
-    """Run the operator without the host; a batch without masks changes the context once."""
-    settings = _in_floats(text)
-    if names:
-        settings = _replaced(settings, dict(zip(_split(names), values, strict=True)))
-    renderer = _renderer(number, image)
-    images = _batch(image)
-    if mask is None and emission is None and len(images) > 1:
-        frames = renderer.apply_each(images, settings, attachments="final")
-    else:
-        masks, emissions = (
-            [None] * len(images) if one is None else one.detach().reshape(-1, *one.shape[-sides:])
-            for one, sides in ((mask, 2), (emission, 3))
-        )
-        frames = (
-            renderer.apply(one, settings, mask=masks[i], emission=emissions[i], attachments="final")
-            for i, one in enumerate(images)
-        )
-    # The images of a batch are in the same memory.
-    batches = merged([cast("DeviceArray", one["final"]) for one in frames])
-    return _joined([torch.from_dlpack(one) for one in batches], image, torch.cat)
-
-
-def _dtype(tensor: Any) -> Any:
-    return torch.empty(0, dtype=tensor.dtype).numpy().dtype
-
-
-@_bloom.register_fake  # type: ignore[untyped-decorator]
-def _(  # noqa: PLR0917
-    image: Any, mask: Any, emission: Any, values: Any, names: str, settings: str, renderer: int
-) -> Any:
-    return torch.empty(image.shape, dtype=image.dtype, device=image.device)
-
-
-@_operator("vkbloom::bloom_backward", "Tensor cotangent, ", "Tensor[]")  # type: ignore[untyped-decorator]
-def _backward(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    settings: str,
-    renderer: int,
-) -> list[Any]:
-    """Return the derivatives by the image, those of mask and emission that are there, and values.
-
-    Of a batch, the derivatives by values are added.
-    """
-    inputs = {"image": image, "mask": mask, "emission": emission}
-    images = {name: part for name, part in inputs.items() if part is not None}
-    fields = dict(zip(_split(names), values, strict=True))
-    found: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
-    on_device = image.is_cuda and image.dtype != torch.float64
-    if on_device:
-        one = _replaced(_settings(settings), fields)
-        pulled = _pulled_on_device(cotangent, image, mask, emission, one, renderer)
-    else:
-        wanted = cotangent.detach().cpu().numpy()
-        pulled = (
-            _pulled(arrays, one, renderer, wanted[index])
-            for index, arrays, one in _each(image, mask, emission, values, names, settings)
-        )
-    for gradients in pulled:
-        for name, parts in found.items():
-            parts.append(_as_tensor(gradients[name]))
-    return [
-        *(_joined(found[name], part) for name, part in images.items()),
-        *(sum(found[name], torch.zeros(part.shape)).to(part) for name, part in fields.items()),
-    ]
-
-
-def _as_tensor(part: Any) -> Any:
-    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact."""
-    if isinstance(part, DeviceArray):
-        return torch.from_dlpack(part)
-    return torch.from_numpy(np.array(part, np.float64))
-
-
-def _joined(parts: list[Any], like: Any, join: Any = None) -> Any:
-    """Return images, or with `join` batches, as a tensor of the kind of another one."""
-    if not parts:
-        return like.new_zeros(like.shape)
-    joined = parts[0] if len(parts) == 1 else (join or torch.stack)(parts)
-    return joined.reshape(like.shape).to(like).contiguous()
-
-
-@_backward.register_fake  # type: ignore[untyped-decorator]
-def _(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Any,
-    names: str,
-    settings: str,
-    renderer: int,
-) -> Any:
-    parts = [part for part in (image, mask, emission, *values) if part is not None]
-    return [torch.empty(part.shape, dtype=part.dtype, device=part.device) for part in parts]
-
-
-def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
-    image, mask, emission, values, *ctx.texts = inputs
-    ctx.given = [part is not None for part in (image, mask, emission)]
-    ctx.save_for_backward(*(part for part in (image, mask, emission) if part is not None), *values)
-
-
-def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
-    saved = iter(ctx.saved_tensors)
-    inputs = [next(saved) if given else None for given in ctx.given]
-    found = iter(torch.ops.vkbloom.bloom_backward(cotangent, *inputs, [*saved], *ctx.texts))
-    return *(next(found) if given else None for given in ctx.given), [*found], None, None, None
-
-
-def _refuse(ctx: Any, *cotangents: Any) -> Any:
-    raise RuntimeError(
-        "vkbloom::bloom: its second derivative is not implemented; the first is exact, so compute "
-        "without create_graph=True"
-    )
-
-
-_bloom.register_autograd(_back, setup_context=_keep)
-_backward.register_autograd(_refuse)

@@ -80,7 +80,7 @@ vec4 by_scene(Pixel p)
     if (COMPOSITE == COMPOSITE_SCREEN)
         colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
-        colour *= vec3(greaterThan(p.scene.rgb, vec3(0.0)));
+        colour *= 0.5 + 0.5 * sign(p.scene.rgb);
     return vec4(colour, p.brought.a * alpha_slope(p));
 }
 

@@ -61,12 +61,13 @@ vec3 back_through_tonemap(vec3 c, vec3 brought, int tonemap)
     if (tonemap == TONEMAP_NONE)
         return brought;
     c = clamp(c, -1e30, 1e30);
+    // Where the result is infinite, the derivative is 0.
     if (tonemap == TONEMAP_REINHARD)
-        return brought / (c + 1.0) / (c + 1.0);
+        return mix(vec3(0.0), brought / (c + 1.0) / (c + 1.0), notEqual(c, vec3(-1.0)));
     if (tonemap == TONEMAP_ACES)
         return back_aces(clamp(c, -65504.0, 65504.0), brought);
     if (tonemap == TONEMAP_EXPONENTIAL)
-        return brought * exp(-c);
+        return mix(vec3(0.0), brought * exp(-c), greaterThan(c, vec3(-88.0)));
     if (tonemap == TONEMAP_KHRONOS_NEUTRAL)
         return back_khronos_neutral(c, brought);
     return back_agx(c, brought);
@@ -93,9 +94,10 @@ vec3 hlg_slope(vec3 c)
 {
     const float A = 0.17883277, B = 0.28466892, WHITE = 0.26496;
     vec3 e = WHITE * c, held = clamp(e, 0.0, 1.0);
-    vec3 slope = mix(1.5 / sqrt(3.0 * held), 12.0 * A / (12.0 * max(held, 1.0 / 12.0) - B),
+    vec3 slope = mix(sqrt(3.0) * power_slope(held, 0.5),
+                     12.0 * A / (12.0 * max(held, 1.0 / 12.0) - B),
                      greaterThan(held, vec3(1.0 / 12.0)));
-    return WHITE * mix(vec3(0.0), slope, greaterThan(inside(e, 0.0, 1.0), vec3(0.5)));
+    return WHITE * slope * inside(e, 0.0, 1.0);
 }
 
 // The derivatives by each channel.

@@ -266,8 +266,11 @@ vec4 back_highlights(vec4 value, vec4 brought)
     if (brightest <= 0.0)
         return vec4(0.0);
     float kept = max(above, 0.0) + rounding(above, at_low);
-    float slope = float(kept < range) - rounding_slope(kept - range, at_high);
-    slope *= float(above > 0.0) + rounding_slope(above, at_low);
+    // In the middle of a transition, both sides have the slope 1/2.
+    float slope = kept == range && at_high > 0.0
+                    ? 0.5
+                    : float(kept < range) - rounding_slope(kept - range, at_high);
+    slope *= above == 0.0 && at_low > 0.0 ? 0.5 : float(above > 0.0) + rounding_slope(above, at_low);
     float factor = highlight(brightest) / brightest;
     float by_brightest = dot(brought, value) * (slope - factor) / brightest;
     return factor * brought + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);

@@ -9,23 +9,29 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.conftest import ADAPTER
+from tests.exhaustive import EXHAUSTIVE
+from tests.processes import output
 from vkbloom import Renderer
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 
 from vkbloom import torch as vkbloom_torch  # noqa: E402
+from vkbloom.gradients import operators  # noqa: E402
 
+#: Tensors are on the GPU where the tests run on one.
+DEVICE = "cuda" if ADAPTER == "hardware" and torch.cuda.is_available() else "cpu"
 SETTINGS = vkbloom.Pyramid(levels=2, threshold=0.4, knee=0.5, intensity=0.7)
 
 
 def tensor(*shape: int, dtype: Any = None, seed: int = 1, requires_grad: bool = True) -> Any:
     random = torch.Generator().manual_seed(seed)
     found = torch.rand(shape, generator=random, dtype=dtype or torch.float32)
-    return found.requires_grad_(requires_grad)
+    return found.to(DEVICE).requires_grad_(requires_grad)
 
 
 def arguments(dtype: Any, settings: Any = SETTINGS) -> tuple[Any, ...]:
-    value = torch.tensor(0.7, dtype=dtype, requires_grad=True)
+    value = torch.tensor(0.7, dtype=dtype, device=DEVICE, requires_grad=True)
     image, emission = (tensor(4, 5, 3, dtype=dtype, seed=seed) for seed in (1, 2))
     mask = tensor(4, 5, dtype=dtype, seed=3).detach() * 0.8 + 0.1
     return image, mask.requires_grad_(), emission, [value], "intensity", settings.to_json(), 0
@@ -35,8 +41,8 @@ def test_result_is_that_of_the_renderer(renderer: Renderer) -> None:
     image = tensor(2, 7, 9, 3, requires_grad=False)
     final = vkbloom_torch.bloom(image, SETTINGS, renderer=renderer)
     for one, expected in zip(final, image, strict=True):
-        frames = renderer.apply(expected.numpy(), SETTINGS)
-        assert np.array_equal(one.numpy(), frames["final"])
+        frames = renderer.apply(expected.cpu().numpy(), SETTINGS)
+        assert np.array_equal(one.cpu().numpy(), frames["final"])
     first = vkbloom_torch.bloom(
         image.movedim(-1, -3), SETTINGS, renderer=renderer, channels_first=True
     )
@@ -49,9 +55,9 @@ def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:
     (module(image) * cotangent).sum().backward()
     totals = {"intensity": 0.0, "threshold": 0.0}
     for index in range(2):
-        _, pullback = renderer.vjp(image[index].detach().numpy(), SETTINGS)
-        found = pullback({"final": cotangent[index].numpy()})
-        assert np.allclose(image.grad[index].numpy(), found["image"], rtol=0, atol=1e-6)
+        _, pullback = renderer.vjp(image[index].detach().cpu().numpy(), SETTINGS)
+        found = pullback({"final": cotangent[index].cpu().numpy()})
+        assert np.allclose(image.grad[index].cpu().numpy(), found["image"], rtol=0, atol=1e-6)
         totals = {name: total + float(found[name]) for name, total in totals.items()}
     for name, total in totals.items():
         assert abs(module.learned[name].grad.item() - total) <= 1e-5 * abs(total)
@@ -111,6 +117,54 @@ def test_field_is_learned_and_nothing_grows(renderer: Renderer) -> None:
     assert counts[1] - counts[0] < 50
 
 
+def test_training_accumulates_two_losses_of_two_images(renderer: Renderer) -> None:
+    """Calls before one backward keep what they have saved, also if settings are read between."""
+    steps = 200 if EXHAUSTIVE or DEVICE == "cuda" else 12
+    images = [tensor(8, 8, 3, seed=seed, requires_grad=False) for seed in (1, 2, 3, 4)]
+    targets = [vkbloom_torch.bloom(image, SETTINGS, renderer=renderer) for image in images]
+    module = vkbloom_torch.Bloom(
+        SETTINGS.replace(intensity=0.1, threshold=0.2),
+        learn=("intensity", "threshold", "knee"),
+        renderer=renderer,
+    ).to(DEVICE)
+    optimizer = torch.optim.Adam(module.parameters(), lr=0.02)
+    losses = []
+    for _ in range(steps):
+        optimizer.zero_grad()
+        total = 0.0
+        for part in (slice(0, 2), slice(2, 4)):
+            finals = [module(image) for image in images[part]]
+            assert module.settings.intensity >= 0
+            near = sum((f - t).square().mean() for f, t in zip(finals, targets[part], strict=True))
+            (near + 0.1 * (finals[0] - targets[part][0]).abs().mean()).backward()
+            total += float(near.detach())
+        losses.append(total)
+        optimizer.step()
+    assert losses[-1] < (1e-3 if steps == 200 else 0.8) * losses[0]
+
+
+def test_derivatives_by_parameters_are_those_of_separate_calls(renderer: Renderer) -> None:
+    fields = ("intensity", "knee", "glare.0.threshold")
+    settings = SETTINGS.replace(knee=0.0, glare=(vkbloom.Streaks(threshold=0.1),))
+    module = vkbloom_torch.Bloom(settings, learn=fields, renderer=renderer).to(DEVICE)
+    images = [tensor(6, 5, 3, seed=seed, requires_grad=False) for seed in (1, 2)]
+
+    def pulled(*parts: Any) -> Any:
+        module.zero_grad()
+        sum(module(image).square().sum() for image in parts).backward()
+        return torch.stack([parameter.grad for parameter in module.parameters()])
+
+    assert torch.allclose(pulled(*images), pulled(images[0]) + pulled(images[1]), rtol=1e-5)
+
+
+def test_fields_pass_gradcheck() -> None:
+    fields = ("intensity", "exposure", "threshold", "knee", "level_weights")
+    settings = SETTINGS.replace(level_weights=(0.5, 0.5), exposure=0.1)
+    module = vkbloom_torch.Bloom(settings, learn=fields).double().to(DEVICE)
+    image = tensor(4, 5, 3, dtype=torch.float64)
+    torch.autograd.gradcheck(lambda image, *_: module(image), (image, *module.parameters()))
+
+
 def test_parameters_return_to_their_ranges(renderer: Renderer) -> None:
     module = vkbloom_torch.Bloom(SETTINGS, learn=("knee",), renderer=renderer)
     with torch.no_grad():
@@ -130,7 +184,151 @@ def test_wrong_arguments_are_named(renderer: Renderer) -> None:
             vkbloom_torch.bloom(tensor(*shape), SETTINGS, channels_first=first)
     with pytest.raises(ValueError, match=r"mask: the shape \(5, 6\) is not \(6, 5\)"):
         vkbloom_torch.bloom(image, SETTINGS, mask=tensor(5, 6))
-    with pytest.raises(TypeError, match="image: a tensor is needed, not list"):
-        vkbloom_torch.bloom([0.5], SETTINGS)
+    for wrong, kind in (([0.5], "list"), (None, "NoneType")):
+        with pytest.raises(TypeError, match=f"image: a tensor is needed, not {kind}"):
+            vkbloom_torch.bloom(wrong, SETTINGS)
+    named: Any = "software"
+    with pytest.raises(TypeError, match="renderer: 'software' is not a Renderer; give an open one"):
+        vkbloom_torch.bloom(image, SETTINGS, renderer=named)
+    with pytest.raises(TypeError, match="renderer: 'software' is not a Renderer; give an open one"):
+        vkbloom_torch.Bloom(SETTINGS, renderer=named)
+    for shape in ((0, 5, 3), (2, 6, 0, 3)):
+        with pytest.raises(ValueError, match=r"image: .* with sides of at least 1"):
+            vkbloom_torch.bloom(tensor(*shape), SETTINGS)
     with pytest.raises(ValueError, match=r"emission: .* is not the image's"):
         vkbloom_torch.bloom(image, SETTINGS, emission=tensor(6, 5, 4))
+
+
+def test_an_empty_batch_is_empty(renderer: Renderer) -> None:
+    image, mask = tensor(2, 0, 4, 5, 3), tensor(2, 0, 4, 5)
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity",), renderer=renderer).to(DEVICE)
+    final = module(image, mask=mask)
+    final.sum().backward()
+    assert final.shape == image.grad.shape == image.shape
+    assert mask.grad.shape == mask.shape
+    assert module.learned["intensity"].grad == 0
+
+
+def test_a_renderer_lives_until_the_backward_pass() -> None:
+    image = tensor(4, 5, 3)
+    final = vkbloom_torch.bloom(image, SETTINGS, renderer=Renderer())
+    final.sum().backward()
+    expected, image.grad = image.grad, None
+    vkbloom_torch.bloom(image, SETTINGS).sum().backward()
+    assert torch.equal(image.grad, expected)
+
+
+def test_a_renderer_that_was_collected_is_named() -> None:
+    *given, _ = arguments(torch.float32)
+    renderer = Renderer()
+    number = operators.number_of(renderer)
+    assert torch.ops.vkbloom.bloom(*given, number).shape == (4, 5, 3)
+    del renderer
+    gc.collect()
+    with pytest.raises(ValueError, match="renderer: it was collected; keep a reference to it"):
+        torch.ops.vkbloom.bloom(*given, number)
+    with pytest.raises(ValueError, match="renderer: it was collected; keep a reference to it"):
+        torch.ops.vkbloom.bloom_backward(given[0], *given, number)
+
+
+FORKED = """
+import sys, warnings
+import torch
+from torch.utils.data import DataLoader, Dataset
+import vkbloom, vkbloom.torch
+
+class Bloomed(Dataset):
+    def __len__(self):
+        return 2
+    def __getitem__(self, index):
+        return vkbloom.torch.bloom(torch.full((4, 4, 3), index + 1.0), vkbloom.Pyramid(levels=1))
+
+warnings.simplefilter("ignore")
+images = Bloomed()
+expected = torch.stack([images[0], images[1]])
+loader = DataLoader(images, batch_size=2, num_workers=1, multiprocessing_context="fork")
+print(torch.equal(next(iter(loader)), expected), torch.equal(images[1], expected[1]))
+"""
+
+
+@pytest.mark.usefixtures("software")
+def test_a_forked_worker_opens_a_renderer_of_its_own() -> None:
+    assert output("-c", FORKED, VKBLOOM_ADAPTER="software") == "True True\n"
+
+
+def compiled(fullgraph: bool, function: Any) -> Any:
+    torch._dynamo.reset()
+    return torch.compile(function, fullgraph=fullgraph, backend="aot_eager")
+
+
+@pytest.mark.parametrize("fullgraph", [True, False])
+def test_compiled_code_has_the_settings_that_it_is_called_with(
+    renderer: Renderer, fullgraph: bool
+) -> None:
+    def of_argument(image: Any, settings: Any) -> Any:
+        return vkbloom_torch.bloom(image, settings, renderer=renderer)
+
+    def made_inside(image: Any, settings: Any) -> Any:
+        return vkbloom_torch.bloom(image, settings.replace(intensity=0.25), renderer=renderer)
+
+    image = tensor(6, 5, 3)
+    kernels = [np.random.default_rng(seed).random((3, 3)) for seed in (1, 2)]
+    cases = (
+        *(SETTINGS.replace(intensity=value) for value in (0.5, 1.0, 2.0, 0.5)),
+        vkbloom.Pyramid(levels=3),
+        SETTINGS.replace(glare=(vkbloom.Streaks(),)),
+        *(vkbloom.Convolution(psf=kernel) for kernel in kernels),
+        vkbloom.Convolution(psf=vkbloom.psf.gaussian(sigma=1.5)),
+    )
+    # (Dynamo compiles a function eight times at the most.)
+    for function, part in (
+        (of_argument, cases[:5]),
+        (of_argument, cases[5:]),
+        (made_inside, cases[:1]),
+    ):
+        run = compiled(fullgraph, function)
+        for settings in part:
+            assert torch.equal(run(image, settings), function(image, settings)), settings
+
+
+@pytest.mark.parametrize("fullgraph", [True, False])
+def test_a_compiled_module_trains(renderer: Renderer, fullgraph: bool) -> None:
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "knee"), renderer=renderer)
+    module = module.to(DEVICE)
+    images = [tensor(6, 5, 3, seed=seed) for seed in (1, 2)]
+    found = []
+    for call in (compiled(fullgraph, module), module):
+        module.zero_grad()
+        with torch.no_grad():
+            module.learned["intensity"].fill_(-1.0)
+        sum(call(image).square().sum() for image in images).backward()
+        assert module.learned["intensity"] == 0
+        found.append([one.grad.clone() for one in module.parameters()])
+    assert all(torch.allclose(one, other) for one, other in zip(*found, strict=True))
+
+
+@pytest.mark.skipif(DEVICE != "cuda", reason="there are no tensors of CUDA here")
+def test_a_graph_of_cuda_is_refused(renderer: Renderer) -> None:
+    """What Vulkan computes would not be in it. Calls before and after are right."""
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity",), renderer=renderer).to(DEVICE)
+    image = tensor(2, 8, 8, 3)
+    expected = module(image)
+    loss = expected.sum()
+    loss.backward(retain_graph=True)
+    gradient = image.grad.clone()
+    steps: tuple[Any, ...] = (
+        lambda: module(image),
+        lambda: loss.backward(retain_graph=True),
+    )
+    for step in steps:
+        torch.cuda.synchronize()
+        with (
+            pytest.raises(RuntimeError, match="a CUDA graph cannot hold it"),
+            torch.cuda.graph(torch.cuda.CUDAGraph()),
+        ):
+            step()
+    image.grad = None
+    found = module(image)
+    found.sum().backward()
+    assert torch.equal(found, expected)
+    assert torch.equal(image.grad, gradient)

@@ -73,8 +73,67 @@ def test_what_has_no_derivative_is_named(renderer: Renderer) -> None:
     _, pullback = renderer.vjp(image, vkbloom.Pyramid(levels=2))
     with pytest.raises(ValueError, match="gradients: 'levels' has no derivative; available: image"):
         pullback({"final": image})["levels"]
-    with pytest.raises(ValueError, match="image: derivatives need the pixels"):
-        renderer.vjp(renderer.upload(image), vkbloom.Pyramid())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])
+@pytest.mark.parametrize("names", [(), ("mask",), ("emission",), ("mask", "emission")])
+def test_uploaded_images_have_the_derivatives_of_their_arrays(
+    renderer: Renderer, dtype: Any, names: tuple[str, ...]
+) -> None:
+    scale = 255 if dtype == np.uint8 else 1
+    pixels = (random_image(7, 6, channels=4, seed=seed).clip(0, 1) * scale for seed in (1, 2))
+    image, emission = (one.astype(dtype) for one in pixels)
+    if dtype != np.uint8:
+        image[1, 2] = (np.nan, np.inf, -0.25, 0.5)
+    mask = np.random.default_rng(3).random((7, 6), np.float32)
+    given: Any = {name: {"mask": mask, "emission": emission}[name] for name in names}
+    settings = vkbloom.Pyramid(levels=2, threshold=0.3, knee=0.5)
+    cotangents = {"final": np.ones((7, 6, 4), np.float32)}
+    frames, pullback = renderer.vjp(image, settings, **given)
+    expected = dict(pullback(cotangents).items())
+    uploaded = renderer.upload(image, **given)
+    for part in (image, emission, mask):
+        part[:] = 0
+    found_frames, pullback = renderer.vjp(uploaded, settings)
+    found = pullback(cotangents)
+    assert np.array_equal(found_frames["final"], frames["final"], equal_nan=True)
+    assert [*found] == [*expected]
+    assert all(np.array_equal(found[name], part) for name, part in expected.items())
+
+
+def test_uploaded_images_are_refused_as_in_apply(renderer: Renderer) -> None:
+    image = np.ones((4, 4, 3), np.float32)
+    uploaded = renderer.upload(image)
+    for name, given in (("mask", image[..., 0]), ("emission", image)):
+        wrong: Any = {name: given}
+        with pytest.raises(ValueError, match=f"{name}: the image was uploaded already"):
+            renderer.vjp(uploaded, vkbloom.Pyramid(), **wrong)
+    with Renderer(renderer.info.name) as other:
+        messages = []
+        for call in (other.apply, other.vjp):
+            use: Any = call
+            with pytest.raises(ValueError) as raised:  # noqa: PT011  the same as of apply
+                use(uploaded, vkbloom.Pyramid())
+            messages.append(str(raised.value))
+    assert messages[0] == messages[1]
+
+
+def test_a_field_has_the_same_bits_however_it_is_read(renderer: Renderer) -> None:
+    image = random_image(9, 8, seed=1).astype(np.float32)
+    settings = vkbloom.Separable(threshold=0.2, knee=0.5, intensity=0.7, exposure=0.3)
+    _, pullback = renderer.vjp(image, settings)
+    cotangents = {"final": random_image(9, 8, seed=2).astype(np.float32)}
+    readings: tuple[Any, ...] = (
+        lambda found: dict(found.items()),
+        lambda found: dict(zip(found, found.values(), strict=True)),
+        lambda found: {name: found[name] for name in found},
+        lambda found: {name: found.get(name) for name in reversed([*found])},
+        lambda found: (found["knee"], dict(found.items()))[1],
+        lambda found: (repr(found), dict(found))[1],
+    )
+    first, *others = (read(pullback(cotangents)) for read in readings)
+    for other in others:
+        assert all(np.array_equal(part, other[name]) for name, part in first.items())
 
 
 @pytest.mark.parametrize(

@@ -170,13 +170,12 @@ class DeviceGradients(Gradients):
         self._more = [fields, every]
 
     def _complete(self) -> None:
-        """Take what is missing from the reference."""
-        if self._more:
-            every = self._more[-1]()
-            self._more.clear()
-            known = dict(super().items())
+        """Take what is missing: of the device, then of the reference, as `__missing__` does."""
+        while self._more:
+            found = self._more.pop(0)()
+            known = {**found, **dict(super().items())}
             super().clear()
-            super().update((name, known.get(name, part)) for name, part in every.items())
+            super().update((name, known[name]) for name in self._names if name in known)
 
     def __missing__(self, name: str) -> NDArray[Any]:
         if name not in self._names:

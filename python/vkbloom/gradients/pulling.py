@@ -15,6 +15,7 @@ from vkbloom.device_arrays import Taken, on_cuda, place_of, placed, take
 from vkbloom.frames import Frames
 from vkbloom.gradients.passes import DeviceGradients, Passes, check_finite
 from vkbloom.image import Image
+from vkbloom.methods.separable import Separable
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import (
     Gradients,
@@ -23,7 +24,7 @@ from vkbloom.reference.derivatives import (
     differentiable,
 )
 from vkbloom.requests import IMAGES_AHEAD
-from vkbloom.sources import Inputs, checked_inputs
+from vkbloom.sources import Inputs, checked_inputs, image_source, uploaded_inputs
 
 if TYPE_CHECKING:
     from vkbloom.device_arrays import Device, Place
@@ -54,19 +55,27 @@ def vjp(  # noqa: PLR0917
 
     The arrays are copied, since they may change before the pullback is called.
     """
-    if isinstance(image, Image):
-        raise ValueError("image: derivatives need the pixels; give the array, not the uploaded one")
     if hasattr(settings, "twin"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )
     core = core_of(renderer)
-    inputs = checked_inputs(image, mask, emission, core).kept()
-    source = inputs.source()
-    shape, dtype = source.kind
-    frames = renderer.apply(
-        Image(source, shape, np.dtype(dtype)), settings.replace(format="rgba32float"), device=device
-    )
+    if isinstance(image, Image):
+        image_source(image, mask, emission)
+        # A pass without bloom copies the pixels.
+        alone = Separable(bloom=False)
+        inputs = uploaded_inputs(
+            image,
+            lambda: renderer.apply(image, alone, attachments="final", device="host")["final"],
+        )
+        uploaded = image
+    else:
+        inputs = checked_inputs(image, mask, emission, core).kept()
+        source = inputs.source()
+        shape, dtype = source.kind
+        uploaded = Image(source, shape, np.dtype(dtype))
+    floats = settings.replace(format="rgba32float")
+    frames = renderer.apply(uploaded, floats, device=device)
     place = place_of(next(iter(frames.values())))
     pulled = pullback_of(renderer, inputs, settings, place)
 

@@ -16,6 +16,7 @@ from .image import BlurInput, Storage, finite, storage
 from .levels import halved
 from .pyramid import downsample
 from .sampling import Array, sample, weighted_mean
+from .tape import value_of
 from .threshold import brightest, masked
 from .upsampling import combine, linear, tent_of_target
 
@@ -53,7 +54,8 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
     images = _TYPES[settings.type](bright, settings, store, (width, height))
     light = sample(images.pop("light"), source.size)
-    rgb = np.multiply(saturated(light[..., :3], settings.saturation), settings.tint)
+    rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
+    rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
     return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
 
@@ -77,11 +79,31 @@ def saturated(rgb: Array, saturation: float) -> Array:
     The largest channel does not change. Where it is not above 0, the others become equal to it.
     """
     most = rgb.max(axis=-1, keepdims=True)
-    least = rgb.min(axis=-1, keepdims=True)
-    above, spread = np.where(most > 0, most, 1.0), most - least
-    wanted = np.clip(saturation * spread / above, 0.0, 1.0)
-    scale = wanted * above / np.where(spread > 0, spread, 1.0)
-    result: Array = np.where(most > 0, most * (1 - wanted) + (rgb - least) * scale, most)
+    spread = most - rgb.min(axis=-1, keepdims=True)
+    # The distance of each channel from the largest one is scaled. Around a grey, distances grow
+    # from 0 by the same scale. Around black, opposite changes of two channels grow by at most 1/2.
+    around_grey = np.where(most > 0, np.inf, np.where(most < 0, 0.0, 0.5))
+    most_scale = np.maximum(most, 0.0) / np.where(spread > 0, spread, 1.0)
+    scale = np.minimum(saturation, np.where(spread > 0, most_scale, around_grey))
+    result: Array = most - scale * (most - rgb)
+    return result
+
+
+def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
+    """Return saturated colours, derived as if channels were equal, or 0, that are but for rounding.
+
+    The roundings of a convolution are those of the single floats of renderers, so that the kinks
+    are at the same colours.
+    """
+    values = value_of(rgb)
+    if values is rgb:
+        return saturated(rgb, saturation)
+    near = np.where(np.abs(values) <= rounding, 0.0, values)
+    for extreme in (near.max(axis=-1, keepdims=True), near.min(axis=-1, keepdims=True)):
+        least = rounding * (1 + 10 * np.abs(extreme))
+        near = np.where(np.abs(near - extreme) <= least, extreme, near)
+    result: Array = saturated(rgb + (near - values), saturation)
+    result = result + (saturated(values, value_of(saturation)) - value_of(result))
     return result
 
 
@@ -151,12 +173,14 @@ def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
 def _smooth_min(values: Array, end: float, width: float) -> Array:
     """Return min(value, end) - h^2 width / 4 with h = max(1 - |value - end| / width, 0).
 
-    The quadratic smooth minimum of Inigo Quilez, "Smooth minimum".
+    The quadratic smooth minimum of Inigo Quilez, "Smooth minimum". Where h is above 0, this is a
+    parabola, which has no kink at the end.
     """
     smaller: Array = np.minimum(values, end)
     if width > 0:
-        h = np.maximum(width - np.abs(values - end), 0) / width
-        smaller = smaller - h * h * width / 4
+        beyond = values - end
+        parabola = (values + end) / 2 - width / 4 - beyond * beyond / (4 * width)
+        smaller = np.where(np.abs(beyond) < width, parabola, smaller)
     return smaller
 
 

@@ -150,7 +150,8 @@ def composite_checked(
             # The glow was already exposed before the threshold.
             rgb = _godots(rgb * scale, glow, settings, curve, share)
         elif settings.method == "blender":
-            rgb = curve((np.maximum(rgb, 0.0) + glow) * scale)
+            # max(0, s), whose derivative at black is the mean of both sides.
+            rgb = curve(((rgb + np.abs(rgb)) / 2 + glow) * scale)
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
         alpha = _blend_alpha(alpha, light, settings.alpha)

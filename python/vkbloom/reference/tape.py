@@ -6,8 +6,8 @@ derivative with respect to its result to those with respect to its arguments.
 
 At a kink, the rules take these subgradients: a clamp passes the derivative inside and at its ends;
 a maximum or minimum passes it to the strictly larger or smaller argument, between equal arrays or
-channels in equal shares, and nothing where it equals a constant; a power passes nothing at a base
-of 0.
+channels in equal shares, and nothing where it equals a constant. An operation passes nothing where
+its derivative is infinite or undefined, such as that of a root at 0.
 """
 
 from __future__ import annotations
@@ -215,9 +215,8 @@ def gradients(results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced])
 
 
 def _times(derivative: Array, factor: Any) -> Array:
-    """Return the product; 0 where the derivative is 0, also if the factor is infinite there."""
-    with np.errstate(all="ignore"):
-        product: Array = np.where(derivative == 0, 0.0, derivative * factor)
+    """Return the product; 0 where the factor is not finite."""
+    product: Array = derivative * np.where(np.isfinite(factor), factor, 0.0)
     return product
 
 
