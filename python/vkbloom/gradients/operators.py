@@ -241,7 +241,7 @@ def _operator(name: str, parameters: str, result: str) -> Any:
 
 #: What `torch.compile` must not put into a graph of CUDA. (PyTorch has the tag since 2.8.)
 _TAGS: Final[dict[str, Any]] = (
-    {"tags": torch.Tag.cudagraph_unsafe} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
+    {"tags": (torch.Tag.cudagraph_unsafe,)} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
 )
 
 
