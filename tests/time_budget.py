@@ -35,6 +35,7 @@ BUDGET: Final[dict[str, int]] = {
     "core/test_plans.py": 35,
     "core/test_readback.py": 20,
     "device/test_cuda_path.py": 25,
+    "device/test_second_driver.py": 30,
     "docs/test_docs.py": 40,
     "docs/test_examples.py": 20,
     "explorer/test_explorer_page.py": 45,
