@@ -462,8 +462,8 @@ def test_texels_are_what_fused_passes_take_them_for(renderer: Renderer) -> None:
     On a CPU a level is multiplied by the float nearest to 1 / 255, on a GPU it is divided by 255.
     """
     levels = np.arange(256, dtype=np.uint8)
-    loaded: Any = levels.astype(np.float32)
-    loaded = loaded * np.float32(1 / 255) if renderer.info.type == "cpu" else loaded / 255
+    factor = np.float32(1 / 255)
+    loaded = levels * factor if renderer.info.type == "cpu" else levels / np.float32(255)
     halves = np.arange(1024, dtype=np.uint16).view(np.float16)
     cases: list[tuple[Any, Any, Any]] = [
         (levels, "rgba32float", loaded),
