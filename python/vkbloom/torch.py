@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from vkbloom.checks import import_extra
-from vkbloom.gradients.operators import number_of, replaced, text_of
+from vkbloom.gradients.operators import number_of, refuse_capture, replaced, text_of
 from vkbloom.reference.derivatives import differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
@@ -168,6 +168,9 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
+        if not torch.compiler.is_compiling():
+            # Comparing parameters waits for the device, which would end the capture.
+            refuse_capture(image)
         values = dict(zip(self._names, self._values(), strict=True))
         return _call(
             image,
