@@ -379,15 +379,30 @@ def _fitted(
         history += search.history
         points.append(search.best)
         searches.append(search)
-    last = searches[-1]
-    settings = space.settings(last.best)
     seconds = time.perf_counter() - began
-    measure = stages[-1].measure
-    frames = renderer.apply(stages[-1].image, settings)
+    return _result(
+        renderer, stages[-1], space, searches[-1], framebuffer, history=history, seconds=seconds
+    )
+
+
+def _result(
+    renderer: Renderer,
+    stage: _Stage,
+    space: Space,
+    last: Search,
+    framebuffer: str,
+    *,
+    history: list[float],
+    seconds: float,
+) -> FitResult:
+    """Return what a search found, judged at the image's own size."""
+    settings = space.settings(last.best)
+    measure = stage.measure
+    frames = renderer.apply(stage.image, settings)
     plain = np.zeros_like(measure.target)
     if framebuffer == "final":
         bare = settings.replace(bloom=False, glare=())
-        plain = light(renderer.apply(stages[-1].image, bare, attachments=["final"])["final"])
+        plain = light(renderer.apply(stage.image, bare, attachments=["final"])["final"])
     with _one_thread():
         explained = measure.explained(last.loss, plain)
     return FitResult(

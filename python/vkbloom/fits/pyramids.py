@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Iterable
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -112,12 +113,7 @@ def fit_pyramid(
     with opened as used:
         image = used.upload(point)
         sole = [begun.replace(level_weights=tuple(row)) for row in np.eye(levels)]
-        plan = used.plan(image, sole[-1])
-        if f"down_{levels - 1}" not in plan.outputs:
-            count = sum(name.startswith("down_") for name in plan.outputs)
-            raise ValueError(
-                f"levels: {levels} is out of range, 1 to {count} for {width} x {height} pixels"
-            )
+        _check_levels(levels, used.plan(image, sole[-1]).outputs, (width, height))
         columns: list[NDArray[np.float64]] = [
             light(frames["bloom"])[:, :, 0].ravel()
             for frames in used.apply_many(image, sole, attachments=["bloom"])
@@ -130,14 +126,14 @@ def fit_pyramid(
         start = used.apply(image, begun, attachments=["bloom"])["bloom"]
     framebuffer = "final" if direct else "bloom"
     found = light(frames[framebuffer])
-    history = np.array([measure(light(start)), measure(found)])
+    losses = measure(light(start)), measure(found)
     plain = light(point) if direct else np.zeros_like(measure.target)
     return FitResult(
         settings=settings,
-        loss=float(history[-1]),
-        start_loss=float(history[0]),
+        loss=losses[1],
+        start_loss=losses[0],
         calls=levels + 2,
-        history=history,
+        history=np.array(losses),
         seconds=time.perf_counter() - began,
         framebuffer=framebuffer,
         loss_name=loss,
@@ -146,8 +142,17 @@ def fit_pyramid(
         target=measure.target,
         residual=found - measure.target,
         plain=plain,
-        explained=measure.explained(float(history[-1]), plain),
+        explained=measure.explained(losses[1], plain),
     )
+
+
+def _check_levels(levels: int, outputs: Iterable[str], size: tuple[int, int]) -> None:
+    """Raise ValueError if a frame is too small for so many levels."""
+    count = sum(name.startswith("down_") for name in outputs)
+    if count < levels:
+        raise ValueError(
+            f"levels: {levels} is out of range, 1 to {count} for {size[0]} x {size[1]} pixels"
+        )
 
 
 def _nonnegative(
