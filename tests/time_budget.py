@@ -52,6 +52,7 @@ BUDGET: Final[dict[str, int]] = {
     "methods/test_engine_frames.py": 20,
     "methods/test_glare.py": 20,
     "methods/test_glow_sources.py": 25,
+    "methods/test_one_sided.py": 30,
     "methods/test_presets.py": 40,
     "methods/test_torch.py": 25,
     "methods/test_variants.py": 60,
