@@ -32,6 +32,7 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "tools/docs_pictures.py": ("pictures", "matplotlib"),
     "tools/first_apply.py": ("tutorial", "numpy"),
     "tools/fit_recovery.py": ("a.md --count 1", "scipy"),
+    "tools/fit_screenshots.py": ("a.md", "scipy"),
     "tools/glare_pictures.py": (".", "OpenImageIO"),
     "tools/laws.py": ("--out a.md", "cv2"),
     "tools/line_counts.py": ("", "numpy"),
@@ -52,6 +53,7 @@ RUN: Final[dict[str, tuple[str, str]]] = {
 LONG: Final = (
     "tools/check_table.py",
     "tools/fit_recovery.py",
+    "tools/fit_screenshots.py",
     "tools/psf_atlas.py",
     "tools/steadiness_tables.py",
 )

@@ -520,7 +520,8 @@ def test_files(page: Page, tmp_path: Path) -> None:
     path = vkbloom.write(tmp_path / "photo.png", pixels)
     page.get_by_label("image or settings").set_input_files(path)
     page.locator(".vkb-status", has_text="50 × 30 float32").wait_for()
-    wait_for_code(page, 'vkbloom.presets["photo"]')
+    read = 'image = vkbloom.read("photo.png", expand=4)'
+    wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"]')
     page.locator(".vkb-status", has_text="highlights expanded up to 4").wait_for()
     assert page.get_by_label("shading").count() == 0
     black = vkbloom.write(tmp_path / "mask.png", np.zeros((30, 50, 3), np.uint8))
@@ -531,7 +532,7 @@ def test_files(page: Page, tmp_path: Path) -> None:
     page.get_by_role("button", name="Open mask").wait_for()
     page.get_by_role("button", name="Open emission").wait_for()
     field(page, "bloom").uncheck()
-    wait_for_code(page, 'vkbloom.presets["photo"].replace(bloom=False)')
+    wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"].replace(bloom=False)')
     with page.expect_download() as download:
         page.get_by_role("button", name="Save picture").click()
     assert download.value.suggested_filename == "final.png"
@@ -556,7 +557,7 @@ def test_files(page: Page, tmp_path: Path) -> None:
         }""",
         text,
     )
-    wait_for_code(page, "vkbloom.KinoBloom(radius=3.0)")
+    wait_for_code(page, f"{read}\nsettings = vkbloom.KinoBloom(radius=3.0)")
     (tmp_path / "words.png").write_text("words")
     page.get_by_label("image or settings").set_input_files(tmp_path / "words.png")
     page.get_by_role("alert").get_by_text("words.png").wait_for()

@@ -180,7 +180,7 @@ class TestCommandLine:
         assert chunk(file, b"cICP") == bytes([9, 16, 0, 1])
         np.testing.assert_allclose(stored(file), shown(RAMP, display, HDR), atol=HALF)
         monkeypatch.setattr("vkbloom.large_files.LARGE", 1)
-        monkeypatch.setattr("vkbloom.cli.apply.is_large", lambda *_: True)
+        monkeypatch.setattr("vkbloom.cli.applied.is_large", lambda *_: True)
         again, _ = self.apply(tmp_path, "c.png", "--view", f"{display}/{HDR}")
         assert np.array_equal(stored(again), stored(file))
 

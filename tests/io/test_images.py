@@ -496,8 +496,9 @@ class TestSave:
     def test_integers_clip(self, tmp_path: Path) -> None:
         row = np.array([-5, -0.0, 1, 1.001, 1e30, np.nan, np.inf, -np.inf], np.float32)
         pixels = np.repeat(row[None, :, None], 3, axis=2)
-        (note,) = save(linear_picture(pixels, "float"), tmp_path / "b.png")
+        note, clipped = save(linear_picture(pixels, "float"), tmp_path / "b.png")
         assert note.endswith("b.png has integers: NaN is written as 0, infinity as 1")
+        assert "--tonemap" in clipped
         levels = reread(tmp_path / "b.png")[1][0, :, 0].tolist()
         assert levels == [0, 0, 255, 255, 255, 0, 255, 0]
 

@@ -185,7 +185,10 @@ BY_FORMULA = {
     "blender_streaks": {"colour", "grey"},
     # Kernels whose channels differ.
     "unreal_convolution": {"colour", "grey"},
-    "iris_6": {"grey"},
+    "iris_6": {"colour", "grey"},
+    # Light leaves the picture, so that a flat one darkens towards its border.
+    "spencer_photopic": {"colour"},
+    "camera_lens": {"colour"},
 }
 
 

@@ -152,7 +152,8 @@ def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
     is_over = np.isfinite(peak) & (peak > 1)
     if not is_over.any():
         return values
-    made = values.copy()
+    # (Half floats are divided as single ones, so that only the result is rounded, to levels.)
+    made = values.astype(np.result_type(values.dtype, np.float32))
     made[:, :, :count] /= np.where(is_over, peak, values.dtype.type(1))
     return made
 
