@@ -1,14 +1,17 @@
 # make demo: installs what is missing, renders the built-in scene into out/.
 # make test: installs what the tests need, runs all tests. Both are quick the second time.
+# make test-devices: runs all tests on SwiftShader, which comes with Debian's Chromium. (make test runs a
+#   part of all workloads there.) SWIFTSHADER: its manifest. TESTS: some of the tests.
 # make exhaustive: the same with every case of the tests that otherwise take a few (tests/exhaustive.py),
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
-# make wheels: builds the wheels of vkbloom, its driver and its compiler for x86-64 and aarch64 into dist/
-#   (docs/releasing.md); as root.
+# make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for
+#   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
-# make try-core: builds the core's wheel with what this system has, and tries it in a fresh environment.
+# make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
+#   tries it in a fresh environment.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
 # make test-aarch64: runs the fast part of the tests with the aarch64 wheels of dist/ under QEMU; as root.
@@ -45,12 +48,20 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
+.PHONY: demo test test-devices exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
 	$(PYTHON) examples/demo.py --out out
+
+SWIFTSHADER := /usr/lib/chromium/vk_swiftshader_icd.json
+test-devices: export VK_DRIVER_FILES := $(SWIFTSHADER)
+test-devices: export VK_ICD_FILENAMES := $(SWIFTSHADER)
+test-devices: export VKBLOOM_DRIVER := system
+test-devices: build/stamp/core build/stamp/test
+	test -f $(SWIFTSHADER) || { echo "$(SWIFTSHADER) is missing: apt install chromium-common"; exit 2; }
+	$(PYTHON) -m pytest $(PARALLEL) $(TESTS)
 
 exhaustive: export VKBLOOM_EXHAUSTIVE := 1
 test exhaustive: build/stamp/core build/stamp/test

@@ -1,12 +1,18 @@
-"""Builds the C core; the shaders are compiled to SPIR-V and embedded as part of it."""
+"""Builds the C core, which embeds the shaders as SPIR-V.
+
+A source distribution has the SPIR-V, and the versions of the programs that made it. So a build from
+it needs neither glslang nor spirv-opt, unless a shader was changed.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import runpy
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -18,11 +24,16 @@ from typing import Any, NamedTuple
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.sdist import sdist
 
 SHADERS = Path("shaders")
 # GLSL that users can include, too.
 LIBRARY = Path("python/vkbloom/own/glsl")
 SPIRV = Path("build/spirv")
+# Where a source distribution has its modules.
+SHIPPED = Path("spirv")
+# Beside the modules: the digest of their sources, and the programs' versions.
+MADE = "made.json"
 STAGES = (".vert", ".frag", ".comp")
 # Python without the GIL has no stable ABI: a core for that version alone.
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
@@ -121,20 +132,37 @@ def tool(*names: str, package: str) -> str:
     raise SystemExit(f"{names[0]} is missing; on Debian or Ubuntu: apt install {package}")
 
 
-def run_tool(what: Path, *command: str) -> None:
-    """Run a program on a shader; end with its output if it fails."""
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        raise SystemExit(f"{what}: {command[0]} fails:\n{result.stdout}{result.stderr}")
+def run_tool(what: object, *command: str) -> str:
+    """Return what a program prints about a shader; end with its output if it fails."""
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    result = subprocess.run(command, **piped, text=True, check=False)
+    status = result.returncode
+    if status == 0:
+        return result.stdout
+    # A shell that started the program has 128 and the signal as its status.
+    number = -status if status < 0 else status - 128
+    if number in set(signal.Signals):
+        reason = f"is ended by {signal.Signals(number).name} ({signal.strsignal(number)})"
+    else:
+        reason = f"fails with status {status}"
+    raise SystemExit(f"{what}: {command[0]} {reason}:\n{result.stdout}".rstrip(":\n"))
+
+
+def compiler() -> str:
+    """Return the path of glslang."""
+    return tool("glslangValidator", "glslang", package="glslang-tools")
+
+
+def optimizer() -> str:
+    """Return the path of spirv-opt."""
+    return tool("spirv-opt", package="spirv-tools")
 
 
 def compile_shader(module: Module, target: Path) -> None:
     """Compile one module, as glslang does, to a file."""
-    compiler = tool("glslangValidator", "glslang", package="glslang-tools")
     options = ["-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
-    run_tool(
-        module.shader, compiler, *options, *module.options, "-o", str(target), str(module.shader)
-    )
+    files = ("-o", str(target), str(module.shader))
+    run_tool(module.shader, compiler(), *options, *module.options, *files)
 
 
 def decorate(target: Path) -> None:
@@ -146,9 +174,8 @@ def decorate(target: Path) -> None:
 
 def optimize(module: Module, target: Path, passes: list[str]) -> None:
     """Run spirv-opt on a module in a file."""
-    optimizer = tool("spirv-opt", package="spirv-tools")
     options = ["--target-env=vulkan1.1", "--scalar-block-layout", *passes]
-    run_tool(module.shader, optimizer, *options, str(target), "-o", str(target))
+    run_tool(module.shader, optimizer(), *options, str(target), "-o", str(target))
 
 
 def build_module(module: Module, target: Path) -> None:
@@ -164,36 +191,67 @@ def build_module(module: Module, target: Path) -> None:
     optimize(module, target, SIMPLER)
 
 
-def compile_module(module: Module) -> tuple[int, ...]:
-    """Compile one module to its SPIR-V words."""
-    target = SPIRV / f"{module.name}.spv"
-    sources = [Path("setup.py"), Path("python/vkbloom/own/spirv.py")]
-    sources += [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
-    if not target.exists() or target.stat().st_mtime < max(s.stat().st_mtime for s in sources):
-        made = target.with_suffix(".part")
-        build_module(module, made)
-        made.replace(target)
-    code = target.read_bytes()
-    return struct.unpack(f"={len(code) // 4}I", code)
+def sources() -> list[Path]:
+    """Return what the modules are made of, and by."""
+    files = [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
+    return [Path("setup.py"), Path("python/vkbloom/own/spirv.py"), *sorted(files)]
 
 
-def write_spirv() -> None:
+def made_with(folder: Path) -> dict[str, str]:
+    """Return what a folder says about its modules."""
+    file = folder / MADE
+    return dict(json.loads(file.read_text())) if file.exists() else {}
+
+
+def compile_modules(built: list[Module], jobs: int) -> Path:
+    """Return the folder that has all modules, compiled now if those at hand have other sources."""
+    digest = hashlib.sha256()
+    for source in sources():
+        digest.update(f"{source.as_posix()} {source.stat().st_size}\n".encode())
+        digest.update(source.read_bytes())
+    wanted = {"sources": digest.hexdigest()}
+    for folder in (SHIPPED, SPIRV):
+        there = all((folder / f"{module.name}.spv").exists() for module in built)
+        if there and wanted.items() <= made_with(folder).items():
+            return folder
+    for program, name in ((compiler(), "glslang"), (optimizer(), "spirv-opt")):
+        wanted[name] = run_tool(name, program, "--version").splitlines()[0]
+    SPIRV.mkdir(parents=True, exist_ok=True)
+    # A build that was stopped goes on.
+    if made_with(SPIRV) != wanted:
+        for old in SPIRV.glob("*.spv"):
+            old.unlink()
+        (SPIRV / MADE).write_text(f"{json.dumps(wanted, indent=1)}\n")
+
+    def build_missing(module: Module) -> None:
+        target = SPIRV / f"{module.name}.spv"
+        if not target.exists():
+            build_module(module, target.with_suffix(".part"))
+            target.with_suffix(".part").replace(target)
+
+    with ThreadPoolExecutor(jobs) as threads:
+        list(threads.map(build_missing, built))
+    return SPIRV
+
+
+def all_modules() -> list[Module]:
+    """Return the modules of all shaders."""
+    shaders = [path for path in SHADERS.rglob("*.*") if path.suffix in STAGES]
+    shaders.sort(key=lambda path: path.name)
+    return [module for shader in shaders for module in modules(shader)]
+
+
+def write_spirv(jobs: int) -> None:
     """Write spirv.h and spirv.c: a shader object for each module (csrc/graph/shader.h)."""
     SPIRV.mkdir(parents=True, exist_ok=True)
-    shaders = sorted(
-        (path for path in SHADERS.rglob("*.*") if path.suffix in STAGES), key=lambda path: path.name
-    )
-    built = [module for shader in shaders for module in modules(shader)]
+    built = all_modules()
+    folder = compile_modules(built, jobs)
+    codes = [(folder / f"{module.name}.spv").read_bytes() for module in built]
     names = {module.name for module in built}
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        compiled = list(threads.map(compile_module, built))
-    arrays = "".join(
-        f"static const uint32_t {module.name}[] = {{{','.join(map(str, words))}}};\n"
-        for module, words in zip(built, compiled, strict=True)
-    )
-    declared = objects = ""
-    for module, words in zip(built, compiled, strict=True):
-        code = struct.pack(f"={len(words)}I", *words)
+    arrays = declared = objects = ""
+    for module, code in zip(built, codes, strict=True):
+        words = ",".join(map(str, struct.unpack(f"={len(code) // 4}I", code)))
+        arrays += f"static const uint32_t {module.name}[] = {{{words}}};\n"
         hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
         twins = (
             f"{module.shader.stem}_dispatch",
@@ -215,7 +273,7 @@ def write_spirv() -> None:
     (SPIRV / "spirv.c").write_text(f'#include "spirv.h"\n\n{arrays}\n{objects}')
 
 
-def compiled_once(compiler: Any) -> Callable[..., list[str]]:
+def compiled_once(compiler: Any, jobs: int) -> Callable[..., list[str]]:
     """Return a compiler's method that compiles sources in threads, and keeps equal objects.
 
     An object is kept if the digest beside it is that of its source, all headers and the options.
@@ -241,10 +299,19 @@ def compiled_once(compiler: Any) -> Callable[..., list[str]]:
         return str(made)
 
     def compile_each(sources: list[str], output_dir: str, **options: Any) -> list[str]:
-        with ThreadPoolExecutor(os.cpu_count()) as threads:
+        with ThreadPoolExecutor(jobs) as threads:
             return list(threads.map(lambda one: compile_one(one, output_dir, options), sources))
 
     return compile_each
+
+
+def processes(asked: int | None = None) -> int:
+    """Return how many processes may run: -j, or the package builder's limit, or the processors."""
+    debian = re.search(r"\bparallel=(\d+)", os.environ.get("DEB_BUILD_OPTIONS", ""))
+    nix = re.fullmatch(r"(\d+)", os.environ.get("NIX_BUILD_CORES", ""))
+    limits = [asked or 0, *(int(limit[1]) for limit in (debian, nix) if limit)]
+    usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+    return next((limit for limit in limits if limit > 0), len(usable))
 
 
 class BuildCore(build_ext):
@@ -258,8 +325,9 @@ class BuildCore(build_ext):
     def build_extension(self, ext: Extension) -> None:
         """Build one extension, with the embedded shaders as one more source."""
         check_vulkan_headers()
-        write_spirv()
-        ext.include_dirs.append(str(SPIRV))
+        jobs = processes(self.parallel)
+        write_spirv(jobs)
+        ext.include_dirs += [volk_folder(), str(SPIRV)]
         # First, since it takes longest.
         ext.sources.insert(0, str(SPIRV / "spirv.c"))
         if self.compiler.compiler_type == "msvc":
@@ -269,8 +337,22 @@ class BuildCore(build_ext):
         # Warnings are errors in CI only: a newer compiler must not stop a user's build.
         ext.extra_compile_args += os.environ.get("VKBLOOM_CFLAGS", "").split()
         ext.extra_link_args += os.environ.get("VKBLOOM_LDFLAGS", "").split()
-        self.compiler.compile = compiled_once(self.compiler)
+        self.compiler.compile = compiled_once(self.compiler, jobs)
         super().build_extension(ext)
+
+
+class DistributeSpirv(sdist):
+    """sdist with the modules."""
+
+    def make_release_tree(self, base_dir: str, files: list[str]) -> None:
+        """Add them where a build looks first."""
+        super().make_release_tree(base_dir, files)
+        built = all_modules()
+        folder = compile_modules(built, processes())
+        shipped = Path(base_dir) / SHIPPED
+        shipped.mkdir()
+        for name in (MADE, *(f"{module.name}.spv" for module in built)):
+            shutil.copyfile(folder / name, shipped / name)
 
 
 def include_folders() -> list[Path]:
@@ -308,15 +390,14 @@ setup(
             sources=sorted(str(path) for path in Path("csrc").rglob("*.c")),
             depends=[
                 *(str(path) for path in Path("csrc").rglob("*.h")),
-                *(str(path) for path in SHADERS.rglob("*.*")),
-                *(str(path) for path in LIBRARY.rglob("*.glsl")),
+                *map(str, sources()),
             ],
-            include_dirs=["csrc", ".", volk_folder()],
+            include_dirs=["csrc", "."],
             define_macros=[("VK_NO_PROTOTYPES", None), *LIMITED_API],
             libraries=[] if os.name == "nt" else ["m", "dl"],
             py_limited_api=LIMITED,
         )
     ],
-    cmdclass={"build_ext": BuildCore},
+    cmdclass={"build_ext": BuildCore, "sdist": DistributeSpirv},
     options={"bdist_wheel": {"py_limited_api": "cp311"}} if LIMITED else {},
 )

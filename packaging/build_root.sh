@@ -1,7 +1,8 @@
 #!/bin/sh
 # Makes the root that the wheels are built in: Debian 11 with glibc 2.31, GCC 10 and a static
 # LLVM 16, both also for aarch64; Python 3.11 from Debian 12's source; glslang's source as Debian 12
-# has it, Mesa's as Debian 13 has it; volk and the Vulkan headers of Debian 12. As root, with
+# has it, Mesa's as Debian 13 has it; volk and the Vulkan headers of Debian 12. Only Mesa's own build
+# finds glslang, and nothing spirv-opt: they would be too old for the core's shaders. As root, with
 # mmdebstrap.
 # DEBIAN_MIRROR, DEBIAN_SECURITY_MIRROR: by default what this system's apt uses.
 # Argument: the folder to make.
@@ -25,6 +26,8 @@ mmdebstrap --mode=root --variant=minbase --quiet \
     --customize-hook="upload $here/fetch_sources.sh /srv/fetch_sources.sh" \
     --customize-hook="upload $here/versions.sh /srv/versions.sh" \
     --customize-hook='chroot "$1" sh /srv/fetch_sources.sh' \
+    --customize-hook='mkdir "$1/opt/glslang"; mv "$1/usr/bin/glslangValidator" "$1/opt/glslang/"' \
+    --customize-hook='rm "$1"/usr/bin/spirv-*' \
     bullseye "$root.part" \
     "deb $mirror bullseye main" "deb $security_mirror bullseye-security main"
 mv "$root.part" "$root"

@@ -3,7 +3,8 @@
 `add` takes the objects and the archives that the linker used from its map (-Wl,-Map), and their
 Debian packages. What was compiled from source is given by `--source NAME VERSION FILE...`; the
 version "-" is that of a HEADER_VERSION in the first file, and a file may be "NAME@SHA-256". It
-fails if nm, or $NM, finds a library's symbols in `--symbols` that the SBOM does not list. `check`
+fails if nm, or $NM, finds a library's symbols in `--symbols` that the SBOM does not list. The JSON
+object of `--properties FILE` becomes properties of the wheel: what made its SPIR-V. `check`
 validates the SBOMs of wheels by cyclonedx-python-lib, and compares the binaries' hashes.
 """
 
@@ -182,7 +183,12 @@ def libraries_in(binaries: Iterable[Path]) -> set[str]:
     }
 
 
-def document(wheel: zipfile.ZipFile, member: str, components: Sequence[Component]) -> Json:
+def document(
+    wheel: zipfile.ZipFile,
+    member: str,
+    components: Sequence[Component],
+    properties: Mapping[str, str],
+) -> Json:
     """Return the SBOM of a wheel's binary."""
     said = Parser().parsestr(wheel.read(_in_dist_info(wheel, "METADATA")).decode())
     purl = f"pkg:pypi/{said['Name']}@{said['Version']}"
@@ -197,6 +203,10 @@ def document(wheel: zipfile.ZipFile, member: str, components: Sequence[Component
             {"type": "file", "name": member, "hashes": _sha256(_digest(wheel.read(member)))}
         ],
     }
+    if properties:
+        main["properties"] = [
+            {"name": f"vkbloom:spirv:{key}", "value": value} for key, value in properties.items()
+        ]
     listed = [one.to_json() for one in components]
     made = time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", time.time())))
     name = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps([main, listed]))
@@ -251,7 +261,8 @@ def add(wheel: Path, options: argparse.Namespace) -> None:
     if left_out := found - {one.key for one in components}:
         raise SystemExit(f"{wheel}: nm finds {', '.join(sorted(left_out))}, not in the SBOM")
     with zipfile.ZipFile(wheel) as opened:
-        made = document(opened, options.member, components)
+        properties = json.loads(options.properties.read_text()) if options.properties else {}
+        made = document(opened, options.member, components, properties)
     name = made["metadata"]["component"]["name"]
     rewrite(wheel, {f"sboms/{name}.cdx.json": f"{json.dumps(made, indent=1)}\n".encode()})
     print(f"{wheel.name}: {', '.join(LIBRARIES[one.key].name for one in components)}")
@@ -290,6 +301,7 @@ def main() -> None:
     adding.add_argument("--sysroot", type=Path, default=Path("/"), help="another system's packages")
     adding.add_argument("--symbols", type=Path, nargs="+", required=True)
     adding.add_argument("--source", nargs="+", action="append", default=[])
+    adding.add_argument("--properties", type=Path, help="what made the SPIR-V")
     adding.set_defaults(run=lambda options: add(options.wheel, options))
     checking = commands.add_parser("check")
     checking.add_argument("wheels", type=Path, nargs="+")

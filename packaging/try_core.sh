@@ -1,6 +1,7 @@
 #!/bin/sh
-# Builds the core's wheel with what this system has, with its SBOM where that is Debian, and renders
-# with it in a fresh environment: nothing of the working tree is imported. Arguments: the Python
+# Builds the core's wheel with what this system has, from a source distribution and without glslang
+# and spirv-opt, with its SBOM where the system is Debian, and renders with it in a fresh environment:
+# nothing of the working tree is imported. Arguments: the Python
 # that builds, with setuptools; "twice": builds in a second folder, too, and compares the wheels.
 set -eu
 python=$(realpath -s "$1")
@@ -14,9 +15,9 @@ if test "${2:-}" = twice; then
     unset VKBLOOM_CFLAGS
 else
     export VKBLOOM_CFLAGS="${VKBLOOM_CFLAGS:-}"
-    for made in spirv objects; do
-        test ! -d "build/$made" || cp -rp "build/$made" "$work/one/build/"
-    done
+    mkdir -p "$work/one/core/build"
+    test ! -d build/spirv || cp -rp build/spirv "$work/one/build/"
+    test ! -d build/objects || cp -rp build/objects "$work/one/core/build/"
 fi
 packaging/core_wheel.sh "$work/one" "$python"
 if test "${2:-}" = twice; then

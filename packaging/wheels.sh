@@ -1,7 +1,9 @@
 #!/bin/sh
-# Builds the wheels of vkbloom, vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64 into dist/,
-# each twice in two folders, which must give equal files; as root on a system with mmdebstrap. The root
-# that they are built in is made once, in build/wheels; so are Mesa and glslang, in all folders.
+# Builds the source distribution of vkbloom, and from it and packaging/ the wheels of vkbloom,
+# vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64, into dist/; each wheel twice in two
+# folders, which must give equal files; as root on a system with mmdebstrap. The root that they are
+# built in is made once, in build/wheels; so are Mesa and glslang, in all folders. SPIR-V is made here,
+# once, by the versions of glslang and spirv-opt in packaging/versions.sh.
 # STEPS: the scripts to run, MACHINES: which ones to build for; by default all.
 set -eu
 cd "$(dirname "$0")/.."
@@ -24,10 +26,14 @@ needs "dpkg's keys (apt install debian-archive-keyring)" \
     "$(ls /usr/share/keyrings/debian-archive-keyring.gpg 2>/dev/null)"
 needs "pip and venv (apt install python3-pip python3-venv)" \
     "$(python3 -c 'import ensurepip, pip' 2>/dev/null && echo yes)"
+needs "glslang $GLSLANG (apt install glslang-tools, on Debian 12)" \
+    "$(glslangValidator --version 2>/dev/null | grep -F ":$GLSLANG")"
+needs "SPIRV-Tools $SPIRV_TOOLS (apt install spirv-tools, on Debian 12)" \
+    "$(spirv-opt --version 2>&1 | grep -F " v$SPIRV_TOOLS ")"
 needs "7 GB of free disk in $PWD" \
     "$(test "$(df -P -k . | awk 'END { print $4 }')" -lt 7000000 || echo yes)"
-needs "a new root, with arm64's packages (rm -r $work)" \
-    "$(test -d "$root" && test ! -d "$root/opt/aarch64" || echo yes)"
+needs "a new root, without spirv-opt (rm -r $work)" \
+    "$(test -d "$root" && test ! -d "$root/opt/glslang" || echo yes)"
 test -z "$missing" || { echo "make wheels needs:$missing" >&2; exit 2; }
 
 test -d "$root" || packaging/build_root.sh "$root"
@@ -44,6 +50,14 @@ chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
     /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
         --root-user-action=ignore --upgrade /srv/pypi/*.whl'
 
+# Both builds are of the same files, which may change meanwhile.
+test -d "$work/check" || python3 -m venv "$work/check"
+"$work/check/bin/pip" install --quiet --requirement packaging/requirements.txt \
+    "cyclonedx-python-lib[json-validation]==$CYCLONEDX"
+rm -rf "$work/source"
+DEB_BUILD_OPTIONS="parallel=${JOBS:-2}" packaging/sdist.sh "$work/source" "$PWD/$work/check/bin/python"
+sdist=$(ls "$work"/source/dist/*.tar.gz)
+
 # Builds for a machine in a folder of the root.
 build_in() {
     rm -rf "$root$1/vkbloom" "$root$1/wheels"
@@ -51,7 +65,8 @@ build_in() {
     for source in "mesa-$MESA" "glslang-$GLSLANG"; do
         test -d "$root$1/$source" || cp -r "$root/build/$source" "$root$1/"
     done
-    tar -x -f "$work/source.tar" -C "$root$1/vkbloom"
+    tar -x -f "$sdist" -C "$root$1/vkbloom" --strip-components=1
+    cp -r "$work/source/packaging" "$root$1/vkbloom/"
     for step in $steps; do
         folder=$1/vkbloom
         test "$step" = core.sh || folder=$folder/packaging/$(dirname "$step")
@@ -59,8 +74,6 @@ build_in() {
             MACHINE="$2" sh "$1/vkbloom/packaging/$step" "$folder" "$1/wheels"
     done
 }
-# Both from the same files, which may change meanwhile.
-git ls-files -z --cached --others --exclude-standard | tar -c --null -T - -f "$work/source.tar"
 for machine in $machines; do
     build_in "/build/$machine" "$machine"
     build_in "/again/$machine" "$machine"
@@ -69,8 +82,6 @@ for machine in $machines; do
         echo "two builds are equal: $(sha256sum "$wheel" | cut -d ' ' -f 1) $(basename "$wheel")"
     done
 done
-test -d "$work/check" || python3 -m venv "$work/check"
-"$work/check/bin/pip" install --quiet "cyclonedx-python-lib[json-validation]==$CYCLONEDX"
 "$work/check/bin/python" packaging/sbom.py check "$root"/build/*/wheels/*.whl
 
 # Names that promise more than the files keep must not leave here.
@@ -81,6 +92,7 @@ check_glibc() {
     test "$(printf '%s\n' "$newest" "$most" | sort -V | tail -n 1)" = "$most"
 }
 mkdir -p dist
+cp "$sdist" dist/
 for MACHINE in $machines; do
     . packaging/machine.sh
     build=/build/$MACHINE

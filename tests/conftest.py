@@ -17,6 +17,7 @@ import hypothesis
 import pytest
 
 import vkbloom
+from tests.device.exceptions import reason_against
 from tests.time_budget import TimeBudget
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters, interruptible
 from vkbloom.registry import METHODS
@@ -35,6 +36,13 @@ def pytest_configure(config: pytest.Config) -> None:
     hypothesis.settings.load_profile("untimed")
     config.pluginmanager.register(TimeBudget(), "time-budget")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what the driver of this run cannot do."""
+    for item in items:
+        if reason := reason_against(item.name):
+            item.add_marker(pytest.mark.skip(reason=reason))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -144,6 +144,8 @@ def assert_matches_reference(
     limits = {}
     for index, (name, array) in enumerate(frames.items()):
         dtype = image.dtype if name == "final" else _DTYPES[format]
+        if name == "kernel":
+            dtype = np.dtype(np.float32)
         assert array.dtype == dtype, f"{name}: {array.dtype}, not {dtype}"
         assert array.flags.c_contiguous, f"{name}: not contiguous"
         is_own = array.flags.owndata or isinstance(array.base, _core.Pages)

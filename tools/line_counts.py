@@ -14,6 +14,7 @@ import tokenize
 from collections import Counter
 from pathlib import Path
 
+ROOT = Path(__file__).parents[1]
 LAYOUT = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT}
 C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*|(\"(?:\\.|[^\"\\\n])*\")", re.DOTALL)
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
@@ -46,13 +47,15 @@ def files(revision: str | None) -> dict[str, str]:
     """Return the text of each counted file by its path."""
 
     def git(*words: str) -> str:
-        return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout
+        run = subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True)
+        return run.stdout
 
     listed = git("ls-tree", "-r", "--name-only", revision) if revision else git("ls-files")
     found = {}
     for name in listed.splitlines():
-        if name.endswith((".py", *C_SUFFIXES)) and (revision or Path(name).exists()):
-            found[name] = git("show", f"{revision}:{name}") if revision else Path(name).read_text()
+        file = ROOT / name
+        if name.endswith((".py", *C_SUFFIXES)) and (revision or file.exists()):
+            found[name] = git("show", f"{revision}:{name}") if revision else file.read_text()
     return found
 
 

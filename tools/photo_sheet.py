@@ -1,9 +1,11 @@
-"""Draw ten photographs before and after ``vkbloom apply``, for docs/presets.md and README.md.
+"""Draw photographs and graphics before and after ``vkbloom apply``, for the docs and README.md.
 
 python tools/photo_sheet.py docs/pictures [Desk.exr]
 
 The photographs are scikit-image's; the HDR photograph is of the OpenEXR collection and is developed
-to 8 bits. photos.jpg has all, photo.jpg a part of the city.
+to 8 bits. photos.jpg has all, photo.jpg a part of the city, graphics.jpg ten made-up graphics.
+The printed columns: the most that a value becomes darker, the mean change, and the median and the
+99th percentile of the changes of hue in degrees.
 """
 
 from __future__ import annotations
@@ -69,6 +71,49 @@ def photographs(hdr: list[str]) -> dict[str, Image]:
     return found
 
 
+def graphics() -> dict[str, Image]:
+    """Return ten graphics by name: flat and bright colours, as in drawings and user interfaces."""
+    size = (240, 360, 3)
+    down, across = np.mgrid[:240, :360]
+    found = {}
+    for name, ground, shapes in (
+        ("orange on black", (0, 0, 0), [(255, 128, 0)]),
+        ("cream poster", (255, 245, 220), [(200, 60, 40), (40, 90, 140)]),
+        ("light blue window", (200, 230, 255), [(255, 255, 255), (30, 60, 90)]),
+        ("pastels", (40, 40, 48), [(255, 200, 200), (200, 255, 220), (220, 210, 255)]),
+        ("primaries", (0, 0, 0), [(255, 0, 0), (0, 255, 0), (0, 0, 255)]),
+        ("secondaries", (16, 16, 16), [(255, 255, 0), (0, 255, 255), (255, 0, 255)]),
+        ("neon on night", (10, 8, 30), [(255, 20, 147), (57, 255, 20), (0, 240, 255)]),
+        ("buttons on white", (255, 255, 255), [(255, 140, 0), (0, 150, 255), (90, 200, 90)]),
+    ):
+        image = np.full(size, ground, np.uint8)
+        for index, colour in enumerate(shapes):
+            middle = 360 * (index + 0.5) / len(shapes)
+            image[(np.abs(down - 120) < 50) & (np.abs(across - middle) < 40)] = colour
+        found[name] = image
+    hue = (across / 360)[..., np.newaxis]
+    wheel = np.clip(np.abs((hue * 6 + np.array([0, 4, 2])) % 6 - 3) - 1, 0, 1)
+    found["hues to white"] = np.uint8(255 * (1 - (1 - wheel) * (down / 239)[..., np.newaxis]))
+    found["sky to sun"] = np.uint8(
+        np.array([80, 140, 220]) + (down / 239)[..., np.newaxis] * np.array([175, 60, -140])
+    )
+    return found
+
+
+def hue_changes(pair: tuple[Image, Image]) -> NDArray[np.float64]:
+    """Return how far hues turn in degrees, where a colour is bright and has a hue."""
+    before, after = (one.astype(np.float64) / 255 for one in pair)
+    has_hue = (before.max(axis=2) > 0.9) & (before.max(axis=2) - before.min(axis=2) > 0.1)
+    angles = [
+        np.arctan2(
+            np.sqrt(3) * (one[..., 1] - one[..., 2]), 2 * one[..., 0] - one[..., 1] - one[..., 2]
+        )
+        for one in (before, after)
+    ]
+    turned = np.degrees(angles[1] - angles[0])[has_hue]
+    return np.abs((turned + 180) % 360 - 180) if turned.size else np.zeros(1)
+
+
 def after(image: Image, folder: Path) -> Image:
     """Return what the command makes of a photograph without options."""
     vkbloom.write(folder / "a.png", np.ascontiguousarray(image))
@@ -90,28 +135,35 @@ def fitted(image: Image, height: int, width: int) -> NDArray[np.float32]:
     return small[top : top + height, left : left + width]
 
 
-def main(folder: Path, hdr: list[str]) -> None:
-    """Write both pictures."""
-    images = photographs(hdr)
+def draw(images: dict[str, Image], path: Path) -> dict[str, tuple[Image, Image]]:
+    """Write a sheet of all pairs, print their figures, and return them."""
     rows = -(-len(images) // 2)
     sheet = np.full((rows * (HEIGHT + LABEL), 4 * WIDTH + 3 * GAP, 3), 24, np.uint8)
-    labels = []
+    labels, pairs = [], {}
     with tempfile.TemporaryDirectory() as temporary:
         for index, (name, image) in enumerate(images.items()):
-            pair = image, after(image, Path(temporary))
+            pair = pairs[name] = image, after(image, Path(temporary))
             top, left = index // 2 * (HEIGHT + LABEL), index % 2 * 2 * (WIDTH + GAP)
             for place, one in enumerate(pair):
                 begin = left + place * (WIDTH + GAP)
                 tile = np.rint(fitted(one, HEIGHT, WIDTH)).clip(0, 255).astype(np.uint8)
                 sheet[top : top + HEIGHT, begin : begin + WIDTH] = tile
             labels.append((left + 8, top + HEIGHT + 22, name))
-            changes = pair[1].astype(int) - pair[0]
-            print(f"{name}: darker by {max(0, -changes.min())} at most, mean {changes.mean():+.2f}")
-            if name == "city (made up)":
-                part = [one[120:520, 320:860] for one in pair]
-                vkbloom.write(folder / "photo.jpg", np.concatenate(part, axis=1), quality=88)
-    sheet = pictures.labelled(sheet, labels, 20)
-    vkbloom.write(folder / "photos.jpg", sheet, quality=86)
+            changes, hues = pair[1].astype(int) - pair[0], hue_changes(pair)
+            print(
+                f"| {name} | {max(0, -changes.min())} | {changes.mean():+.2f} | "
+                f"{np.median(hues):.1f} | {np.percentile(hues, 99):.1f} |"
+            )
+    vkbloom.write(path, pictures.labelled(sheet, labels, 20), quality=86)
+    return pairs
+
+
+def main(folder: Path, hdr: list[str]) -> None:
+    """Write the pictures."""
+    draw(graphics(), folder / "graphics.jpg")
+    pairs = draw(photographs(hdr), folder / "photos.jpg")
+    part = [one[120:520, 320:860] for one in pairs["city (made up)"]]
+    vkbloom.write(folder / "photo.jpg", np.concatenate(part, axis=1), quality=88)
 
 
 if __name__ == "__main__":

@@ -60,34 +60,33 @@ static void pack_hash(const struct vkb_shader *shader, unsigned char *bytes, siz
     *size += sizeof hash;
 }
 
+// The fields that are packed as they are.
+// clang-format off
+#define PACKED_FIELDS(PACK) \
+    PACK(name) PACK(geometry) PACK(textured) PACK(constants) PACK(reads) PACK(read_count) \
+    PACK(reading) PACK(fused) PACK(block_width) PACK(block_height) PACK(groups_width) \
+    PACK(groups_height) PACK(targets) PACK(target_count) PACK(depth) PACK(load) PACK(blend) \
+    PACK(turn) PACK(block)
+// clang-format on
+
+#define SIZE(field) +sizeof((struct vkb_pass_row *)NULL)->field
+// With those of two shaders and of the resources, and at most all parameters.
+_Static_assert(0 PACKED_FIELDS(SIZE) + 2 * sizeof(struct vkb_hash) + sizeof(uint64_t)
+                       + sizeof(union vkb_params)
+                   <= sizeof(struct vkb_pass_row),
+               "a packed row has space for all fields");
+#undef SIZE
+
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes)
 {
     size_t size = 0;
 
-#define PACK(field) \
-    memcpy(bytes + size, &pass->field, sizeof pass->field); \
-    size += sizeof pass->field
-    PACK(name);
-    PACK(geometry);
-    PACK(textured);
     pack_hash(pass->vertex, bytes, &size);
     pack_hash(pass->shader, bytes, &size);
-    PACK(constants);
-    PACK(reads);
-    PACK(read_count);
-    PACK(reading);
-    PACK(fused);
-    PACK(block_width);
-    PACK(block_height);
-    PACK(groups_width);
-    PACK(groups_height);
-    PACK(targets);
-    PACK(target_count);
-    PACK(depth);
-    PACK(load);
-    PACK(blend);
-    PACK(turn);
-    PACK(block);
+#define PACK(field) \
+    memcpy(bytes + size, &pass->field, sizeof pass->field); \
+    size += sizeof pass->field;
+    PACKED_FIELDS(PACK)
 #undef PACK
     // A hash of the serials: there is no space for all of them.
     uint64_t hash = VKB_HASH_START;

@@ -149,6 +149,8 @@ struct vkb_graph {
     uint32_t image_count, pass_count;
     size_t image_capacity, pass_capacity;
     void *owned[2];  // pixels of images, freed with the graph
+    // Of levels whose width follows from the aspect of the frame: the adapter's limit; 0: none.
+    uint32_t max_width;
     // Of a batch; 0 and NULL: of one image.
     uint32_t layers, layered_count;
     struct vkb_layered *layered;

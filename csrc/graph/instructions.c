@@ -30,29 +30,43 @@ uint32_t vkb_target(const uint32_t *at, uint32_t i)
     return 0;
 }
 
+// Whether all instructions with that opcode are pure.
+static bool is_plain(uint32_t code)
+{
+    return code == SPV_PHI || code == SPV_LOAD || code == SPV_ACCESS_CHAIN
+        || code == SPV_IN_BOUNDS_ACCESS_CHAIN
+        || (code >= SPV_VECTOR_EXTRACT_DYNAMIC && code <= SPV_IMAGE_READ)
+        || (code >= SPV_IMAGE && code <= SPV_IMAGE_QUERY_SAMPLES)
+        || (code >= SPV_CONVERT_F_TO_U && code <= SPV_FWIDTH_COARSE);
+}
+
 bool vkb_is_pure(const uint32_t *at)
 {
     const uint32_t code = vkb_opcode(at);
 
-    return code == SPV_PHI || code == SPV_LOAD || code == SPV_ACCESS_CHAIN
-        || code == SPV_IN_BOUNDS_ACCESS_CHAIN
-        || (code == SPV_EXT_INST && at[4] != GLSL_MODF && at[4] != GLSL_FREXP)
-        || (code >= SPV_VECTOR_EXTRACT_DYNAMIC && code <= SPV_IMAGE_READ)
-        || (code >= SPV_IMAGE && code <= SPV_IMAGE_QUERY_SAMPLES)
-        || (code >= SPV_CONVERT_F_TO_U && code <= SPV_FWIDTH_COARSE);
+    return is_plain(code) || (code == SPV_EXT_INST && at[4] != GLSL_MODF && at[4] != GLSL_FREXP);
+}
+
+static bool is_type(uint32_t code)
+{
+    return code >= SPV_TYPE_VOID && code < SPV_TYPE_FORWARD_POINTER;
+}
+
+bool vkb_has_result(uint32_t code)
+{
+    return code == SPV_LABEL || is_type(code) || code == SPV_EXT_INST || is_plain(code)
+        || (code >= SPV_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
+        || (code >= SPV_FUNCTION && code <= SPV_VARIABLE && code != SPV_FUNCTION_END)
+        || (code >= SPV_ATOMIC_LOAD && code <= SPV_ATOMIC_XOR && code != SPV_ATOMIC_STORE);
 }
 
 uint32_t vkb_result(const uint32_t *at)
 {
     const uint32_t code = vkb_opcode(at);
 
-    if (code == SPV_LABEL || (code >= SPV_TYPE_VOID && code < SPV_TYPE_FORWARD_POINTER))
+    if (code == SPV_LABEL || is_type(code))
         return at[1];
-    return vkb_is_pure(at) || (code >= SPV_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
-                || (code >= SPV_FUNCTION && code <= SPV_VARIABLE && code != SPV_FUNCTION_END)
-                || (code >= SPV_ATOMIC_LOAD && code <= SPV_ATOMIC_XOR && code != SPV_ATOMIC_STORE)
-             ? at[2]
-             : 0;
+    return vkb_has_result(code) ? at[2] : 0;
 }
 
 static bool set(uint32_t *value, uint32_t number)

@@ -9,7 +9,8 @@
 enum {
     SPV_MAGIC = 0x07230203,
     SPV_HEADER_WORDS = 5,
-    SPV_BOUND = 3,    // the word of the header that all ids are below
+    SPV_BOUND = 3,  // the word of the header that all ids are below
+    SPV_MAX_BOUND = 0x3fffff,
     SPV_SPEC_ID = 1,  // decorations
     SPV_BUILT_IN = 11,
     // Storage classes.
@@ -150,6 +151,9 @@ bool vkb_ends_block(const uint32_t *at);
 
 // Number i of the blocks that may follow this end of a block; 0: there are no more.
 uint32_t vkb_target(const uint32_t *at, uint32_t i);
+
+// Whether vkb_result may read its words.
+bool vkb_has_result(uint32_t opcode);
 
 // Whether it has a result, and no effect if nothing uses the result.
 bool vkb_is_pure(const uint32_t *at);

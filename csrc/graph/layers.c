@@ -62,7 +62,8 @@ static void declare_all(struct module *module)
 // Adds the layer to the coordinates `*place` of two numbers.
 static bool add_layer(struct module *module, uint32_t *place, struct vkb_error *error)
 {
-    const uint32_t *ids = module->ids, type = module->read.at[module->read.at[*place][1]][2];
+    const uint32_t *vector_type = vkb_type_of(&module->read, *place, SPV_TYPE_VECTOR);
+    const uint32_t *ids = module->ids, type = vector_type ? vector_type[2] : 0;
     struct vkb_code *made = &module->made;
     const uint32_t loaded = module->bound++, layer = module->bound++, result = module->bound++;
     uint32_t number = layer, vector = ids[UINT3];
@@ -86,8 +87,9 @@ static bool add_layer(struct module *module, uint32_t *place, struct vkb_error *
 static void query_size(struct module *module, uint32_t *words)
 {
     const uint32_t type = words[1], result = words[2], size = module->bound++;
+    const uint32_t *vector = vkb_type_of(&module->read, result, SPV_TYPE_VECTOR);
 
-    words[1] = module->ids[module->read.at[type][2] == module->ids[INT] ? INT3 : UINT3];
+    words[1] = module->ids[vector && vector[2] == module->ids[INT] ? INT3 : UINT3];
     words[2] = size;
     vkb_write(&module->made, words, vkb_word_count(words));
     VKB_WRITE(&module->made, SPV_VECTOR_SHUFFLE, type, result, size, size, 0, 1);

@@ -12,10 +12,15 @@ struct vkb_module {
     const uint32_t **at;                      // by id: what defines it; NULL: nothing
 };
 
-// Fails if the shader is not SPIR-V: if an instruction or an id is outside, or if it has no
-// function. Either way the caller frees `module->at` with vkb_free.
+// Fails if the shader is not well-formed SPIR-V, so that what follows reads within it: instructions
+// have the words that their opcodes need, ids are below the bound and defined once, branches lead
+// to labels, and functions are made of blocks. An id that is used may have no definition, as those
+// of opcodes that vkb_result does not know. Either way the caller frees `module->at` with vkb_free.
 bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
                      struct vkb_error *error);
+
+// The type of what defines an id, if that is known and has this opcode, or NULL.
+const uint32_t *vkb_type_of(const struct vkb_module *module, uint32_t id, uint32_t opcode);
 
 // Whether a type is that of a bool or a 32-bit integer.
 bool vkb_is_word(const struct vkb_module *module, uint32_t type);

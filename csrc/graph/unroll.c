@@ -173,6 +173,9 @@ static void write_function(struct vkb_unrolled *module)
 {
     const uint32_t *first = vkb_next(module->read.functions), *end = first;
 
+    module->fits &= vkb_opcode(first) == SPV_LABEL;
+    if (!module->fits)
+        return;
     vkb_write(&module->function, module->read.functions, vkb_word_count(module->read.functions));
     vkb_label_name(module, first[1]);
     while (vkb_opcode(end) != SPV_FUNCTION_END)
@@ -224,11 +227,10 @@ bool vkb_unroll(uint32_t **code, size_t *size, struct vkb_error *error)
     const struct vkb_shader shader = {.name = "a shader", .code = *code, .size = *size};
     struct vkb_code made = {.error = error};
 
-    if (!has_loop(*code + SPV_HEADER_WORDS, *code + *size / sizeof **code))
-        return true;
     struct vkb_unrolled *module = create(&shader, error);
     if (!module)
         return false;
+    module->fits &= has_loop(module->read.functions, module->read.end);
     read_declarations(module);
     module->fits &= read_function(module);
     // First, since it tells which declarations are needed.

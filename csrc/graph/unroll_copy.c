@@ -64,7 +64,9 @@ static bool is_constant(const struct vkb_unrolled *module, const uint32_t *at)
 
     if (code != SPV_LOAD)
         return vkb_is_pure(at) && (code < SPV_SAMPLE_IMPLICIT || code > SPV_IMAGE_READ);
-    const uint32_t *type = module->read.at[module->read.at[at[3]][1]];
+    const uint32_t *type = vkb_type_of(&module->read, at[3], SPV_TYPE_POINTER);
+    if (!type)
+        return false;
     return type[2] == SPV_UNIFORM_CONSTANT || type[2] == SPV_UNIFORM || type[2] == SPV_PUSH_CONSTANT
         || type[2] == SPV_INPUT;
 }
@@ -115,7 +117,8 @@ static void write_plain(struct vkb_unrolled *module, const uint32_t *at)
 
 static void write_variable(struct vkb_unrolled *module, const uint32_t *at)
 {
-    const uint32_t *type = module->read.at[module->read.at[at[1]][3]];
+    const uint32_t *pointer = vkb_type_of(&module->read, at[2], SPV_TYPE_POINTER);
+    const uint32_t *type = pointer ? module->read.at[pointer[3]] : NULL;
     struct id *id = &module->ids[at[2]];
     const bool is_array = type && vkb_opcode(type) == SPV_TYPE_ARRAY;
 
@@ -135,9 +138,12 @@ static bool take_element(struct vkb_unrolled *module, const uint32_t *at)
     id->place = 0;
     if (!base->place)
         return false;
+    module->fits &= vkb_word_count(at) == 5 && at[4] < module->read.bound;
+    if (!module->fits)
+        return true;
     const struct value index = module->ids[at[4]].value;
-    module->fits &= vkb_word_count(at) == 5 && index.known && index.number < base->elements;
-    id->place = base->place + index.number;
+    module->fits &= index.known && index.number < base->elements;
+    id->place = module->fits ? base->place + index.number : 0;
     return true;
 }
 

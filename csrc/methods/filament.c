@@ -19,7 +19,7 @@ static void choose_sizes(struct vkb_levels *levels)
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;
     const double height = values->resolution;
-    const double width = fmin(height * frame.width / frame.height, WIDEST_LEVEL);
+    const double width = fmin(height * frame.width / frame.height, vkb_widest_level(levels));
     const uint32_t most = (uint32_t)log2(floor(fmax(width, height))) + 1;
     const uint32_t wanted = (uint32_t)values->levels, count = wanted < most ? wanted : most;
     struct vkb_size size = {stepped(width), stepped(height)};

@@ -1,5 +1,5 @@
 // The forward system: draws the glow mesh into its own buffer, blurs it, and adds it to the lit
-// scene.
+// scene. Without a glow mesh, the emission of the body takes its place.
 #include "methods/methods.h"
 
 // The bloom buffers of the forward system have this size for every frame size. Published methods
@@ -33,6 +33,7 @@ static bool add_scene(const struct vkb_scene_source *source, const struct vkb_me
     }
     struct vkb_pass_row body =
         vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, *scene, depth, &stored);
+    body.constants.emitters = vkb_body_glows(source);
     return vkb_add_mesh(&body, source->body_textured, &vkb_shader_phong_textured_frag, graph,
                         error);
 }

@@ -76,6 +76,7 @@ static bool image_fits(const struct vkb_image_source *planned, const struct vkb_
 static bool scene_fits(const struct vkb_scene_source *planned, const struct vkb_scene_source *given)
 {
     return planned->has_sky == given->has_sky && planned->has_glow == given->has_glow
+        && planned->has_emission == given->has_emission
         && planned->body_textured == given->body_textured
         && planned->glow_textured == given->glow_textured;
 }

@@ -23,6 +23,13 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
     return combination;
 }
 
+double vkb_widest_level(const struct vkb_levels *levels)
+{
+    const double widest = 16384.0, limit = levels->graph->max_width;
+
+    return limit > 0.0 ? fmin(limit, widest) : widest;
+}
+
 static uint32_t half(uint32_t side)
 {
     return side > 1 ? side / 2 : 1;

@@ -5,10 +5,6 @@
 
 #include "passes/pass.h"
 
-// The widest level of a method that gives its levels a height and the aspect of the frame. Every
-// usual device has images of this width.
-#define WIDEST_LEVEL 16384.0
-
 struct vkb_levels {
     const struct vkb_settings *settings;
     const struct vkb_bloom_source *source;
@@ -31,6 +27,10 @@ struct vkb_combination {
 
 // A combination with the same `own` and `coarse` for all levels.
 struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse);
+
+// The widest level of a method that gives its levels a height and the aspect of the frame: 16384,
+// or the adapter's limit where that is lower.
+double vkb_widest_level(const struct vkb_levels *levels);
 
 // Half of a size, rounded down, at least 1 on each side.
 struct vkb_size vkb_halved(struct vkb_size size);

@@ -53,17 +53,21 @@ bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_so
                   struct vkb_size size, bool framebuffer, enum vkb_mode threshold,
                   struct vkb_graph *graph, uint32_t *glow, struct vkb_error *error)
 {
+    const bool own = vkb_body_glows(source);
     uint32_t depth;
 
     if (!vkb_add_first(settings, graph, format, size, framebuffer, glow, error)
         || !vkb_add_target(graph, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer, &depth,
                            error))
         return false;
-    struct vkb_pass_row row =
-        vkb_scene_row("glow", VKB_GEOMETRY_GLOW, &vkb_shader_glow_frag, *glow, depth, params);
+    struct vkb_pass_row row = vkb_scene_row("glow", own ? VKB_GEOMETRY_BODY : VKB_GEOMETRY_GLOW,
+                                            own ? &vkb_shader_emission_frag : &vkb_shader_glow_frag,
+                                            *glow, depth, params);
     row.constants.threshold_mode = threshold;
     row.params.mesh.limit = vkb_formats[format].limit;
     if (threshold != THRESHOLD_NONE)
         vkb_params_read(row.block, &settings->values, &row.params);
-    return vkb_add_mesh(&row, source->glow_textured, &vkb_shader_glow_textured_frag, graph, error);
+    return vkb_add_mesh(&row, own ? source->body_textured : source->glow_textured,
+                        own ? &vkb_shader_emission_textured_frag : &vkb_shader_glow_textured_frag,
+                        graph, error);
 }

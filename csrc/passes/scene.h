@@ -18,8 +18,15 @@ struct vkb_scene_source {
 // The parameters that all draws of a frame have.
 struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source);
 
+// Whether the forward system draws the body's emission, which then glows: a glow mesh takes its
+// place.
+static inline bool vkb_body_glows(const struct vkb_scene_source *source)
+{
+    return source->has_emission && !source->has_glow;
+}
+
 // Adds the pass that draws the glow mesh into "glow" and "glow_depth", with a threshold of this
-// mode.
+// mode. If the body glows instead, draws its emission.
 bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_source *source,
                   const struct vkb_mesh_params *params, enum vkb_format format,
                   struct vkb_size size, bool framebuffer, enum vkb_mode threshold,

@@ -117,6 +117,7 @@ PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
     }
     complete.image.size.height = height;
     if (vkb_hold_passes(state, settings_object, VKB_MAX_SIDE, &complete, &passes, &settings)) {
+        graph.max_width = renderer->device.max_side;
         if (!vkb_require_open(renderer, &error)
             || !vkb_source_build(&complete, &settings, VKB_MAX_SIDE, &graph, &error))
             vkb_raise(state, &error);

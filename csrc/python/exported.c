@@ -61,18 +61,50 @@ static struct exported_object *exported_of(PyObject *object)
     return (struct exported_object *)object;
 }
 
+// CUDA waits for streams when it frees memory, and these may wait for the GIL.
+void vkb_release_exports(struct vkb_exports *exports)
+{
+    struct vkb_export *surplus;
+    bool last;
+
+    do {
+        VKB_LOCK(vkb_memory);
+        surplus = vkb_exports_surplus(exports);
+        last = !surplus && vkb_exports_end_use(exports);
+        VKB_UNLOCK(vkb_memory);
+        if (surplus) {
+            Py_BEGIN_ALLOW_THREADS
+            vkb_cuda_free(exports->cuda, &surplus->memory);
+            Py_END_ALLOW_THREADS
+            VKB_LOCK(vkb_memory);
+            vkb_exports_remove(surplus);
+            VKB_UNLOCK(vkb_memory);
+        }
+    } while (surplus);
+    if (last) {
+        Py_BEGIN_ALLOW_THREADS
+        vkb_exports_free(exports);
+        Py_END_ALLOW_THREADS
+    }
+}
+
 static void dealloc(PyObject *object)
 {
     struct exported_object *self = exported_of(object);
     struct vkb_error ignored;
 
     // A forked process returns nothing: the device belongs to its parent.
-    if (self->run && self->process == vkb_current_process()) {
-        // After a failure. Other memory was filled before the device read it.
-        vkb_export_filled(self->run, &ignored);
-        VKB_LOCK(vkb_memory);
-        vkb_exports_give_back(self->exports, self->run);
-        VKB_UNLOCK(vkb_memory);
+    if (self->exports && self->process == vkb_current_process()) {
+        if (self->run) {
+            // After a failure. Other memory was filled before the device read it.
+            Py_BEGIN_ALLOW_THREADS
+            vkb_export_filled(self->run, &ignored);
+            Py_END_ALLOW_THREADS
+            VKB_LOCK(vkb_memory);
+            vkb_exports_give_back(self->exports, self->run);
+            VKB_UNLOCK(vkb_memory);
+        }
+        vkb_release_exports(self->exports);
     }
     vkb_free_object(object);
 }
@@ -98,6 +130,41 @@ static struct vkb_exports *open_exports(struct vkb_renderer *renderer, struct vk
     return renderer->exports;
 }
 
+// As open_exports, as a user of them.
+static struct vkb_exports *use_exports(struct vkb_renderer *renderer, struct vkb_error *error)
+{
+    VKB_LOCK(vkb_memory);
+    struct vkb_exports *exports = open_exports(renderer, error);
+    if (exports)
+        vkb_exports_begin_use(exports);
+    VKB_UNLOCK(vkb_memory);
+    return exports;
+}
+
+// Takes memory for a new object, whose `exports` it uses.
+static bool take_memory(struct exported_object *self, Py_ssize_t size, struct vkb_error *error)
+{
+    bool settled = true;
+
+    VKB_LOCK(vkb_memory);
+    const uint64_t unmarked = vkb_exports_unmarked(self->exports);
+    VKB_UNLOCK(vkb_memory);
+    if (unmarked) {
+        Py_BEGIN_ALLOW_THREADS
+        settled = vkb_cuda_settle(self->exports->cuda);
+        Py_END_ALLOW_THREADS
+    }
+    VKB_LOCK(vkb_memory);
+    if (settled)
+        vkb_exports_set_settled(self->exports, unmarked);
+    if (self->exports->device)
+        self->run = vkb_exports_take(self->exports, (uint64_t)size, error);
+    else
+        vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
+    VKB_UNLOCK(vkb_memory);
+    return self->run != NULL;
+}
+
 static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ssize_t size)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE((PyObject *)renderer));
@@ -111,12 +178,8 @@ static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ss
     if (!self)
         return NULL;
     self->process = renderer->process;
-    VKB_LOCK(vkb_memory);
-    self->exports = open_exports(renderer, &error);
-    if (self->exports)
-        self->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
-    VKB_UNLOCK(vkb_memory);
-    if (self->run)
+    self->exports = use_exports(renderer, &error);
+    if (self->exports && take_memory(self, size, &error))
         return self;
     Py_DECREF(self);
     return (void *)vkb_raise(state, &error);
@@ -193,16 +256,26 @@ PyObject *vkb_renderer_dlpack(PyObject *object, PyObject *image)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     struct vkb_error error = {0};
+    PyObject *capsule = NULL;
 
-    VKB_LOCK(vkb_memory);
-    struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
-    VKB_UNLOCK(vkb_memory);
-    // PyTorch exports only tensors of the current device.
-    if (!exports || !vkb_cuda_enter(exports->cuda, &error))
+    // The producer's code may close the renderer, and so may other threads beside it.
+    struct vkb_exports *exports = use_exports((struct vkb_renderer *)object, &error);
+    if (!exports)
         return vkb_raise(state, &error);
-    PyObject *capsule = call_dlpack(image, vkb_cuda_stream(exports->cuda));
-    vkb_cuda_leave(exports->cuda);
-    return capsule;
+    // PyTorch exports only tensors of the current device.
+    bool done = vkb_cuda_require_no_capture(exports->cuda, NULL, &error)
+             && vkb_cuda_enter(exports->cuda, &error);
+    if (done) {
+        capsule = call_dlpack(image, vkb_cuda_stream(exports->cuda));
+        vkb_cuda_leave(exports->cuda);
+        // A producer whose stream is captured takes this one into the capture.
+        done = !capsule || vkb_cuda_require_no_capture(exports->cuda, NULL, &error);
+    }
+    vkb_release_exports(exports);
+    if (done)
+        return capsule;
+    Py_XDECREF(capsule);
+    return vkb_raise(state, &error);
 }
 
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
@@ -218,6 +291,13 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "sKnKp:snapshot", &what, &address, &size, &after, &waits))
         return NULL;
+    // Before memory is taken, which would make the capture invalid.
+    struct vkb_exports *exports = use_exports(renderer, &error);
+    done = exports && vkb_cuda_require_no_capture(exports->cuda, (void *)(uintptr_t)after, &error);
+    if (exports)
+        vkb_release_exports(exports);
+    if (!done)
+        return vkb_raise(state, &error);
     struct exported_object *self = new_exported(renderer, size);
     if (!self)
         return NULL;
@@ -489,17 +569,17 @@ static PyObject *clone_export(PyObject *object, PyObject *arguments)
     other->process = self->process;
     VKB_LOCK(vkb_memory);
     const bool open = self->exports->device;
-    if (open)
-        other->run = vkb_exports_take(self->exports, (uint64_t)size, &error);
+    if (open) {
+        vkb_exports_begin_use(self->exports);
+        other->exports = self->exports;
+    }
     VKB_UNLOCK(vkb_memory);
     if (!open) {
         PyErr_SetString(PyExc_BufferError, "copy: the renderer is closed; copy the result");
         Py_DECREF(other);
         return NULL;
     }
-    if (other->run)
-        other->exports = self->exports;
-    done = other->run && order_stream(self, NULL, &error);
+    done = take_memory(other, size, &error) && order_stream(self, NULL, &error);
     if (done) {
         Py_BEGIN_ALLOW_THREADS
         done = vkb_cuda_copy(self->exports->cuda, other->run->memory.address,

@@ -6,12 +6,17 @@
 
 #include <string.h>
 
-// NumPy marks unaligned arrays with a prefix.
+// NumPy writes "=" for unaligned arrays, and "<" or ">" where a dtype names its byte order.
 char vkb_element_code(const Py_buffer *view)
 {
     const char *format = view->format ? view->format : "B";
+    const uint16_t probe = 1;
+    const bool is_little = *(const unsigned char *)&probe == 1;
+    const bool is_native = *format == '@' || *format == '=' || *format == (is_little ? '<' : '>')
+                        || (*format == '!' && !is_little);
 
-    if (*format == '@' || *format == '=')
+    // A byte has no order.
+    if (is_native || (view->itemsize == 1 && *format && strchr("<>!", *format)))
         ++format;
     return strlen(format) == 1 ? *format : 0;
 }
@@ -100,7 +105,10 @@ bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *im
     if (!hold_image(array, image))
         return false;
     if (!vkb_has_element(view, "Bef")) {
-        PyErr_Format(PyExc_TypeError, "%s: an array of uint8, float16 or float32 is needed", name);
+        PyErr_Format(PyExc_TypeError,
+                     "%s: elements of the format \"%s\" are not uint8, float16 or float32 in this "
+                     "machine's byte order",
+                     name, view->format);
         return false;
     }
     if (view->ndim != 3 || !has_sides(view) || (view->shape[2] != 3 && view->shape[2] != 4)) {
@@ -118,7 +126,10 @@ bool vkb_read_mask(PyObject *array, struct vkb_held_image *image)
     if (!hold_image(array, image))
         return false;
     if (!vkb_has_element(view, "f")) {
-        PyErr_SetString(PyExc_TypeError, "mask: an array of float32 is needed");
+        PyErr_Format(PyExc_TypeError,
+                     "mask: elements of the format \"%s\" are not float32 in this machine's byte "
+                     "order",
+                     view->format ? view->format : "B");
         return false;
     }
     if (view->ndim != 2 || !has_sides(view)) {

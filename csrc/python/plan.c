@@ -181,6 +181,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                         struct vkb_portion *portion, struct vkb_graph *graph,
                         struct vkb_error *error)
 {
+    graph->max_width = device->max_side;
     return (portion && portion->part ? vkb_build_part(source, settings, portion->part, graph, error)
             : portion && portion->cotangents
                 ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,

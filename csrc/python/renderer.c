@@ -92,28 +92,36 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
 }
 
 // Arrays and handles that are left keep what is theirs. Called with the lock, or at the end.
-static void close_memory(struct vkb_renderer *self)
+static void close_memory(struct vkb_renderer *self, bool settled)
 {
     VKB_LOCK(vkb_memory);
+    struct vkb_exports *exports = self->exports;
     vkb_pages_close(self->pages);
     vkb_residents_close(self->residents);
-    vkb_exports_close(self->exports);
+    if (exports)
+        vkb_exports_close(exports, settled);
     self->pages = NULL;
     self->residents = NULL;
     self->exports = NULL;
     VKB_UNLOCK(vkb_memory);
+    if (exports)
+        vkb_release_exports(exports);
 }
 
-// Streams of CUDA may still wait for the device, which has finished everything.
-static void end_waits(struct vkb_renderer *self)
+// Streams of CUDA may still wait for the device, which has finished everything. False: some may
+// wait afterwards, too.
+static bool end_waits(struct vkb_renderer *self)
 {
+    bool settled;
+
     VKB_LOCK(vkb_memory);
     struct vkb_exports *exports = self->exports;
     vkb_exports_complete(exports);
     VKB_UNLOCK(vkb_memory);
     Py_BEGIN_ALLOW_THREADS
-    vkb_exports_settle(exports);
+    settled = vkb_exports_settle(exports);
     Py_END_ALLOW_THREADS
+    return settled;
 }
 
 // Called with the lock and without the GIL. The validation layer reports objects that were not
@@ -135,8 +143,7 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
-    end_waits(self);
-    close_memory(self);
+    close_memory(self, end_waits(self));
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -177,7 +184,7 @@ static void dealloc(PyObject *object)
         return;
     vkb_renderer_release_finished(self);
     if (self->pages)
-        close_memory(self);
+        close_memory(self, true);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);

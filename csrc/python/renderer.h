@@ -80,6 +80,9 @@ void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pen
 void vkb_pending_release(struct vkb_pending *pending);
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg);
 
+// Ends a use of exports. With the GIL, which it releases, and without vkb_memory.
+void vkb_release_exports(struct vkb_exports *exports);
+
 // Fails if this is the address of no open screen of the renderer. With the renderer's lock.
 bool vkb_require_screen(const struct vkb_renderer *renderer, const struct vkb_screen *screen,
                         struct vkb_error *error);

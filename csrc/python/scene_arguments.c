@@ -15,7 +15,8 @@ static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, cons
     ++scene->view_count;
     if (view->len > 0 && vkb_has_element(view, codes))
         return view;
-    PyErr_Format(PyExc_TypeError, "scene: %s is an array of the wrong type", what);
+    PyErr_Format(PyExc_TypeError, "scene: %s is an array of the wrong type, \"%s\"", what,
+                 view->format ? view->format : "B");
     return NULL;
 }
 

@@ -26,8 +26,8 @@ bool vkb_require_tuple(PyObject *object, const char *what);
 int vkb_read_uint32(PyObject *object, void *number);
 int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
 
-// The buffer protocol's code of the element type; 0 if it is not a single number in native byte
-// order.
+// The buffer protocol's code of the element type; 0 if it is not a single number in this machine's
+// byte order, whether or not the format names the order.
 char vkb_element_code(const Py_buffer *view);
 bool vkb_has_element(const Py_buffer *view, const char *codes);
 

@@ -44,6 +44,8 @@ typedef int result;
 enum {
     OUT_OF_MEMORY = 2,
     NOT_INITIALIZED = 3,
+    STREAM_CAPTURE_IMPLICIT = 906,
+    CAPTURE_MODE_RELAXED = 2,
     STREAM_NON_BLOCKING = 1,
     EVENT_DISABLE_TIMING = 2,
     ATTRIBUTE_IS_MANAGED = 8,
@@ -106,6 +108,8 @@ struct uuid {
     NAME(cuStreamDestroy, "cuStreamDestroy_v2", (void *)) \
     NAME(cuStreamSynchronize, "cuStreamSynchronize", (void *)) \
     NAME(cuStreamWaitEvent, "cuStreamWaitEvent", (void *, void *, unsigned)) \
+    NAME(cuStreamIsCapturing, "cuStreamIsCapturing", (void *, int *)) \
+    NAME(cuThreadExchangeStreamCaptureMode, "cuThreadExchangeStreamCaptureMode", (int *)) \
     NAME(cuEventCreate, "cuEventCreate", (void **, unsigned)) \
     NAME(cuEventDestroy, "cuEventDestroy_v2", (void *)) \
     NAME(cuEventRecord, "cuEventRecord", (void *, void *)) \
@@ -243,18 +247,50 @@ static bool find_device(struct vkb_cuda *cuda, const uint8_t uuid[16], const cha
     return fail_missing(cuda, name, count, error);
 }
 
-// Every use of the context is between these two.
+// What this thread's calls do to captures of graphs, while the core makes calls.
+static _Thread_local int capture_mode;
+
+// Every use of the context is between these two. Waits, imports and frees would else invalidate
+// captures of any thread, which have nothing to do with the own stream.
 static bool enter(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return CU(error, cuda->cuCtxPushCurrent(cuda->context));
+    if (!CU(error, cuda->cuCtxPushCurrent(cuda->context)))
+        return false;
+    capture_mode = CAPTURE_MODE_RELAXED;
+    cuda->cuThreadExchangeStreamCaptureMode(&capture_mode);
+    return true;
 }
 
 static bool leave(struct vkb_cuda *cuda, bool done)
 {
     void *context;
 
+    cuda->cuThreadExchangeStreamCaptureMode(&capture_mode);
     cuda->cuCtxPopCurrent(&context);
     return done;
+}
+
+// Work of Vulkan cannot be recorded into a graph. A stream that waits for another one's event is
+// captured with it.
+static bool require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error)
+{
+    int status = 0;
+    const result answer = RESULT(cuda->cuStreamIsCapturing(stream, &status));
+
+    if (answer != STREAM_CAPTURE_IMPLICIT && status == 0)
+        return check(cuda, error, answer, "cuStreamIsCapturing");
+    return vkb_fail(error, VKB_ERROR_GENERAL,
+                    "CUDA graph: the stream is being captured, and the renderer's work cannot be "
+                    "recorded; make the call before or after the capture");
+}
+
+// As enter, to give work to the own stream and, unless it is NULL, to another one.
+static bool enter_streams(struct vkb_cuda *cuda, void *other, struct vkb_error *error)
+{
+    return enter(cuda, error)
+        && ((require_no_capture(cuda, cuda->stream, error)
+             && (!other || require_no_capture(cuda, other, error)))
+            || leave(cuda, false));
 }
 
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error)
@@ -287,12 +323,19 @@ void vkb_cuda_close(struct vkb_cuda *cuda)
 
 bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return enter(cuda, error);
+    return CU(error, cuda->cuCtxPushCurrent(cuda->context));
 }
 
 void vkb_cuda_leave(struct vkb_cuda *cuda)
 {
-    leave(cuda, true);
+    void *context;
+
+    cuda->cuCtxPopCurrent(&context);
+}
+
+bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error)
+{
+    return enter_streams(cuda, stream, error) && leave(cuda, true);
 }
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda)
@@ -384,7 +427,7 @@ bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
 {
     const struct semaphore_point point = {.value = value};
 
-    return enter(cuda, error)
+    return enter_streams(cuda, NULL, error)
         && leave(cuda, CU(error, cuda->cuSignalExternalSemaphoresAsync(&semaphore, &point, 1,
                                                                        cuda->stream)));
 }
@@ -394,22 +437,22 @@ bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void 
 {
     const struct semaphore_point point = {.value = value};
 
-    return enter(cuda, error)
+    return enter_streams(cuda, stream, error)
         && leave(cuda, CU(error, cuda->cuWaitExternalSemaphoresAsync(
                                      &semaphore, &point, 1, stream ? stream : cuda->stream)));
 }
 
 bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return enter(cuda, error) && leave(cuda, CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 
-void vkb_cuda_settle(struct vkb_cuda *cuda)
+bool vkb_cuda_settle(struct vkb_cuda *cuda)
 {
     struct vkb_error ignored;
 
-    if (enter(cuda, &ignored))
-        leave(cuda, cuda->cuCtxSynchronize() == 0);
+    return enter(cuda, &ignored) && leave(cuda, cuda->cuCtxSynchronize() == 0);
 }
 
 bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
@@ -458,7 +501,7 @@ static bool follow(struct vkb_cuda *cuda, void *after, struct vkb_error *error)
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    void *after, struct vkb_error *error)
 {
-    return enter(cuda, error)
+    return enter_streams(cuda, after, error)
         && leave(cuda, follow(cuda, after, error)
                            && CU(error, cuda->cuMemcpyDtoDAsync(to, from, size, cuda->stream))
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
@@ -467,7 +510,7 @@ bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address 
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
                          size_t size, void *after, struct vkb_error *error)
 {
-    return enter(cuda, error)
+    return enter_streams(cuda, after, error)
         && leave(cuda,
                  follow(cuda, after, error)
                      && CU(error, cuda->cuMemcpyDtoDAsync(to->address, from, size, cuda->stream))
@@ -491,7 +534,7 @@ bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error)
 {
-    return enter(cuda, error)
+    return enter_streams(cuda, NULL, error)
         && leave(cuda, CU(error, cuda->cuMemcpyDtoHAsync(to, from, size, cuda->stream))
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
@@ -499,22 +542,23 @@ bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_
 bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
                     struct vkb_error *error)
 {
-    return enter(cuda, error)
+    return enter_streams(cuda, NULL, error)
         && leave(cuda, CU(error, cuda->cuMemcpyHtoDAsync(to, from, size, cuda->stream))
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 
-void vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
+bool vkb_cuda_can_mark(const struct vkb_cuda *cuda)
+{
+    return cuda->cuCtxRecordEvent != NULL;
+}
+
+bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
 {
     struct vkb_error ignored;
 
-    if (!enter(cuda, &ignored))
-        return;
-    // Of all streams, since nothing tells on which ones the memory was used. Older drivers, and
-    // contexts that capture a graph, cannot record that, so the host waits.
-    if (!cuda->cuCtxRecordEvent || cuda->cuCtxRecordEvent(cuda->context, memory->event) != 0)
-        cuda->cuCtxSynchronize();
-    leave(cuda, true);
+    // Of all streams, since nothing tells on which ones the memory was used.
+    return vkb_cuda_can_mark(cuda) && enter(cuda, &ignored)
+        && leave(cuda, cuda->cuCtxRecordEvent(cuda->context, memory->event) == 0);
 }
 
 bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)

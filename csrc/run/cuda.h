@@ -24,9 +24,13 @@ struct vkb_cuda_memory {
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error);
 void vkb_cuda_close(struct vkb_cuda *cuda);
 
-// Makes the context the current one of this thread until vkb_cuda_leave.
+// Makes the context the current one of this thread until vkb_cuda_leave, for code of others.
 bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error);
 void vkb_cuda_leave(struct vkb_cuda *cuda);
+
+// Fails if the own stream or another one (NULL: none) is captured into a graph, which stays as it
+// is. All functions below that give work to streams do so, too.
+bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error);
 
 // Imports an exported timeline semaphore. The descriptor belongs to CUDA or is closed.
 void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vkb_error *error);
@@ -40,8 +44,9 @@ bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void 
                    struct vkb_error *error);
 // Waits until the own stream has done all work. Both may overlap with other calls.
 bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error);
-// The same of all streams of the context.
-void vkb_cuda_settle(struct vkb_cuda *cuda);
+// The same of all streams of the context. Fails, and makes captures of graphs invalid, if a stream
+// is captured.
+bool vkb_cuda_settle(struct vkb_cuda *cuda);
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
 // As other libraries get it.
@@ -54,6 +59,7 @@ void vkb_cuda_name(const struct vkb_cuda *cuda, int ordinal, char name[VKB_CUDA_
 // Imports exported memory. The descriptor belongs to CUDA or is closed.
 bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
                      struct vkb_cuda_memory *memory, struct vkb_error *error);
+// Waits for work that uses it. May overlap with other calls.
 void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 
 // Fails with a value error unless this is memory of the GPU that is not managed. `what` is the
@@ -72,7 +78,7 @@ bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error);
 // Makes all work that the context gets from now on wait for the copy, so that its source can be
 // freed or overwritten: nothing tells which stream would do that. False where drivers are too old,
-// or while a graph is captured; then the host has to wait.
+// or while a graph is captured, which becomes invalid; then the host has to wait.
 bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to);
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
@@ -80,8 +86,10 @@ bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from
                     struct vkb_error *error);
 
 // Remembers the work that the context has got so far, which may use the memory; and whether it is
-// over.
-void vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
+// over. Older drivers cannot mark it, nor is it possible while a stream is captured into a graph,
+// which becomes invalid.
+bool vkb_cuda_can_mark(const struct vkb_cuda *cuda);
+bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 
 #endif

@@ -104,7 +104,7 @@ static bool gather(struct vkb_run *run, const struct vkb_gather_work *given,
 
     work.counts = (VkDescriptorBufferInfo){
         readback->counts.handle,
-        (VkDeviceSize)run->counts_slot * VKB_COUNTS_SIZE,
+        0,
         VKB_COUNTS_SIZE * (work.layers ? work.layers : 1),
     };
     if (!work.to.buffer)

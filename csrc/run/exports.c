@@ -6,9 +6,11 @@
 #define KEPT_BYTES ((uint64_t)512 << 20)
 #define GRANULE    ((uint64_t)64 << 10)
 
-static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline)
+static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline,
+                             bool settled)
 {
-    if (timeline->cuda)
+    // A stream may still wait for it: CUDA's part, which does not need the device, is leaked.
+    if (timeline->cuda && settled)
         vkb_cuda_free_semaphore(exports->cuda, timeline->cuda);
     exports->device->vk.vkDestroySemaphore(exports->device->handle, timeline->semaphore, NULL);
     *timeline = (struct vkb_shared_timeline){0};
@@ -32,8 +34,8 @@ static void share_timelines(struct vkb_exports *exports)
         return;
     const struct vkb_messages *before = vkb_messages_begin(&exports->device->messages);
     if (!create_timeline(exports, &exports->filled) || !create_timeline(exports, &exports->drawn)) {
-        destroy_timeline(exports, &exports->filled);
-        destroy_timeline(exports, &exports->drawn);
+        destroy_timeline(exports, &exports->filled, true);
+        destroy_timeline(exports, &exports->drawn, true);
     }
     vkb_messages_end(before);
 }
@@ -52,6 +54,7 @@ struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct v
     if (!exports)
         return NULL;
     exports->device = device;
+    exports->users = 1;
     exports->cuda = vkb_cuda_open(device->adapter.uuid, device->adapter.name, error);
     if (exports->cuda) {
         share_timelines(exports);
@@ -61,9 +64,10 @@ struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct v
     return NULL;
 }
 
-static void destroy_export(struct vkb_exports *exports, struct vkb_export *one)
+static void destroy_export(struct vkb_export *one)
 {
-    vkb_cuda_free(exports->cuda, &one->memory);
+    const struct vkb_exports *exports = one->exports;
+
     if (exports->device) {
         const struct vkb_messages *before = vkb_messages_begin(&exports->device->messages);
         vkb_buffer_destroy(exports->device, &one->buffer);
@@ -88,8 +92,19 @@ static struct vkb_export *create_export(struct vkb_exports *exports, uint64_t si
     vkb_messages_end(before);
     if (done && vkb_cuda_import(exports->cuda, descriptor, one->buffer.size, &one->memory, error))
         return one;
-    destroy_export(exports, one);
+    vkb_cuda_free(exports->cuda, &one->memory);
+    destroy_export(one);
     return NULL;
+}
+
+// Memory whose last use is not known to be over is never used again.
+static bool is_unused(struct vkb_export *one)
+{
+    const struct vkb_exports *exports = one->exports;
+
+    if (one->given_back <= exports->settled)
+        return true;
+    return one->marked && vkb_cuda_passed(exports->cuda, &one->memory);
 }
 
 // The smallest that is up to an eighth too large and that no stream uses any more.
@@ -97,37 +112,39 @@ static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t 
 {
     struct vkb_export *found = NULL;
 
+    // All of them, since what is marked earlier is over earlier.
+    for (struct vkb_export *one = exports->idle; one; one = one->next)
+        one->marked = one->marked || vkb_cuda_mark(exports->cuda, &one->memory);
     for (struct vkb_export *one = exports->idle; one; one = one->next)
         if (one->size >= size && one->size - size <= size / 8 + GRANULE
-            && (!found || one->size < found->size) && vkb_cuda_passed(exports->cuda, &one->memory))
+            && (!found || one->size < found->size) && is_unused(one))
             found = one;
     return found;
 }
 
-static void drop_oldest(struct vkb_exports *exports)
+static void unlink_idle(struct vkb_exports *exports, struct vkb_export *one)
 {
-    struct vkb_export *oldest = exports->idle;
-
-    while (oldest->next)
-        oldest = oldest->next;
-    VKB_UNLINK(&exports->idle, oldest);
-    exports->idle_size -= oldest->size;
-    destroy_export(exports, oldest);
+    VKB_UNLINK(&exports->idle, one);
+    exports->idle_size -= one->size;
+    VKB_PUSH(&exports->taken, one);
 }
 
 struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error)
 {
+    // Marks make captures of graphs invalid.
+    if (!vkb_cuda_require_no_capture(exports->cuda, NULL, error))
+        return NULL;
     struct vkb_export *one = find_idle(exports, size);
 
-    if (one) {
-        VKB_UNLINK(&exports->idle, one);
-        exports->idle_size -= one->size;
-    } else if (!(one = create_export(exports, size, error))) {
+    if (one)
+        unlink_idle(exports, one);
+    else if ((one = create_export(exports, size, error)))
+        VKB_PUSH(&exports->taken, one);
+    else
         return NULL;
-    }
+    one->filling = one->marked = false;
     one->filled = one->drawn = 0;
-    VKB_PUSH(&exports->taken, one);
     return one;
 }
 
@@ -182,46 +199,76 @@ void vkb_exports_complete(struct vkb_exports *exports)
         one->drawn = 0;
 }
 
-void vkb_exports_settle(const struct vkb_exports *exports)
+bool vkb_exports_settle(const struct vkb_exports *exports)
 {
-    if (exports && exports->filled.semaphore)
-        vkb_cuda_settle(exports->cuda);
+    return !exports || !exports->filled.semaphore || vkb_cuda_settle(exports->cuda);
 }
 
-// A closed object is freed with its last memory.
-static void free_closed(struct vkb_exports *exports)
+// The mark is for the next call that takes memory, which knows of captures of graphs: this one runs
+// wherever an array is collected.
+void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
 {
-    if (exports->device || exports->taken)
-        return;
+    VKB_UNLINK(&exports->taken, one);
+    VKB_PUSH(&exports->idle, one);
+    exports->idle_size += one->size;
+    one->given_back = ++exports->last_given_back;
+}
+
+uint64_t vkb_exports_unmarked(const struct vkb_exports *exports)
+{
+    return !vkb_cuda_can_mark(exports->cuda) && exports->idle
+                && exports->last_given_back > exports->settled
+             ? exports->last_given_back
+             : 0;
+}
+
+void vkb_exports_set_settled(struct vkb_exports *exports, uint64_t given_back)
+{
+    if (given_back > exports->settled)
+        exports->settled = given_back;
+}
+
+struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports)
+{
+    struct vkb_export *oldest = exports->idle;
+
+    if (!oldest || (exports->device && exports->idle_size <= KEPT_BYTES))
+        return NULL;
+    while (oldest->next)
+        oldest = oldest->next;
+    unlink_idle(exports, oldest);
+    return oldest;
+}
+
+void vkb_exports_remove(struct vkb_export *one)
+{
+    VKB_UNLINK(&one->exports->taken, one);
+    destroy_export(one);
+}
+
+void vkb_exports_begin_use(struct vkb_exports *exports)
+{
+    ++exports->users;
+}
+
+bool vkb_exports_end_use(struct vkb_exports *exports)
+{
+    return --exports->users == 0;
+}
+
+void vkb_exports_free(struct vkb_exports *exports)
+{
     vkb_cuda_close(exports->cuda);
     vkb_free(exports);
 }
 
-void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
+void vkb_exports_close(struct vkb_exports *exports, bool settled)
 {
-    VKB_UNLINK(&exports->taken, one);
-    if (!exports->device) {
-        destroy_export(exports, one);
-        free_closed(exports);
-        return;
-    }
-    vkb_cuda_mark(exports->cuda, &one->memory);
-    VKB_PUSH(&exports->idle, one);
-    exports->idle_size += one->size;
-    while (exports->idle_size > KEPT_BYTES)
-        drop_oldest(exports);
-}
-
-void vkb_exports_close(struct vkb_exports *exports)
-{
-    if (!exports)
-        return;
-    while (exports->idle)
-        drop_oldest(exports);
+    for (struct vkb_export *one = exports->idle; one; one = one->next)
+        vkb_buffer_destroy(exports->device, &one->buffer);
     for (struct vkb_export *one = exports->taken; one; one = one->next)
         vkb_buffer_destroy(exports->device, &one->buffer);
-    destroy_timeline(exports, &exports->filled);
-    destroy_timeline(exports, &exports->drawn);
+    destroy_timeline(exports, &exports->filled, settled);
+    destroy_timeline(exports, &exports->drawn, settled);
     exports->device = NULL;
-    free_closed(exports);
 }

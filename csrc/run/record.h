@@ -30,7 +30,6 @@ struct vkb_run {
     struct vkb_cached_image *constants[4];
     size_t constant_starts[4];
     uint32_t constant_count;
-    uint32_t counts_slot;   // of the request that is being recorded
     bool unknown_specials;  // whether the source has NaN or infinity is counted on the device
 };
 

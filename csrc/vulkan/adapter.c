@@ -58,8 +58,8 @@ bool vkb_has_extension(const struct vkb_instance *instance, VkPhysicalDevice phy
     return done;
 }
 
-static bool read_pci(const struct vkb_instance *instance, struct vkb_adapter_info *adapter,
-                     struct vkb_error *error)
+// Leaves the address empty where it is unknown, or the query fails.
+static void read_pci(const struct vkb_instance *instance, struct vkb_adapter_info *adapter)
 {
     VkPhysicalDevicePCIBusInfoPropertiesEXT pci = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PCI_BUS_INFO_PROPERTIES_EXT,
@@ -68,22 +68,21 @@ static bool read_pci(const struct vkb_instance *instance, struct vkb_adapter_inf
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
         .pNext = &pci,
     };
+    struct vkb_error error = {0};
     bool found;
 
     if (!vkb_has_extension(instance, adapter->physical, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME, &found,
-                           error))
-        return false;
-    if (!found)
-        return true;
+                           &error)
+        || !found)
+        return;
     instance->vk.vkGetPhysicalDeviceProperties2(adapter->physical, &properties);
     snprintf(adapter->pci, sizeof adapter->pci, "%04x:%02x:%02x.%x", pci.pciDomain, pci.pciBus,
              pci.pciDevice, pci.pciFunction);
-    return true;
 }
 
-// *usable: whether the adapter can run vkbloom.
+// Whether the adapter can run vkbloom.
 static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physical,
-                     struct vkb_adapter_info *adapter, bool *usable, struct vkb_error *error)
+                     struct vkb_adapter_info *adapter)
 {
     VkPhysicalDeviceDriverProperties driver = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES,
@@ -98,11 +97,11 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     VkPhysicalDeviceProperties plain;
 
     instance->vk.vkGetPhysicalDeviceProperties(physical, &plain);
-    *usable = plain.apiVersion >= VK_API_VERSION_1_1;
-    if (!*usable)
-        return true;
+    if (plain.apiVersion < VK_API_VERSION_1_1)
+        return false;
     // Driver properties are core since Vulkan 1.2.
-    if (plain.apiVersion >= VK_API_VERSION_1_2)
+    const bool has_driver = plain.apiVersion >= VK_API_VERSION_1_2;
+    if (has_driver)
         id.pNext = &driver;
     instance->vk.vkGetPhysicalDeviceProperties2(physical, &properties);
 
@@ -110,6 +109,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
         .physical = physical,
         .device_type = plain.deviceType,
         .driver_id = driver.driverID,
+        .nonconformant = has_driver && driver.conformanceVersion.major == 0,
         .api_version = plain.apiVersion,
         .driver_version = plain.driverVersion,
         .queue_family = find_queue_family(instance, physical),
@@ -121,8 +121,8 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     memcpy(adapter->driver_info, driver.driverInfo, sizeof adapter->driver_info);
     memcpy(adapter->driver_uuid, id.driverUUID, sizeof adapter->driver_uuid);
     memcpy(adapter->uuid, id.deviceUUID, sizeof adapter->uuid);
-    *usable = adapter->queue_family != UINT32_MAX;
-    return !*usable || read_pci(instance, adapter, error);
+    read_pci(instance, adapter);
+    return adapter->queue_family != UINT32_MAX;
 }
 
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,
@@ -139,11 +139,7 @@ bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_i
         return true;
     if (result != VK_INCOMPLETE && !vkb_check(error, result, "vkEnumeratePhysicalDevices"))
         return false;
-    for (uint32_t i = 0; i < device_count; ++i) {
-        bool usable;
-        if (!describe(instance, devices[i], &adapters[*count], &usable, error))
-            return false;
-        *count += usable;
-    }
+    for (uint32_t i = 0; i < device_count; ++i)
+        *count += describe(instance, devices[i], &adapters[*count]);
     return true;
 }

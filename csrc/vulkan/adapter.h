@@ -18,6 +18,7 @@ struct vkb_adapter_info {
     char driver[VK_MAX_DRIVER_NAME_SIZE];
     char driver_info[VK_MAX_DRIVER_INFO_SIZE];
     VkDriverId driver_id;  // 0 before Vulkan 1.2
+    bool nonconformant;    // the driver says so
     uint32_t api_version;
     uint32_t driver_version;
     uint8_t driver_uuid[VK_UUID_SIZE];

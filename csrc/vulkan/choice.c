@@ -10,8 +10,8 @@ enum {
     NAMES_SIZE = 1536,
 };
 
-// The rank of an adapter for "auto"; lower is better.
-static int preference(const struct vkb_adapter_info *adapter)
+// The rank of an adapter's type; lower is better.
+static int type_rank(const struct vkb_adapter_info *adapter)
 {
     switch (adapter->device_type) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
@@ -25,6 +25,14 @@ static int preference(const struct vkb_adapter_info *adapter)
     default:
         return 4;
     }
+}
+
+// The rank of an adapter for "auto". Drivers that say that they are not conformant come last.
+static int preference(const struct vkb_adapter_info *adapter)
+{
+    enum { TYPES = 5 };
+
+    return type_rank(adapter) + (adapter->nonconformant ? TYPES : 0);
 }
 
 static bool is_cpu(const struct vkb_adapter_info *adapter)

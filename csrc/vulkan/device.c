@@ -347,6 +347,8 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
     if (!(device->workers = vkb_workers_create(error))
         || !vkb_adapter_open(adapter_choice, driver, validation, &device->instance,
                              &device->adapter, error)
+        || (device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
+            && !vkb_instance_require_room(device->instance, error))
         || !vkb_require_room("a device", DEVICE_MIB, error) || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);

@@ -187,7 +187,7 @@ void vkb_free(void *memory)
     free(memory);
 }
 
-bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error)
+bool vkb_has_room(size_t mib)
 {
     bool done = !REFUSED();
 #ifdef __linux__
@@ -198,9 +198,18 @@ bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error)
     if (room != MAP_FAILED)
         munmap(room, mib << 20);
 #endif
-    return done
-        || vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+    return done;
+}
+
+bool vkb_fail_room(const char *what, size_t mib, struct vkb_error *error)
+{
+    return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
                     "memory is short: %s needs %zu MiB of address space, and this process gets no "
                     "more. Raise its limit (ulimit -v)",
                     what, mib);
+}
+
+bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error)
+{
+    return vkb_has_room(mib) || vkb_fail_room(what, mib, error);
 }

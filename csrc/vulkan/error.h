@@ -72,5 +72,8 @@ extern const char vkb_memory_hint[];
 // Fails if the process gets no `mib` MiB of address space more (ulimit -v), which `what` needs.
 // Drivers that run out of it inside a call crash instead of reporting it.
 bool vkb_require_room(const char *what, size_t mib, struct vkb_error *error);
+bool vkb_has_room(size_t mib);
+// The failure of the first.
+bool vkb_fail_room(const char *what, size_t mib, struct vkb_error *error);
 
 #endif

@@ -18,15 +18,18 @@ const char vkb_install_hint[] =
 
 enum { MAX_INSTANCES = 8 };
 
-// lavapipe takes 400 MiB with LLVM, and each of its threads up to 144 for its stacks and
-// allocations.
-static size_t driver_mib(void)
+// Of address space. The loader loads the libraries of all drivers; lavapipe's, with LLVM, takes
+// 400 MiB.
+enum { LEAST_MIB = 448 };
+
+// Each thread of lavapipe takes up to 144 MiB for its stacks and allocations.
+static size_t lavapipe_mib(void)
 {
-    enum { LEAST = 448, THREAD = 144, MAX_THREADS = 32 };
+    enum { THREAD = 144, MAX_THREADS = 32 };
     const char *text = getenv("LP_NUM_THREADS");
     const unsigned long threads = text ? strtoul(text, NULL, 10) : vkb_core_count();
 
-    return LEAST + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
+    return LEAST_MIB + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
 }
 
 static struct vkb_lock lock;  // protects the instances and volk's globals
@@ -271,7 +274,9 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
         return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
                         sizeof instance->driver - 1);
     memcpy(instance->driver, driver, strlen(driver));
-    if (vkb_require_room("a Vulkan driver", driver_mib(), error)
+    instance->has_room = vkb_has_room(lavapipe_mib());
+    if ((instance->has_room || vkb_has_room(LEAST_MIB)
+         || vkb_fail_room("a Vulkan driver", lavapipe_mib(), error))
         && open_source(instance, &entry, error)
         && create_handle(instance, entry, validation ? &messenger : NULL, error)) {
         load_functions(instance);
@@ -326,6 +331,11 @@ void vkb_instance_close(struct vkb_instance *instance)
     if (--instance->users == 0 && forked)
         destroy_instance(instance);
     vkb_lock_release(&lock);
+}
+
+bool vkb_instance_require_room(const struct vkb_instance *instance, struct vkb_error *error)
+{
+    return instance->has_room || vkb_require_room("a Vulkan driver", lavapipe_mib(), error);
 }
 
 void vkb_instance_explain(struct vkb_error *error)

@@ -53,6 +53,7 @@ struct vkb_instance {
     VkInstance handle;
     char driver[4096];  // the path of its library; "": those that the system's loader finds
     bool validation;
+    bool has_room;  // at its creation there was address space for lavapipe
     bool surfaces;  // it has VK_KHR_surface, and those of the windows and screens that there are
     PFN_vkGetInstanceProcAddr get;  // of the loader, or of the driver
     struct vkb_instance_table vk;
@@ -70,6 +71,9 @@ struct vkb_instance {
 struct vkb_instance *vkb_instance_open(const char *driver, bool validation,
                                        struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
+
+// Checks that there is address space for lavapipe, which creates its threads with a device.
+bool vkb_instance_require_room(const struct vkb_instance *instance, struct vkb_error *error);
 
 // Adds probable causes and remedies to an error of opening something: too many renderers, or a fork
 // from a process with an instance.

@@ -19,6 +19,7 @@ cat >"$build/native.ini" <<END
 [binaries]
 llvm-config = '$llvm/bin/llvm-config'
 python = '$python'
+glslangValidator = '/opt/glslang/glslangValidator'
 END
 set -- --native-file "$build/native.ini"
 if test -n "$cross"; then

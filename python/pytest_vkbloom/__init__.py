@@ -132,7 +132,8 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
         info = renderer.info
         known = f"{info.name} {info.driver_info or info.driver}"
         if wanted is not None and wanted.lower() not in known.lower():
-            raise ValueError(f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}")
+            text = f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}"
+            pytest.fail(text, pytrace=False)
         yield renderer
 
 

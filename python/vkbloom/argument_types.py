@@ -153,6 +153,8 @@ def checked(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _
 
     @functools.wraps(function)
     def call(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
+        # pytest shows the call in the test, and not this function.
+        __tracebackhide__ = True
         # Too many and unknown arguments are left to Python's own error.
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
             accepted = kinds.get(name)

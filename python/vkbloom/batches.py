@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.device_arrays import DeviceArray
+from vkbloom.device_arrays import DeviceArray, memory_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -155,7 +155,7 @@ class Batches:
                     shape,
                     dtype,
                     _stride(shape, dtype),
-                    self._core.export(layers * _stride(shape, dtype)),
+                    memory_for(self._core, layers * _stride(shape, dtype)),
                 )
                 for name, shape, dtype in plan.outputs
             ]

@@ -31,6 +31,7 @@ __all__ = [
     "check_size",
     "check_time",
     "import_extra",
+    "native_order",
     "on_another_device",
 ]
 
@@ -179,13 +180,23 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
             raise TypeError(
                 f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
             )
-        array = array.astype(array.dtype.newbyteorder("="), copy=False)
+        array = native_order(array)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise ValueError(
             f"{name}: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
             + _shape_cure(array.shape)
         )
     return array
+
+
+def native_order(array: NDArray[Any]) -> NDArray[Any]:
+    """Return the values with a dtype that names no byte order, as a view where that is possible.
+
+    Libraries that compare the format strings of the buffer protocol take "f", and not "<f".
+    """
+    native = array.dtype.newbyteorder("=")
+    # `astype` alone keeps the dtype of an array whose order is this machine's.
+    return array.astype(native, copy=False).view(native)
 
 
 def check_emission(emission: object, image: NDArray[Any]) -> NDArray[Any]:
@@ -302,6 +313,8 @@ def _shape_cure(shape: tuple[int, ...]) -> str:
         return "; convert grey to RGB: np.repeat(image, 3, axis=2)"
     if len(shape) == 3 and shape[0] in (3, 4) and shape[2] not in (0, 3, 4):
         return "; move the channels last: np.moveaxis(image, 0, -1)"
+    if len(shape) == 4 and shape[1] in (3, 4) and shape[3] not in (0, 3, 4):
+        return "; move the channels last: np.moveaxis(images, 1, -1)"
     return ""
 
 

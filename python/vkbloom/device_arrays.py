@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
@@ -22,6 +23,7 @@ __all__ = [
     "Taken",
     "fill",
     "likeness",
+    "memory_for",
     "merged",
     "on_cuda",
     "on_host",
@@ -253,13 +255,35 @@ def place_of(array: object) -> Place:
     return "viewed" if isinstance(array._memory, np.ndarray) else "cuda"
 
 
+def _require_no_capture() -> None:
+    """Raise Error if PyTorch captures a CUDA graph in this thread, before that becomes invalid.
+
+    Memory of arrays is used again when all streams have done their work, which CUDA tells of no
+    context that captures. It does not tell of captures either.
+    """
+    torch = sys.modules.get("torch")
+    if torch is None or not torch.cuda.is_initialized():
+        return
+    if torch.cuda.is_current_stream_capturing():
+        raise _core.Error(
+            "CUDA graph: PyTorch's stream is being captured, and the renderer's work cannot be "
+            "recorded; make the call before or after torch.cuda.graph"
+        )
+
+
+def memory_for(core: _core.Renderer, size: int) -> _core.Exported:
+    """Return memory of the device that CUDA shares, of so many bytes."""
+    _require_no_capture()
+    return core.export(size)
+
+
 def placed(array: NDArray[Any], place: Place, core: _core.Renderer) -> NDArray[Any] | DeviceArray:
     """Return an array of the host as if it were a framebuffer at that place."""
     if place == "host":
         return array
     memory: _core.Exported | NDArray[Any] = array
     if place == "cuda":
-        memory = core.export(array.nbytes)
+        memory = memory_for(core, array.nbytes)
         memory.write(np.ascontiguousarray(array))
     return DeviceArray(memory, array.shape, array.dtype.name)
 
@@ -393,7 +417,7 @@ def _from_interface(image: Any, name: str) -> _Array:
     if about.get("mask") is not None:
         raise ValueError(f"{name}: a mask of __cuda_array_interface__ is not taken")
     try:
-        dtype = np.dtype(typestr).name if typestr[0] in "<|=" else typestr
+        dtype = np.dtype(typestr).name if np.dtype(typestr).isnative else typestr
     except TypeError:
         dtype = typestr
     if dtype not in _FORMATS:
@@ -440,6 +464,7 @@ def take(
     `waits`: Until the copy is complete. Otherwise the core's `run` does that, and the array must
     not change before.
     """
+    _require_no_capture()
     try:
         core.cuda()
     except _core.Error as error:

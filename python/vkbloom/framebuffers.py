@@ -17,6 +17,10 @@ class MadeWith(Protocol):
     def encoding(self) -> str:
         """The encoding of `final`, or "none"."""
 
+    @property
+    def glow_note(self) -> str:
+        """What `glow` shows if it is not the light above the threshold."""
+
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name, and ``method``."""
 

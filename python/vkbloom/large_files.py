@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
@@ -19,16 +18,17 @@ from vkbloom.argument_types import checked
 from vkbloom.bands import Band, BloomByBands, ImageByBands
 from vkbloom.checks import check_emission, check_mask
 from vkbloom.core_access import core_of
-from vkbloom.io import image_reading
-from vkbloom.io.array_files import divided, has_straight, premultiplied
+from vkbloom.io import image_reading, image_writing
+from vkbloom.io.alpha import divided, hidden_notes
+from vkbloom.io.array_files import has_straight, premultiplied
 from vkbloom.io.displayed import Saved, check_saved
+from vkbloom.io.files import settings_facts
 from vkbloom.io.glows import alike, grey_mask
 from vkbloom.io.images import Colour, Picture, SavedColour, StoredImage
 from vkbloom.io.rows import Rows, opened_rows, written_rows
 from vkbloom.named_settings import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
-from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     from vkbloom import _core
@@ -69,6 +69,7 @@ def apply_file(
     view: str | None = None,
     raw: bool = False,
     half: bool | None = None,
+    bits: int | None = None,
     expand: float | None = None,
     quality: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -111,6 +112,8 @@ def apply_file(
     half : bool, optional
         Whether to hold floats in half the memory, as half floats. Default: 8-bit files of 64
         million pixels or more.
+    bits : {8, 16, 32}, optional
+        Size of a number in `target`. Default: that of `source`, or the closest one of the format.
     expand : float, optional
         What the highlights of a file of integers are expanded up to, as for `read`.
     quality : int, optional
@@ -170,9 +173,9 @@ def apply_file(
     work = _Work(reading, chosen, progress)
     if renderer is None:
         with Renderer() as own:
-            work.write(core_of(own), Path(target), saved, quality)
+            work.write(core_of(own), Path(target), saved, quality, bits=bits)
     else:
-        work.write(core_of(renderer), Path(target), saved, quality)
+        work.write(core_of(renderer), Path(target), saved, quality, bits=bits)
     return tuple(work.notes)
 
 
@@ -189,19 +192,30 @@ class _Work:
         self._settings = settings
         self._progress = progress
         self._done = 0
+        self._is_zero = False
         self.notes: dict[str, None] = {}
 
-    def write(self, core: _core.Renderer, target: Path, saved: Saved, quality: int | None) -> None:
+    def write(
+        self,
+        core: _core.Renderer,
+        target: Path,
+        saved: Saved,
+        quality: int | None,
+        *,
+        bits: int | None,
+    ) -> None:
         """Render the file and write the result."""
-        facts = {
-            "Software": f"vkbloom {installed_version()}",
-            "vkbloom:settings": json.dumps(self._settings.to_dict()),
-        }
+        facts = settings_facts(self._settings, self._reading.expand)
         height = self._reading.height
         with ExitStack() as stack:
             finals = self._finals(core, stack)
-            write = stack.enter_context(written_rows(target, height, saved, facts, quality))
+            write = stack.enter_context(
+                written_rows(target, height, saved, facts, quality, bits=bits)
+            )
             for final in finals:
+                if not self._is_zero and self._reading.writes_straight(target):
+                    hidden = no_bloom.hidden(final, self._settings)
+                    self.notes.update(dict.fromkeys(filter(None, [hidden])))
                 losses = write(self._reading.result(final, self._settings))
                 self.notes.update(dict.fromkeys(losses))
                 self._count(len(final))
@@ -218,6 +232,7 @@ class _Work:
             return self._held_whole(core, taken)
         for count in bloom.reduce(taken):
             self._count(count)
+        self._is_zero = bloom.is_without
         if bloom.is_without:
             self.notes[f"{self._reading.source}: {no_bloom.reason(self._settings)}"] = None
         return bloom.finals(stack.enter_context(closing(self._reading.bands())))
@@ -260,7 +275,7 @@ class _Reading:
         self._is_blended = is_blended
         self._mask, self._emission = mask, emission
         self._layer, self._subimage = layer, subimage
-        self._colour, self._raw, self._expand = colour, raw, expand
+        self._colour, self._raw, self.expand = colour, raw, expand
         self._picture: Picture | None = None
         with opened_rows(source, subimage or 0, layer) as rows:
             self._size = rows.size
@@ -318,16 +333,24 @@ class _Reading:
 
     def _decoded(self, stored: StoredImage, notes: _Notes) -> Picture:
         # Only the picture's own highlights are expanded, not those of an emission.
-        expand = self._expand if notes.file == self.source else None
+        expand = self.expand if notes.file == self.source else None
         picture = image_reading.decode_file(
             stored, notes.file, self._colour, raw=self._raw, expand=expand
         )
         notes.add(picture)
         if self._is_blended:
             picture = premultiplied(picture)
+        elif notes.file == self.source:
+            notes.add_light(picture)
         if self._half and picture.pixels.dtype == np.float32:
             picture = replace(picture, pixels=picture.pixels.astype(np.float16))
         return picture
+
+    def writes_straight(self, target: Path) -> bool:
+        """Return whether `target` has alpha, and colours that are not multiplied by it."""
+        assert self._picture is not None
+        is_associated = self._picture.stored.associated
+        return image_writing.is_straight(target, is_associated=is_associated)
 
     def result(self, final: NDArray[Any], settings: Settings) -> Picture:
         """Return rows of `final` as a picture with the properties of the file."""
@@ -341,12 +364,17 @@ class _Notes:
     def __init__(self, file: str) -> None:
         self.file = file
         self._nan = self._infinite = 0
+        self._hidden = self._visible = 0.0
         self._texts: dict[str, None] = {}
 
     def add(self, picture: Picture) -> None:
         self._nan += int(np.isnan(picture.values).sum())
         self._infinite += int(np.isinf(picture.values).sum())
         self._texts.update(dict.fromkeys(picture.notes))
+
+    def add_light(self, picture: Picture) -> None:
+        self._hidden += picture.hidden
+        self._visible += picture.visible
 
     def add_text(self, text: str) -> None:
         self._texts[text] = None
@@ -356,7 +384,7 @@ class _Notes:
         specials = image_reading.specials_note(self._nan, self._infinite)
         if specials is not None:
             yield f"{self.file} {specials}"
-        for text in self._texts:
+        for text in (*self._texts, *hidden_notes(self._hidden, self._visible)):
             yield f"{self.file}: {text}"
 
 

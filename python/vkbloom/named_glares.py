@@ -186,7 +186,7 @@ GLARES: Final[Mapping[str, NamedGlare]] = {
 
 #: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
 #: ``docs/glare.md`` list what they are, with their sources.
-glares: Mapping[str, tuple[Glare, ...]] = Named("glare", GLARES, lambda one: one.stages)
+glares: Named[tuple[Glare, ...]] = Named("glare", GLARES, lambda one: one.stages)
 
 
 def read_glare(glare: object) -> tuple[Glare, ...]:

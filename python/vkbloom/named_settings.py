@@ -144,7 +144,7 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "pygfx/pygfx, bloom.py @ f5f8f72c",
     ),
     "spencer_photopic": Preset(
-        lambda: METHODS["convolution"](_psf().spencer(), boundary="edge", composite="mix"),
+        lambda: METHODS["convolution"](_psf().spencer(), composite="mix"),
         "the glare of an eye by day",
         "Spencer et al., SIGGRAPH 1995",
     ),
@@ -164,16 +164,12 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "Unreal Engine's convolution bloom; the kernel of iris_6",
     ),
     "camera_lens": Preset(
-        lambda: METHODS["convolution"](
-            _psf().harvey_shack(), boundary="edge", composite="mix", intensity=0.025
-        ),
+        lambda: METHODS["convolution"](_psf().harvey_shack(), composite="mix", intensity=0.025),
         "the 2.5 % of the light that a lens of 14 surfaces scatters",
         "Ritt, Sensors 20(21):6308, 2020",
     ),
     "iris_6": Preset(
-        lambda: METHODS["convolution"](
-            _psf().aperture(_psf().iris(blades=6)), boundary="edge", composite="mix"
-        ),
+        lambda: METHODS["convolution"](_psf().aperture(_psf().iris(blades=6)), composite="mix"),
         "diffraction at an iris of six blades at f/8",
         "physical optics",
     ),
@@ -186,4 +182,4 @@ PRESETS: Final[Mapping[str, Preset]] = {
 
 #: Name to settings. ``vkbloom presets`` and ``docs/presets.md`` list what they are, with their
 #: sources.
-presets: Mapping[str, Settings] = Named("preset", PRESETS, lambda one: one.make())
+presets: Named[Settings] = Named("preset", PRESETS, lambda one: one.make())

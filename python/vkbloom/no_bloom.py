@@ -1,4 +1,4 @@
-"""Notes for a bloom or a stage of glare that is zero, and for a bloom that darkens."""
+"""Notes for a bloom or a stage of glare that is zero, and for a bloom that darkens or is hidden."""
 
 from __future__ import annotations
 
@@ -14,11 +14,19 @@ from vkbloom.settings import Settings
 
 # Highlights that keep this share are as bright as before: a level of 8 bits near white is 0.9 %.
 _DARKER = 0.985
+# No pixel of an image whose values are below it is a highlight.
+_BLACK = 1e-6
+# The smallest alpha and the smallest light that 8 bits can hold.
+_LEAST = 1 / 255
+
+# Light that no display with 8 bits shows.
+_LEVEL = 1 / 255
 
 __all__ = [
     "brightest_of",
     "darkening",
     "empty_stages",
+    "hidden",
     "is_without",
     "notes",
     "only",
@@ -76,13 +84,30 @@ def darkening(pixels: NDArray[Any], frames: Frames) -> str:
             (one, 255 if one.dtype == np.uint8 else 1) for one in (pixels, frames["final"])
         )
     )
-    lit = before >= 0.9 * max(float(before.max()), 1e-6)
-    change = float(after[lit].mean()) / max(float(before[lit].mean()), 1e-6)
+    brightest = float(before.max(initial=0))
+    if brightest < _BLACK:
+        return ""
+    lit = before >= 0.9 * brightest
+    change = float(after[lit].mean()) / float(before[lit].mean())
     if settings.encoding != "none" or change > _DARKER:
         return ""
     return (
         f"the bloom darkens the highlights to {100 * change:.0f} % of their light: the composite "
         f"{settings.composite} takes light from them; add it with --composite add or --preset photo"
+    )
+
+
+def hidden(final: NDArray[Any], settings: Settings) -> str:
+    """Return a text if light lies on transparent pixels of a file with straight alpha; else ""."""
+    if not settings.bloom or settings.alpha != "keep" or final.shape[2] != 4:
+        return ""
+    least = _LEAST * (255 if final.dtype == np.uint8 else 1)
+    is_clear = final[:, :, 3] < least
+    if not (final[:, :, :3].max(axis=2, where=is_clear[:, :, None], initial=0) >= least).any():
+        return ""
+    return (
+        "the bloom on transparent pixels is not visible, because alpha hides it; --alpha max or "
+        "--alpha blur gives the bloom its own alpha"
     )
 
 
@@ -104,9 +129,17 @@ def notes(frames: Frames, image: NDArray[Any]) -> Iterator[str]:
 
 
 def empty_stages(frames: Frames, settings: Settings) -> Iterator[str]:
-    """Yield a text for each stage of glare whose threshold leaves nothing."""
+    """Yield a text for each stage of glare whose threshold leaves nothing, or nothing visible."""
     for name, stage in _stages(settings):
-        if name in frames and not frames[name][:, :, :3].any():
+        if name not in frames:
+            continue
+        light = float(np.nan_to_num(frames[name][:, :, :3]).max(initial=0)) * stage.intensity
+        if 0 < light * 2**settings.exposure < _LEVEL:
+            yield (
+                f"{name} adds at most {light:.2g}, less than a level of 8 bits: little is above "
+                f"its threshold {stage.threshold:g}; use a lower one or a higher intensity"
+            )
+        elif not light and stage.intensity:
             halved = f" after {stage.halvings} halvings" * bool(stage.halvings)
             hint = ", in which small highlights vanish; use fewer" * bool(stage.halvings)
             yield (

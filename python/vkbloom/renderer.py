@@ -8,8 +8,9 @@ import math
 import os
 import re
 import warnings
+import weakref
 from collections import abc
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, cast
 
 import numpy as np
 
@@ -50,6 +51,11 @@ _SCENE_SIZE = (1280, 720)
 # the number.
 _ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
 _NUMBER = re.compile(r"\d+")
+
+#: The renderers of this process by their numbers, which are never used again: operators of PyTorch
+#: take numbers only.
+RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
+_numbers = itertools.count(1)
 
 
 def _variants() -> str:
@@ -264,6 +270,8 @@ class Renderer:
         # What apply_each has checked last.
         self._named: tuple[object, tuple[str, ...]] = None, ()
         self._kept: KeptArrays | None = shared()
+        self._number = next(_numbers)
+        RENDERERS[self._number] = self
 
     @property
     def closed(self) -> bool:

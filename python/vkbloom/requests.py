@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from vkbloom import _core
-from vkbloom.device_arrays import DeviceArray, Place
+from vkbloom.device_arrays import DeviceArray, Place, memory_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -154,7 +154,7 @@ def new_memory(
 ) -> NDArray[Any] | _core.Exported:
     """Return an array for a framebuffer, or memory on the device."""
     if place == "cuda":
-        return core.export(math.prod(shape) * np.dtype(dtype).itemsize)
+        return memory_for(core, math.prod(shape) * np.dtype(dtype).itemsize)
     return new_array(core, shape, dtype)
 
 

@@ -167,6 +167,12 @@ class Settings(Record):
             raise TypeError("Settings is abstract; use a method, such as Separable")
         super().__post_init__()
 
+    @property
+    def glow_note(self) -> str:
+        """What `glow` shows if it is not the light above the threshold; empty if it is."""
+        is_frame = self.published and self.threshold is not None
+        return "the frame before its threshold" if is_frame else ""
+
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed, as `dataclasses.replace` does.
 

@@ -11,23 +11,39 @@ T = TypeVar("T")
 E = TypeVar("E")
 
 
-# A shorter name is part of many others.
-_LEAST_PART = 3
+# More changes than these, or than one for three letters, make another word.
+_MOST_CHANGES = 3
+_LETTERS = 3
 
 
 def nearest(name: object, known: Iterable[str]) -> str | None:
     """Return the known name that is most like another one; None if none is like it.
 
+    A name is like another one if few letters differ, or if one is a complete word of the other.
     Upper case, "-" and "_" make no difference.
     """
-    import difflib  # noqa: PLC0415  rarely needed
-
-    plain = {one.lower().replace("-", "_"): one for one in known}
-    asked = str(name).lower().replace("-", "_")
-    found = difflib.get_close_matches(asked, plain, n=1)
-    if not found and len(asked) >= _LEAST_PART:
-        found = [one for one in plain if asked in one or (len(one) >= _LEAST_PART and one in asked)]
+    plain = {one.lower().replace("-", "_").strip("_"): one for one in known}
+    asked = str(name).lower().replace("-", "_").strip("_")
+    most = min(_MOST_CHANGES, (len(asked) + 1) // _LETTERS)
+    near = {one: _changes(asked, one) for one in plain if abs(len(one) - len(asked)) <= most}
+    found = [one for one in sorted(near, key=near.__getitem__) if near[one] <= most]
+    if not found and len(asked) >= _LETTERS:
+        found = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
     return plain[found[0]] if found else None
+
+
+def _changes(first: str, second: str) -> int:
+    """Return how many letters are to be changed, added, left out, or exchanged with the next."""
+    before: list[int] = []
+    row = list(range(len(second) + 1))
+    for y, letter in enumerate(first):
+        earlier, before, row = before, row, [y + 1]
+        for x, other in enumerate(second):
+            least = min(before[x] + (letter != other), before[x + 1] + 1, row[x] + 1)
+            if x and y and (letter, other) == (second[x - 1], first[y - 1]):
+                least = min(least, earlier[x - 1] + 1)
+            row.append(least)
+    return row[-1]
 
 
 def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
@@ -62,10 +78,13 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
 
 
 class Named(Mapping[str, T]):
-    """Objects by their published names; the error for an unknown name suggests one.
+    """Objects by their published names, as keys or attributes.
+
+    The error for an unknown name suggests one.
 
     - `kind`: What the objects are.
-    - `entries`: What each object is made of, when it is first asked for.
+    - `entries`: What each object is made of, when it is first asked for; `what` and `whose` of an
+      entry say what it looks like, and its source.
     """
 
     def __init__(self, kind: str, entries: Mapping[str, E], make: Callable[[E], T]) -> None:
@@ -90,5 +109,28 @@ class Named(Mapping[str, T]):
     def __len__(self) -> int:
         return len(self._entries)
 
+    def __getattr__(self, name: str) -> T:
+        # copy and pickle ask for methods before there are entries.
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0], name=name, obj=self) from None
+
+    def __dir__(self) -> Iterable[str]:
+        return [*super().__dir__(), *self]
+
     def __repr__(self) -> str:
-        return repr(dict(self))
+        width = max(map(len, self), default=0)
+        return "\n".join(f"{name:<{width}}  {one.what}" for name, one in self._entries.items())
+
+    def _repr_html_(self) -> str:
+        from html import escape  # noqa: PLC0415  rarely needed
+
+        rows = (
+            "".join(f"<td>{escape(text)}</td>" for text in (name, one.what, one.whose))
+            for name, one in self._entries.items()
+        )
+        head = f"<tr><th>{escape(self._kind)}</th><th>what</th><th>whose</th></tr>"
+        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"

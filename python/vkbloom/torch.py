@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from vkbloom.checks import import_extra
-from vkbloom.gradients.operators import number_of, replaced, text_of
+from vkbloom.gradients.operators import number_of, refuse_capture, replaced, text_of
 from vkbloom.reference.derivatives import differentiable
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings, field_info
@@ -168,6 +168,9 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
+        if not torch.compiler.is_compiling():
+            # Comparing parameters waits for the device, which would end the capture.
+            refuse_capture(image)
         values = dict(zip(self._names, self._values(), strict=True))
         return _call(
             image,
@@ -245,7 +248,10 @@ def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
     shape = tuple(image.shape)
     order = "(..., C, H, W)" if channels_first else "(..., H, W, C)"
     if len(shape) < 3 or shape[-3 if channels_first else -1] not in (3, 4):
-        raise ValueError(f"image: the shape {shape} is not {order} with 3 or 4 channels")
+        text = f"image: the shape {shape} is not {order} with 3 or 4 channels"
+        if len(shape) >= 3 and shape[-1 if channels_first else -3] in (3, 4):
+            text += f"; give channels_first={not channels_first}"
+        raise ValueError(text)
     if 0 in shape[-3:]:
         raise ValueError(f"image: the shape {shape} is not {order} with sides of at least 1")
     if not image.is_floating_point():

@@ -137,10 +137,9 @@ void transform_held(int a, int b, bool inverse)
         transform_few(a, j, b, inverse);
     [[unroll]] for (int q = 1; q < a; ++q) {
         [[unroll]] for (int j = 1; j < b; ++j) {
-            // All operands are constants, so that the compiler computes the angle.
-            float angle = 6.2831853071795865 * float(q * j) / float(a * b);
-            vec2 turned = vec2(cos(angle), inverse ? sin(angle) : -sin(angle));
-            held[b * q + j] = rotated(held[b * q + j], turned);
+            // All operands are constants, so that the driver computes the angle once.
+            vec2 angle = turn(q * j, a * b);
+            held[b * q + j] = rotated(held[b * q + j], inverse ? conjugate(angle) : angle);
         }
     }
     [[unroll]] for (int q = 0; q < a; ++q)

@@ -1,5 +1,8 @@
-// The glow mesh: its unlit colour times the intensity, after the threshold if there is one.
+// What glows, after the threshold if there is one: the glow mesh's unlit colour times the intensity, or,
+// with EMISSION, the emission of the body.
+#ifndef EMISSION
 #define GLOW
+#endif
 #include "lib/block.glsl"
 #include "scene/surface.glsl"
 #include "lib/threshold.glsl"
@@ -11,7 +14,11 @@ layout(location = 0) out vec4 colour;
 
 void main()
 {
-    vec3 kept = apply_threshold(surface_colour() * params.glow_intensity, THRESHOLD_MODE,
-                                  params.threshold, params.knee);
+#ifdef EMISSION
+    vec3 light = surface_emission();
+#else
+    vec3 light = surface_colour() * params.glow_intensity;
+#endif
+    vec3 kept = apply_threshold(light, THRESHOLD_MODE, params.threshold, params.knee);
     colour = vec4(storable(kept), 1.0);
 }

@@ -1,4 +1,4 @@
-// The lit mesh of the forward system.
+// The lit mesh of the forward system, with its emission if EMITTERS is not 0.
 #include "lib/block.glsl"
 #include "scene/phong.glsl"
 #include "scene/surface.glsl"
@@ -11,5 +11,7 @@ layout(location = 0) out vec4 colour;
 void main()
 {
     vec3 lit = phong(surface_colour(), normalize(view_normal), view_position);
+    if (EMITTERS != 0)
+        lit += surface_emission();
     colour = vec4(storable(lit), 1.0);
 }

@@ -212,7 +212,7 @@ class TestCommand:
             ("a.png b.png --diff d.unknown", 2, "'.unknown' is not the extension of a writable"),
             ("a.png b.png --diff d.png --diff-scale 0", 2, "scale: 0.0 is out of range"),
             ("a.png b.png --diff-scale 2", 2, "--diff-scale needs --diff"),
-            ("a.png b.png --diff none/d.png", 1, "none/d.png: No such file or directory"),
+            ("a.png b.png --diff none/d.png", 1, "none/d.png: there is no folder none"),
         ],
     )
     def test_impossible_comparison_fails_with_one_line(

@@ -49,12 +49,32 @@ def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
     done = CliRunner().invoke(program, ["fit", *wrong, *words])
     assert done.exit_code == 0
     verdict = done.stdout.splitlines()[2]
-    assert verdict.startswith("  poor: the method separable does not reach it with intensity; vary")
+    assert verdict == "  poor: no bloom was found"
     done = CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "0.001"])
     assert done.exit_code == 1
     assert "vkbloom: note: the smallest loss, " in done.stderr
     assert done.stderr.endswith(", is over --max-loss 0.001\n")
     assert CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "99"]).exit_code == 0
+
+
+def test_screenshots(tmp_path: Path) -> None:
+    """Every preset is ranked, the preset photo with and without an expanded image."""
+    names = [str(tmp_path / name) for name in ("image.png", "target.png")]
+    image = (np.random.default_rng(0).random((24, 32, 3)) ** 4).astype(np.float32)
+    vkbloom.write(names[0], image)
+    words = ["apply", *names, "--preset", "unity_urp", "--threshold", "0.4", "--intensity", "0.5"]
+    assert CliRunner().invoke(program, words).exit_code == 0
+    words = ["fit", *names, "--preset", "all", "--max-calls", "3"]
+    done = CliRunner().invoke(program, words)
+    assert done.exit_code == 0, done.output
+    begun = [
+        line.rpartition(" ")[2] for line in done.stdout.splitlines() if ", from the preset " in line
+    ]
+    assert sorted(begun) == sorted([*vkbloom.presets, "photo"])
+    words = ["fit", *names, "--preset", "unity_urp", "--json"]
+    (found,) = json.loads(CliRunner().invoke(program, words).stdout)
+    assert found["verdict"] == "good"
+    assert found["varied"] == pytest.approx({"threshold": 0.4, "intensity": 0.5}, rel=0.1)
 
 
 def test_json(files: tuple[str, str]) -> None:
@@ -99,7 +119,7 @@ def test_translate(renderer: vkbloom.Renderer) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--to", "kino"), "give what to translate: --preset NAME or --method NAME"),
+        (("--to", "kino"), "give what to translate: --preset NAME, --method NAME"),
         (("--preset", "kino"), "Missing option '--to'"),
         (("--preset", "kino", "--to", "pyramids"), "'pyramids'; did you mean 'pyramid'?"),
         (("--preset", "kino", "--to", "pyramid", "--vary", "levls"), "did you mean 'levels'?"),

@@ -267,7 +267,7 @@ class TestStores:
         """Known before anything is rendered."""
         out = tmp_path / "a.zarr"
         (tmp_path / "folder.png").mkdir()
-        for name, told in (("no/a.png", "No such file"), ("folder.png", "Is a directory")):
+        for name, told in (("no/a.png", "there is no folder"), ("folder.png", "Is a directory")):
             file = tmp_path / name
             result = run(
                 image_file,

@@ -44,6 +44,13 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(params=[False, True], ids=["complete", "by rows"])
+def by_rows_or_not(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read and write pictures in bands of rows, as large ones are, or not."""
+    if request.param:
+        monkeypatch.setattr("vkbloom.large_files.LARGE", 1)
+
+
 class TestSequences:
     @pytest.mark.parametrize(
         ("words", "written"),
@@ -88,12 +95,67 @@ class TestSequences:
         assert message in result.stderr
         assert names(frames) == before
 
-    def test_an_error_comes_after_the_images_before_it(self, frames: Path) -> None:
-        (frames / "f.0010.png").write_bytes(b"nothing of the kind")
+    @pytest.mark.parametrize("which", [(8,), (9, 10), (11,), (8, 9, 10, 11)])
+    def test_the_other_images_are_done(self, frames: Path, which: tuple[int, ...]) -> None:
+        for number in which:
+            (frames / f"f.{number:04d}.png").write_bytes(b"nothing of the kind")
         result = run("f.%04d.png", "g.%04d.png")
         assert result.exit_code == 1
-        assert "f.0010.png: is not a readable image" in result.stderr
-        assert [name for name in names(frames) if name[0] == "g"] == ["g.0008.png", "g.0009.png"]
+        *errors, last = result.stderr.splitlines()
+        assert [line.partition(" (")[0].partition(": is not")[0] for line in errors] == [
+            f"vkbloom: f.{number:04d}.png" for number in which
+        ]
+        assert last == f"vkbloom: {len(which)} of 4 images failed"
+        done = [f"g.{number:04d}.png" for number in range(8, 12) if number not in which]
+        assert [name for name in names(frames) if name[0] == "g"] == done
+
+    @pytest.mark.parametrize("words", [("--mask", "m.png"), ("--alpha", "max")])
+    def test_an_image_that_options_do_not_fit(self, frames: Path, words: tuple[str, ...]) -> None:
+        """The others are done, also those that were read before the error came."""
+        other = np.ones((5, 7, 3) if words[0] == "--mask" else (12, 16, 4), np.float32)
+        if words[0] == "--mask":
+            wrong, right = ["b.exr"], ["f.0008.png", "f.0009.png"]
+        else:
+            wrong, right = ["f.0008.png", "f.0009.png"], ["b.exr"]
+        vkbloom.write(frames / "b.exr", other)
+        vkbloom.write(frames / "m.png", np.ones((12, 16), np.float32))
+        result = run("f.0008.png", "b.exr", "f.0009.png", "out", *words)
+        assert result.exit_code == 1
+        assert result.stderr.endswith(f"vkbloom: {len(wrong)} of 3 images failed\n")
+        assert names(frames / "out") == sorted(right)
+
+    def test_a_target_that_cannot_be_written(self, frames: Path) -> None:
+        (frames / "g.0009.png").mkdir()
+        result = run("f.%04d.png", "g.%04d.png")
+        assert (result.exit_code, result.stderr.count("\n")) == (1, 2)
+        assert result.stderr.endswith("g.0009.png: Is a directory\nvkbloom: 1 of 4 images failed\n")
+        assert (frames / "g.0011.png").is_file()
+
+    def test_existing_images_are_skipped(self, frames: Path) -> None:
+        for number in (8, 10):
+            (frames / f"g.{number:04d}.png").write_bytes(b"before")
+        result = run("f.%04d.png", "g.%04d.png", "--skip-existing")
+        assert result.exit_code == 0
+        assert "skipped 2 of 4 images" in result.stdout
+        assert (frames / "g.0010.png").read_bytes() == b"before"
+        assert vkbloom.read(frames / "g.0011.png").shape == IMAGE.shape
+        assert run("f.%04d.png", "g.%04d.png", "--skip-existing").exit_code == 0
+
+    @pytest.mark.parametrize("order", ["exr first", "png first", "between"])
+    def test_each_file_starts_from_its_own_preset(self, frames: Path, order: str) -> None:
+        values = np.random.default_rng(0).random((12, 16, 3)).astype(np.float32) ** 8 * 3
+        vkbloom.write("x.exr", values)
+        vkbloom.write("y.png", values)
+        kinds = {"exr first": "eepp", "png first": "ppee", "between": "epep"}[order]
+        (frames / "in").mkdir()
+        for place, kind in enumerate(kinds):
+            source = Path("x.exr" if kind == "e" else "y.png")
+            (frames / f"in/{place}{source.suffix}").write_bytes(source.read_bytes())
+        for words in (("in", "out"), ("x.exr", "alone.exr"), ("y.png", "alone.png")):
+            assert CliRunner().invoke(program, ["apply", *words]).exit_code == 0
+        for file in (frames / "out").iterdir():
+            alone = vkbloom.read(f"alone{file.suffix}")
+            np.testing.assert_array_equal(vkbloom.read(file), alone)
 
     def test_sizes_and_types_change(self, frames: Path) -> None:
         values = np.linspace(0, 2, 5 * 7 * 3, dtype=np.float32).reshape(5, 7, 3)
@@ -117,9 +179,103 @@ class TestSequences:
         ended = python("-m", "vkbloom.cli", "apply", *words)
         assert ended.returncode == 1
         lines = ended.stderr.splitlines()
-        assert len(lines) == 4
+        assert len(lines) == 5
         assert all(line.startswith("vkbloom: ") for line in lines)
-        assert "f.0011.png: " in lines[-1]
+        assert "f.0011.png: " in lines[-2]
+
+
+class TestNotes:
+    @pytest.mark.parametrize(
+        ("out", "words", "is_told"),
+        [
+            ("b.png", (), True),
+            ("b.jpg", (), True),
+            ("b.png", ("--tonemap", "aces"), False),
+            ("b.png", ("--view", "ACES 2.0 - SDR 100 nits (Rec.709)"), False),
+            ("b.png", ("--output-colour", "pq"), False),
+            ("b.exr", (), False),
+        ],
+    )
+    @pytest.mark.usefixtures("by_rows_or_not")
+    def test_clipping_names_the_cure(
+        self,
+        tmp_path: Path,
+        out: str,
+        words: tuple[str, ...],
+        is_told: bool,
+    ) -> None:
+        file = vkbloom.write(tmp_path / "a.exr", np.full((24, 32, 3), 3, np.float32))
+        result = run(file, tmp_path / out, *words)
+        assert result.exit_code == 0, result.stderr
+        assert ("values above 1 are clipped; --tonemap" in result.stderr) is is_told
+
+    @pytest.mark.parametrize(
+        ("suffix", "words", "is_told"),
+        [
+            (".png", (), True),
+            (".tga", (), True),
+            (".png", ("--alpha", "max"), False),
+            (".png", ("--no-bloom",), False),
+            (".jpg", (), False),
+            (".exr", (), False),
+        ],
+    )
+    @pytest.mark.usefixtures("by_rows_or_not")
+    def test_alpha_that_hides_the_bloom(
+        self,
+        tmp_path: Path,
+        suffix: str,
+        words: tuple[str, ...],
+        is_told: bool,
+    ) -> None:
+        image = np.zeros((24, 32, 4), np.float32)
+        image[8:16, 8:16] = 1
+        file = vkbloom.write(tmp_path / "a.png", image)
+        result = run(file, tmp_path / f"b{suffix}", *words)
+        assert result.exit_code == 0, result.stderr
+        assert ("alpha hides it; --alpha max" in result.stderr) is is_told
+
+    @pytest.mark.parametrize("value", [0.0, 1e-7, np.nan])
+    @pytest.mark.parametrize("suffix", [".exr", ".png"])
+    def test_a_black_frame(self, tmp_path: Path, value: float, suffix: str) -> None:
+        """The first frame of a fade has no highlights that could become darker."""
+        file = vkbloom.write(tmp_path / f"a{suffix}", np.full((8, 8, 3), value, np.float32))
+        result = CliRunner().invoke(program, ["apply", str(file), str(tmp_path / f"b{suffix}")])
+        assert result.exit_code == 0, result.stderr
+        assert "nan %" not in result.stderr
+        assert "darkens" not in result.stderr
+
+
+@pytest.mark.usefixtures("by_rows_or_not")
+@pytest.mark.parametrize(
+    ("source", "out", "bits", "numbers"),
+    [
+        ("a.exr", "b.png", "16", "uint16"),
+        ("a.exr", "b.tif", "16", "uint16"),
+        ("a.png", "b.exr", "16", "half"),
+        ("a.png", "b.exr", "32", "float"),
+        ("a.png", "b.png", "16", "uint16"),
+        ("a.exr", "b.tif", "8", "uint8"),
+        ("a.exr", "b.jpg", "16", "jpeg has no numbers of 16 bits"),
+        ("a.exr", "b.exr", "8", "openexr has no numbers of 8 bits"),
+    ],
+)
+def test_bits(
+    tmp_path: Path,
+    source: str,
+    out: str,
+    bits: str,
+    numbers: str,
+) -> None:
+    vkbloom.write(tmp_path / source, np.linspace(0, 1, 24 * 3, dtype=np.float32).reshape(6, 4, 3))
+    result = run(tmp_path / source, tmp_path / out, "--bits", bits)
+    if " " in numbers:
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert numbers in result.stderr
+        return
+    assert result.exit_code == 0, result.stderr
+    _, facts = vkbloom.read(tmp_path / out, metadata=True)
+    assert facts["numbers"] == numbers
 
 
 def test_pipes(tmp_path: Path) -> None:
@@ -263,6 +419,7 @@ def test_no_bloom_is_noted(tmp_path: Path, words: list[str], said: str | None) -
         ),
         ("streaks:threshold=2,halvings=0+ghosts", "streaks is zero everywhere: no value is"),
         ("streaks+streaks:threshold=0.5,halvings=2", "streaks_1 is zero everywhere"),
+        ("streaks:threshold=0.1,halvings=0,intensity=0.0001", "streaks adds at most "),
         ("streaks:threshold=0.5,halvings=0", None),
         ("streaks:halvings=3", None),
     ],

@@ -683,9 +683,12 @@ def test_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
         ("Mesa 22.3.60 (LLVM 15.0.6)", "note"),
         ("Mesa 24.2.8-1ubuntu1 (LLVM 19.1.1)", "note"),
         ("", "note"),
+        ("git-12af", "note"),
     ],
 )
 def test_lavapipe_versions(driver_info: str, status: str) -> None:
-    finding = doctor._software([{"type": "cpu", "driver_info": driver_info, "bundled": False}])
+    adapter = {"type": "cpu", "driver_info": driver_info, "bundled": False, "name": "Swift"}
+    finding = doctor._software([adapter])
     assert finding.status == status
     assert "22.3.6 and 25.0.7" in finding.found
+    assert ("is Swift, not lavapipe" in finding.found) is ("Mesa" not in driver_info)

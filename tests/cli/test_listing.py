@@ -165,10 +165,31 @@ def test_a_large_picture_is_reduced() -> None:
         (("-o", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
         (("--sheet", "a.png", "-o", "b.jpg"), 2, "--out: b.jpg does not end in .png"),
         (("--sheet", "none.png", "-o", "b.png"), 1, "none.png: No such file"),
-        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: No such file"),
+        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: there is no folder none"),
     ],
 )
 def test_wrong_use(words: tuple[str, ...], status: int, told: str) -> None:
     result = run("glares", *words)
     assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
     assert told in result.stderr
+
+
+def test_each_glare_is_seen_on_lamps(tmp_path: Path) -> None:
+    """Lights are expanded until a glare shows what it is; the line of its tile says how far."""
+    image = np.full((90, 160, 3), 12, np.uint8)
+    for index, colour in enumerate(((255, 240, 200), (255, 60, 40), (120, 180, 255))):
+        image[14 + 20 * index : 18 + 20 * index, 30 + 40 * index : 34 + 40 * index] = colour
+    source, out = vkbloom.write(tmp_path / "a.png", image), tmp_path / "sheet.png"
+    result = run("glares", "--sheet", source, "-o", out, "--quiet")
+    assert result.exit_code == 0, result.output
+    sheet, cell = load(out).pixels, (480, 270)
+    count = 1 + len(STAGES) + len(GLARES)
+    tiles = [tile(sheet, index, cell).astype(int) for index in range(count)]
+    for index, one in enumerate(tiles):
+        for other in tiles[index + 1 :]:
+            assert (np.abs(one - other) > 16).any(axis=2).mean() > 5e-4
+    # A file of floats has the light that it has.
+    dim = vkbloom.write(tmp_path / "a.exr", np.full((18, 32, 3), 0.2, np.float32))
+    result = run("glares", "--sheet", dim, "-o", out)
+    assert "filament_flare shows nothing on " in result.stderr
+    assert "takes values above 10" in result.stderr

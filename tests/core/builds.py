@@ -114,7 +114,7 @@ def core_with_faults(temporary: Path) -> Path:
             ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")
             for folder in ("csrc", "shaders", "python"):
                 shutil.copytree(ROOT / folder, tree / folder, ignore=ignored)
-            # With its shaders' modules, of which those older than their sources are compiled again.
+            # With its shaders' modules, which are compiled again if these are not their sources.
             if (ROOT / "build" / "spirv").is_dir():
                 shutil.copytree(ROOT / "build" / "spirv", tree / "build" / "spirv")
             for name in ("setup.py", "pyproject.toml", "README.md"):

@@ -165,11 +165,19 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
         properties->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
 }
 
+// The first device that is asked for, of several: a GPU whose driver is not conformant.
+static bool is_nonconformant(VkPhysicalDevice physical)
+{
+    return lacks("conformance") && gpu_number(physical) == 0;
+}
+
 static VKAPI_ATTR void VKAPI_CALL get_properties(VkPhysicalDevice physical,
                                                  VkPhysicalDeviceProperties *properties)
 {
     below.vkGetPhysicalDeviceProperties(physical, properties);
     change_properties(properties);
+    if (is_nonconformant(physical))
+        properties->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
 }
 
 static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
@@ -180,8 +188,13 @@ static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
     if (lacks("gpus"))
         change_id(physical, properties->pNext);
     for (VkBaseOutStructure *next = properties->pNext; next; next = next->pNext)
-        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT
-            && lacks("limits"))
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES
+            && is_nonconformant(physical))
+            ((VkPhysicalDeviceDriverProperties *)next)->conformanceVersion =
+                (VkConformanceVersion){0};
+        else if (next->sType
+                     == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT
+                 && lacks("limits"))
             raise_to(&((VkPhysicalDeviceExternalMemoryHostPropertiesEXT *)next)
                           ->minImportedHostPointerAlignment,
                      65536);
@@ -264,6 +277,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, 
                                                      VkExtensionProperties *extensions)
 {
     const uint32_t room = *count;
+    if (lacks("query") && gpu_number(physical) == 0)
+        return VK_ERROR_OUT_OF_HOST_MEMORY;
     VkResult result =
         below.vkEnumerateDeviceExtensionProperties(physical, layer, count, extensions);
 

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -54,6 +55,17 @@ def use_handles(renderer: Renderer) -> None:
             images, renderer.apply_each(iter(images), Separable()), strict=True
         ):
             tolerance.assert_matches_reference(frames, image, Separable())
+
+
+def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
+    """Apply a bloom whose first level is as wide as the device's limit."""
+    image = picture(330, 1, 3, "float32")
+    frames = renderer.apply(image, settings)
+    width = frames["down_0"].shape[1]
+    assert width >= 4096
+    name = type(settings).__module__.rpartition(".")[2]
+    with mock.patch(f"vkbloom.reference.{name}.WIDEST_LEVEL", width):
+        tolerance.assert_matches_reference(frames, image, settings)
 
 
 def try_all(renderer: Renderer) -> dict[str, str]:
@@ -99,6 +111,8 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
         with_sky = dataclasses.replace(scene, skybox=sky)
         attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
+    for method in (vkbloom.BevyBloom(max_mip_dimension=16), vkbloom.FilamentBloom(resolution=16)):
+        attempt("wide", lambda: apply_wide(renderer, method))  # noqa: B023  called here
     for size in ((6000, 1), (1, 6000)):
         attempt(f"{size[0]} x {size[1]}", lambda: renderer.render(scene, None, size))  # noqa: B023
     return wrong

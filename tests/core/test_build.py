@@ -1,8 +1,9 @@
-"""The build's messages: what is missing, and the package that has it."""
+"""The build: what it compiles again, and its messages about what is missing or fails."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -25,30 +26,126 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     # Where NamedTuple's annotations look for their names.
     monkeypatch.setitem(sys.modules, spec.name, module)
-    spec.loader.exec_module(module)
+    is_file = Path.is_file
+    with monkeypatch.context() as patch:
+        # `setup.py sdist` needs no volk: it is looked for by a build alone.
+        patch.setattr(Path, "is_file", lambda self: self.stem != "volk" and is_file(self))
+        spec.loader.exec_module(module)
     monkeypatch.setattr(module, "include_folders", lambda: [tmp_path / "include"])
     monkeypatch.setattr(shutil, "which", lambda name: None)
+    for variable in ("DEB_BUILD_OPTIONS", "NIX_BUILD_CORES"):
+        monkeypatch.delenv(variable, raising=False)
     return module
 
 
 @pytest.mark.parametrize(
-    ("function", "arguments", "missing", "package"),
+    ("function", "missing", "package"),
     [
-        ("check_vulkan_headers", (), "vulkan/vulkan.h", "libvulkan-dev"),
-        ("volk_folder", (), "volk", "libvulkan-volk-dev"),
-        ("compile_shader", ("module", Path("a.spv")), "glslangValidator", "glslang-tools"),
-        ("optimize", ("module", Path("a.spv"), []), "spirv-opt", "spirv-tools"),
+        ("check_vulkan_headers", "vulkan/vulkan.h", "libvulkan-dev"),
+        ("volk_folder", "volk", "libvulkan-volk-dev"),
+        ("compiler", "glslangValidator", "glslang-tools"),
+        ("optimizer", "spirv-opt", "spirv-tools"),
     ],
 )
 def test_missing_build_tool_is_named_with_its_package(
-    build: ModuleType, function: str, arguments: tuple[Any, ...], missing: str, package: str
+    build: ModuleType, function: str, missing: str, package: str
 ) -> None:
     with pytest.raises(SystemExit) as caught:
-        getattr(build, function)(*arguments)
+        getattr(build, function)()
     text = str(caught.value)
     assert missing in text
     assert "missing; on Debian or Ubuntu: " in text
     assert text.endswith(f"apt install {package}")
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("kill -SEGV $$", "is ended by SIGSEGV (Segmentation fault):\nsaid"),
+        ("sh -c 'kill -ABRT $$'", "is ended by SIGABRT (Aborted):\nsaid"),
+        ("exit 3", "fails with status 3:\nsaid"),
+    ],
+    ids=["signal", "signal-below-a-shell", "status"],
+)
+def test_how_a_tool_fails(build: ModuleType, tmp_path: Path, command: str, reason: str) -> None:
+    tool = tmp_path / "spirv-opt"
+    tool.write_text(f"#!/bin/sh\necho said >&2\n{command}\n")
+    tool.chmod(0o755)
+    with pytest.raises(SystemExit) as caught:
+        build.run_tool(Path("bloom.comp"), str(tool))
+    assert str(caught.value).startswith(f"bloom.comp: {tool} {reason}")
+
+
+@pytest.mark.parametrize(
+    ("asked", "environment", "expected"),
+    [
+        (None, {"DEB_BUILD_OPTIONS": "nocheck parallel=3"}, 3),
+        (None, {"DEB_BUILD_OPTIONS": "nocheck", "NIX_BUILD_CORES": "5"}, 5),
+        (2, {"DEB_BUILD_OPTIONS": "parallel=3", "NIX_BUILD_CORES": "5"}, 2),
+        (None, {"NIX_BUILD_CORES": "0"}, 7),
+        (None, {}, 7),
+    ],
+)
+def test_processes_of_a_build(
+    build: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    asked: int | None,
+    environment: dict[str, str],
+    expected: int,
+) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(7), raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert build.processes(asked) == expected
+
+
+def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
+    build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shipped, kept = tmp_path / "shipped", tmp_path / "kept"
+    source = tmp_path / "a.comp"
+    source.touch()
+    versions = ["tool 1"]
+    compiled: list[str] = []
+
+    def write(module: Any, target: Path) -> None:
+        compiled.append(module.name)
+        target.touch()
+
+    monkeypatch.setattr(build, "SPIRV", kept)
+    monkeypatch.setattr(build, "SHIPPED", shipped)
+    monkeypatch.setattr(build, "sources", lambda: [source])
+    monkeypatch.setattr(build, "build_module", write)
+    monkeypatch.setattr(build, "run_tool", lambda *_: versions[-1])
+    built = [build.Module(name, source) for name in ("one", "two")]
+
+    def compile_from(folder: Path) -> list[str]:
+        compiled.clear()
+        assert build.compile_modules(built, 1) == folder
+        return compiled
+
+    # Nothing is there, and no tool to make it.
+    with pytest.raises(SystemExit, match="glslangValidator is missing"):
+        build.compile_modules(built, 1)
+    monkeypatch.setattr(shutil, "which", lambda name: name)
+    assert compile_from(kept) == ["one", "two"]
+    assert json.loads((kept / "made.json").read_text())["spirv-opt"] == "tool 1"
+    assert compile_from(kept) == []
+    # A build that was stopped goes on, unless a tool has changed meanwhile.
+    (kept / "two.spv").unlink()
+    assert compile_from(kept) == ["two"]
+    (kept / "two.spv").unlink()
+    versions.append("tool 2")
+    assert compile_from(kept) == ["one", "two"]
+    # Modules of a source distribution are taken without tools, until a source is changed.
+    kept.rename(shipped)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    assert compile_from(shipped) == []
+    source.write_text("changed")
+    with pytest.raises(SystemExit, match="glslangValidator is missing"):
+        build.compile_modules(built, 1)
+    monkeypatch.setattr(shutil, "which", lambda name: name)
+    assert compile_from(kept) == ["one", "two"]
 
 
 def test_headers_that_are_there(build: ModuleType, tmp_path: Path) -> None:
@@ -88,7 +185,7 @@ def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed
 
     def compiled(*options: str) -> list[str]:
         compiler = Compiler()
-        objects = build.compiled_once(compiler)(sources, str(tmp_path), extra_postargs=options)
+        objects = build.compiled_once(compiler, 1)(sources, str(tmp_path), extra_postargs=options)
         assert objects == [str(tmp_path / name) for name in ("one.o", "other.o")]
         return sorted(compiler.compiled)
 

@@ -351,8 +351,8 @@ import json, os, vkbloom
 def opened(choice):
     try:
         with vkbloom.Renderer(choice) as renderer:
-            return renderer.info.uuid[:2] + " " + renderer.info.pci
-    except (ValueError, vkbloom.AdapterNotFoundError) as error:
+            return f"{renderer.info.uuid[:2]} {renderer.info.pci} {renderer.info.type}"
+    except (ValueError, vkbloom.Error) as error:
         return type(error).__name__ + ": " + str(error)
 print(json.dumps([opened(choice) for choice in json.loads(os.environ["CHOICES"])]))
 """
@@ -389,7 +389,29 @@ FIRST, SECOND = "a0 0000:3f:00.0", "a1 0000:3e:00.0"
 def test_equal_gpus(
     layer: Path, tmp_path: Path, visible: str | None, choices: dict[str, str]
 ) -> None:
-    """The software adapter twice, as two GPUs."""
+    check_choices(layer, tmp_path, "gpus", choices, visible)
+
+
+def test_an_adapter_whose_query_fails_hides_no_other(layer: Path, tmp_path: Path) -> None:
+    choices = {
+        "uuid:a1": SECOND,
+        "pci:3e:00.0": SECOND,
+        # Its address is not known, and it does not open.
+        "pci:3f:00.0": "AdapterNotFoundError: .*a0a0.*a1a1",
+        "uuid:a0": "OutOfMemoryError: vkEnumerateDeviceExtensionProperties failed",
+    }
+    check_choices(layer, tmp_path, "gpus,query", choices)
+
+
+def test_a_driver_that_is_not_conformant_comes_last(layer: Path, tmp_path: Path) -> None:
+    choices = {"auto": ".* cpu", "software": ".* cpu", "hardware": ".* discrete"}
+    check_choices(layer, tmp_path, "conformance", choices)
+
+
+def check_choices(
+    layer: Path, tmp_path: Path, lesser: str, choices: dict[str, str], visible: str | None = None
+) -> None:
+    """Check what each choice opens of the software adapter twice, as two devices."""
     manifests = list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
     if not manifests:
         pytest.skip("lavapipe is not installed")
@@ -406,7 +428,7 @@ def test_equal_gpus(
     }
     if visible is not None:
         variables["CUDA_VISIBLE_DEVICES"] = visible
-    done = run(layer, "", "gpus", ("-c", CHOICES), **variables)
+    done = run(layer, "", lesser, ("-c", CHOICES), **variables)
     assert done.returncode == 0, done.stderr
     for expected, found in zip(choices.values(), json.loads(done.stdout), strict=True):
         assert re.match(expected, found), (expected, found)

@@ -58,6 +58,17 @@ def test_without_room_for_the_frame(room: int) -> None:
         assert "bloom_scale" in said
 
 
+def test_adapters_need_no_room_for_lavapipes_threads() -> None:
+    """Only lavapipe has them, and only once it is opened."""
+    program = PROGRAM.replace(
+        'with vkbloom.Renderer("software")', "assert vkbloom.adapters()\n    with None"
+    )
+    done = python("-c", program, "600", LP_NUM_THREADS="32", OPENBLAS_NUM_THREADS="1")
+    assert "'NoneType' object does not support the context manager" in done.stderr
+    said = output("-c", PROGRAM, "600", LP_NUM_THREADS="32", OPENBLAS_NUM_THREADS="1")
+    assert "a Vulkan driver needs 5056 MiB" in said
+
+
 def test_with_room() -> None:
     assert output("-c", PROGRAM, "2000", **THREADS) == "done\n"
 

@@ -92,10 +92,12 @@ MUTATIONS = {
 }
 
 
-# Compiles one shader of the tree anew, and writes all of them into build/spirv/spirv.c.
+# Compiles one shader of the tree anew, takes the others of a folder, and writes all of them into
+# build/spirv/spirv.c.
 SPIRV = """
 import shutil
 import sys
+from pathlib import Path
 import setuptools
 setuptools.setup = lambda **_: None
 import setup
@@ -106,10 +108,10 @@ def build_changed(module, target):
     if module.shader.name == sys.argv[1]:
         build_module(module, target)
     else:
-        shutil.copyfile(target.with_suffix(".spv"), target)
+        shutil.copyfile(Path(sys.argv[2]) / f"{module.name}.spv", target)
 
 setup.build_module = build_changed
-setup.write_spirv()
+setup.write_spirv(setup.processes())
 """
 
 
@@ -126,7 +128,7 @@ def build(mutation: Mutation, whole: Path, tree: Path) -> Path:
     text = shader.read_text()
     assert text.count(mutation.original) == 1
     shader.write_text(text.replace(mutation.original, mutation.mutated))
-    succeed(tree, sys.executable, "-c", SPIRV, mutation.shader)
+    succeed(tree, sys.executable, "-c", SPIRV, mutation.shader, whole / "build" / "spirv")
     (core,) = (tree / "python").rglob("_core*.so")
     (spirv,) = (tree / "build").rglob("spirv.o")
     objects = sorted((tree / "build").rglob("*.o"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import threading
 import time
@@ -67,6 +68,9 @@ def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
     """Calls that differ from the one before in one thing return what a new renderer returns."""
     image, mask = picture(16, 12, 4, dtype="float32"), picture(16, 12, 4, dtype="float32")[..., 0]
     scene = Scene.ufo()
+    lamp = dataclasses.replace(
+        scene.body, emission=np.ascontiguousarray(scene.body.vertices[:, 6:])
+    )
     first, second = (Pyramid(levels=2, threshold=threshold) for threshold in (0.1, 0.9))
     calls: list[Callable[[Renderer], Mapping[str, Any]]] = [
         lambda renderer: renderer.apply(image, first),
@@ -80,6 +84,8 @@ def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
         lambda renderer: renderer.apply(image, second, attachments="bloom"),
         lambda renderer: renderer.render(scene, second, (16, 12), attachments="bloom"),
         lambda renderer: renderer.render(scene, second, (16, 12), time=0.3, attachments="bloom"),
+        lambda renderer: renderer.render(Scene(scene.body), second, (16, 12)),
+        lambda renderer: renderer.render(Scene(lamp), second, (16, 12)),
     ]
     with Renderer() as renderer:
         for call in calls:

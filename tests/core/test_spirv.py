@@ -12,7 +12,7 @@ from vkbloom import _core
 
 MAGIC = 0x07230203
 HEADER_WORDS = 5
-DECORATE, FUNCTION, FUNCTION_END = 71, 54, 56
+DECORATE, FUNCTION, FUNCTION_END, EXTENDED = 71, 54, 56, 12
 NO_CONTRACTION = 42
 # OpFNegate, OpFAdd, OpFSub, OpFMul, OpFDiv, OpFRem, OpFMod, and from OpVectorTimesScalar to OpDot.
 FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
@@ -53,6 +53,19 @@ def test_no_operation_on_floats_may_be_contracted() -> None:
         counts.append(len(results))
     assert len(counts) > 60, "modules were not found"
     assert sum(counts) > 2000, "operations were not found"
+
+
+def test_no_function_has_an_absolute_error() -> None:
+    """Vulkan allows sine and cosine an error of 2^-11, and SwiftShader has it."""
+    # Of GLSL.std.450: trigonometry, from Sin to Atan2.
+    used = {
+        words[4]
+        for _, instructions in modules()
+        for words in instructions
+        if words[0] & 0xFFFF == EXTENDED
+    }
+    assert len(used) > 5, "functions were not found"
+    assert not used & set(range(13, 26))
 
 
 def test_loops_over_arrays_are_unrolled() -> None:

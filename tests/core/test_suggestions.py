@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import pickle
 from collections.abc import Callable
@@ -168,4 +169,31 @@ def test_the_signature_is_that_of_the_fields() -> None:
 def test_nothing_is_near() -> None:
     assert nearest("zzz", ["final", "bloom"]) is None
     assert nearest("of", ["roof_garden"]) is None
+    for asked, known in (
+        ("--gpu", "--psf"),
+        ("blade", "balance"),
+        ("strength", "threshold"),
+        ("saturate", "scatter"),
+        ("roof", "proof_reader"),
+    ):
+        assert nearest(asked, [known]) is None
     assert nearest("unity", ["unity_urp", "kino"]) == "unity_urp"
+    assert nearest("kion", ["unity_urp", "kino"]) == "kino"
+    assert nearest("--tresholds", ["--threshold"]) == "--threshold"
+
+
+@pytest.mark.parametrize(
+    ("named", "kind"), [(vkbloom.presets, "preset"), (vkbloom.glares, "glare")]
+)
+def test_published_names_are_a_table(named: Any, kind: str) -> None:
+    lines = repr(named).splitlines()
+    assert [line.split()[0] for line in lines] == list(named)
+    assert max(map(len, lines)) <= 110
+    assert repr(named).count("\n") + 1 == named._repr_html_().count("<tr>") - 1 == len(named)
+    assert {*named} <= {*dir(named)}
+    for name in named:
+        assert getattr(named, name) == named[name]
+    first = next(iter(named))
+    with pytest.raises(AttributeError, match=f"unknown {kind} '{first}x'; did you mean '{first}'"):
+        getattr(named, f"{first}x")
+    assert dict(copy.copy(named)) == dict(pickle.loads(pickle.dumps(dict(named))))

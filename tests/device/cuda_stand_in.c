@@ -2,6 +2,10 @@
 // It imports the memory that lavapipe exports by mapping its descriptor. With STAND_IN_LOG, it
 // writes what is left at the end to that file. The work of its stream is done in a thread; other
 // streams are the host's, whose work is done at once.
+//
+// Tests make calls fail, put callbacks into the stream and capture one of the host's streams into a
+// graph, with functions that CUDA does not have. What NVIDIA's driver 580 does to captures was
+// tried.
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -13,13 +17,52 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-enum { SUCCESS, INVALID_VALUE, OUT_OF_MEMORY, INVALID_DEVICE = 101 };
+enum {
+    SUCCESS,
+    INVALID_VALUE,
+    OUT_OF_MEMORY,
+    INVALID_DEVICE = 101,
+    NOT_READY = 600,
+    CAPTURE_UNSUPPORTED = 900,
+};
+enum { CAPTURE_MODE_GLOBAL = 0 };
 enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
 
 // What is there now, by kind; and bytes that go to and come from the host.
 static _Atomic long contexts, streams, events, memories, mappings, host_bytes, current;
 // Each thread has its own stack of contexts.
 static _Thread_local long current_here;
+static _Thread_local int capture_mode_here;
+
+// The capture of a stream: whether the stream of the core is a part of it, and whether a call has
+// made it invalid.
+static struct {
+    void *stream;  // NULL: none
+    _Atomic int joined, invalid;
+} capture;
+
+struct event {
+    int captured;
+    unsigned long after;  // so much work of the stream
+};
+
+// Names of the functions that fail.
+static char failing[128];
+
+// Calls for the whole context make captures invalid; others do unless the thread's mode is relaxed.
+static int refuses(const char *name, int whole)
+{
+    const int captured = capture.stream && (whole || capture_mode_here == CAPTURE_MODE_GLOBAL);
+
+    capture.invalid |= captured;
+    return captured ? CAPTURE_UNSUPPORTED : strstr(failing, name) ? OUT_OF_MEMORY : SUCCESS;
+}
+#define REFUSE(whole) \
+    do { \
+        const int answer = refuses(__func__, whole); \
+        if (answer) \
+            return answer; \
+    } while (0)
 
 struct memory_handle {
     int type;
@@ -66,6 +109,7 @@ struct work {
     size_t size;
     struct semaphore *signal, *wait;  // NULL: none
     uint64_t value;
+    void (*callback)(void);  // NULL: none
 };
 
 enum { MOST_WORK = 64 };
@@ -75,11 +119,14 @@ static struct {
     pthread_cond_t changed;
     struct work work[MOST_WORK];
     unsigned first, count;
+    unsigned long done;
     int started;
 } queue = {.mutex = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER};
 
 static void do_work(const struct work *work)
 {
+    if (work->callback)
+        work->callback();
     if (work->to) {
         usleep(5000);  // so that whoever should wait for it and does not is found
         memcpy(work->to, work->from, work->size);
@@ -103,6 +150,7 @@ static void *work_off(void *unused)
         pthread_mutex_lock(&queue.mutex);
         queue.first = (queue.first + 1) % MOST_WORK;
         --queue.count;
+        ++queue.done;
         pthread_cond_broadcast(&queue.changed);
     }
     return NULL;
@@ -112,6 +160,8 @@ static void push(struct work work)
 {
     pthread_t thread;
 
+    // What is captured there is not joined with the other stream.
+    capture.invalid |= capture.joined;
     pthread_mutex_lock(&queue.mutex);
     if (!queue.started++ && pthread_create(&thread, NULL, work_off, NULL) == 0)
         pthread_detach(thread);
@@ -122,10 +172,20 @@ static void push(struct work work)
     pthread_mutex_unlock(&queue.mutex);
 }
 
-static void finish(void)
+static unsigned long pushed(void)
 {
     pthread_mutex_lock(&queue.mutex);
-    while (queue.count > 0)
+    const unsigned long work = queue.done + queue.count;
+    pthread_mutex_unlock(&queue.mutex);
+    return work;
+}
+
+static void finish(void)
+{
+    const unsigned long work = pushed();
+
+    pthread_mutex_lock(&queue.mutex);
+    while (queue.done < work)
         pthread_cond_wait(&queue.changed, &queue.mutex);
     pthread_mutex_unlock(&queue.mutex);
 }
@@ -221,6 +281,7 @@ EXPORT int cuCtxPopCurrent_v2(void **context)
 
 EXPORT int cuCtxSynchronize(void)
 {
+    REFUSE(1);
     finish();
     return SUCCESS;
 }
@@ -240,18 +301,37 @@ EXPORT int cuStreamDestroy_v2(void *stream)
 
 EXPORT int cuStreamSynchronize(void *stream)
 {
+    REFUSE(0);
     finish();
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuStreamWaitEvent(void *stream, void *event, unsigned flags)
 {
+    if (event && ((struct event *)event)->captured && stream == &streams)
+        capture.joined = 1;
     return stream && event && !flags ? SUCCESS : INVALID_VALUE;
+}
+
+EXPORT int cuStreamIsCapturing(void *stream, int *status)
+{
+    *status =
+        capture.stream && (stream == capture.stream || (stream == &streams && capture.joined));
+    return SUCCESS;
+}
+
+EXPORT int cuThreadExchangeStreamCaptureMode(int *mode)
+{
+    const int before = capture_mode_here;
+
+    capture_mode_here = *mode;
+    *mode = before;
+    return SUCCESS;
 }
 
 EXPORT int cuEventCreate(void **event, unsigned flags)
 {
-    *event = calloc(1, 1);
+    *event = calloc(1, sizeof(struct event));
     if (*event)
         ++events;
     return *event && flags == 2 ? SUCCESS : INVALID_VALUE;
@@ -266,31 +346,41 @@ EXPORT int cuEventDestroy_v2(void *event)
 
 EXPORT int cuEventRecord(void *event, void *stream)
 {
+    *(struct event *)event = (struct event){capture.stream && stream == capture.stream, pushed()};
     return event && stream ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuEventQuery(void *event)
 {
-    finish();
-    return event ? SUCCESS : INVALID_VALUE;
+    REFUSE(0);
+    pthread_mutex_lock(&queue.mutex);
+    const int busy = queue.done < ((struct event *)event)->after;
+    pthread_mutex_unlock(&queue.mutex);
+    return busy ? NOT_READY : event ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuEventSynchronize(void *event)
 {
+    REFUSE(0);
     finish();
     return event ? SUCCESS : INVALID_VALUE;
 }
 
+#ifndef OLD_DRIVER
 EXPORT int cuCtxRecordEvent(void *context, void *event)
 {
+    REFUSE(1);
+    *(struct event *)event = (struct event){0, pushed()};
     return context == &contexts && event ? SUCCESS : INVALID_VALUE;
 }
 
 // Tests leave the sources of copies as they are, so that nothing of the host has to wait.
 EXPORT int cuCtxWaitEvent(void *context, void *event)
 {
+    REFUSE(1);
     return context == &contexts && event ? SUCCESS : INVALID_VALUE;
 }
+#endif
 
 // Addresses 1 to 3 stand for freed memory, managed memory and memory of the other GPU.
 EXPORT int cuPointerGetAttribute(void *value, int attribute, unsigned long long address)
@@ -309,6 +399,7 @@ EXPORT int cuImportExternalMemory(void **handle, const struct memory_handle *giv
     struct memory *memory = calloc(1, sizeof *memory);
     struct stat about;
 
+    REFUSE(0);
     if (!memory || given->type != 1 || given->flags != 1
         || fstat(given->handle.descriptor, &about) != 0) {
         free(memory);
@@ -342,6 +433,7 @@ EXPORT int cuExternalMemoryGetMappedBuffer(unsigned long long *address, void *ha
 
 EXPORT int cuMemFree_v2(unsigned long long address)
 {
+    REFUSE(0);
     finish();
     --mappings;
     return address ? SUCCESS : INVALID_VALUE;
@@ -372,6 +464,7 @@ EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, 
 
 EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
 {
+    capture.invalid |= capture.joined;
     finish();
     host_bytes += (long)size;
     memcpy(to, (const void *)(uintptr_t)from, size);
@@ -427,6 +520,28 @@ EXPORT int cuWaitExternalSemaphoresAsync(void *const *semaphores,
     else
         do_work(&work);
     return count == 1 && stream ? SUCCESS : INVALID_VALUE;
+}
+
+// Not of CUDA: these functions fail, ones of the names in the text.
+EXPORT void stand_in_fail(const char *names)
+{
+    snprintf(failing, sizeof failing, "%s", names);
+}
+
+// Not of CUDA: begins a capture of a stream; NULL: ends it. Whether the last one was valid.
+EXPORT int stand_in_capture(void *stream)
+{
+    const int valid = !capture.invalid;
+
+    capture.stream = stream;
+    capture.joined = capture.invalid = 0;
+    return valid;
+}
+
+// Not of CUDA: puts a callback into the stream.
+EXPORT void stand_in_callback(void (*callback)(void))
+{
+    push((struct work){.callback = callback});
 }
 
 // Not of CUDA: how many contexts are current in this thread.

@@ -15,13 +15,15 @@ from vkbloom import AdapterInfo
 SOURCE = Path(__file__).with_name("cuda_stand_in.c")
 
 
-def build(folder: Path) -> Path:
-    """Build the library; return its folder."""
+def build(folder: Path, *more: str) -> Path:
+    """Build the library with more options; return its folder."""
     if os.name == "nt":
         pytest.skip("memory is exported as descriptors of files")
     options = ["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     options += ["-fvisibility=hidden", "-Wl,-soname,libcuda.so.1"]
-    subprocess.run([*compiler(), *options, SOURCE, "-o", folder / "libcuda.so.1"], check=True)
+    subprocess.run(
+        [*compiler(), *options, *more, SOURCE, "-o", folder / "libcuda.so.1"], check=True
+    )
     return folder
 
 

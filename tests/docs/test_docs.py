@@ -5,29 +5,17 @@ from __future__ import annotations
 import json
 import os
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.docs.pages import ROOT, TEXTS, blocks
 from tests.exhaustive import witness
-from vkbloom import Renderer, Scene, Separable, presets, write
-from vkbloom.cli.program import program
-from vkbloom.io.image_writing import save
-from vkbloom.io.images import Picture
-from vkbloom.verdicts import measuring
+from vkbloom import Renderer, Scene, Separable
 
-ROOT = Path(__file__).resolve().parents[2]
-TEXTS = [
-    *sorted(ROOT.glob("*.md")),
-    *sorted(ROOT.glob("*/*.md")),
-    *sorted(ROOT.glob("python/*/*/*.md")),
-]
 # test_guide.py runs the code of testing.md, which is files of tests.
 PAGES = [
     page
@@ -36,50 +24,6 @@ PAGES = [
 ]
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 LONG = witness("the other notebooks take 9 s; the pages have the same calls")
-# Commands of `sh` blocks that do not end, need a cluster, or are tested as they stand elsewhere
-# (test_doctor.py): only their arguments are parsed.
-ENDLESS = ("explore", "view", "doctor")
-# What `vkbloom check` measures, for the same laws in less time.
-SMALL = ["--measure-size", "64x64", "--size", "64x48"]
-
-
-def blocks(page: Path, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
-
-
-def commands() -> Iterator[Any]:
-    """Yield the commands of all pages, each once."""
-    found: list[list[str]] = []
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        for block in blocks(page, "sh"):
-            for line in block.replace("\\\n", " ").splitlines():
-                words = shlex.split(line, comments=True)
-                if words[:1] == ["vkbloom"] and words not in found:
-                    found.append(words)
-                    yield pytest.param(words[1:], id=f"{page.name}: {line.split('#')[0].strip()}")
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with the files that pages name."""
-    monkeypatch.chdir(tmp_path)
-    # To find the nearest of all presets takes half a minute, to time large frames three seconds.
-    monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
-    timed = measuring.pass_times
-    monkeypatch.setattr(measuring, "pass_times", lambda one, of, _: timed(one, of, (64, 36), 1))
-    photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
-    save(Picture.of_values(photo, "half"), "photo.exr")
-    write("photo.jpg", photo.astype(np.float32))
-    np.save("picture.npy", photo)
-    (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
-    Path("grid.toml").write_text(grid)
-    (own,) = blocks(ROOT / "docs" / "own_methods.md", "glsl")
-    Path("soft.hook").write_text(own)
-    (twin,) = [
-        text for text in blocks(ROOT / "docs" / "own_methods.md", "python") if "def soft" in text
-    ]
-    Path("twin.py").write_text(twin)
-    return tmp_path
 
 
 # As in test_grid_cluster.py: objects that Dask's cluster leaves behind are its own.
@@ -96,17 +40,6 @@ def test_code_of_a_page(page: Path, folder: Path, kept_renderers: None) -> None:
         line = text[: text.index(block)].count("\n")
         # Blank lines before it, so that a traceback names the page's own line.
         exec(compile("\n" * line + block, page, "exec"), names)
-
-
-@pytest.mark.parametrize("words", list(commands()))
-def test_commands_of_pages(words: list[str], folder: Path, kept_renderers: None) -> None:
-    if words[0] in ENDLESS or "--scheduler" in words or "--from" in words:
-        command = program.get_command(None, words[0])  # type: ignore[arg-type]
-        assert command is not None
-        command.make_context(words[0], words[1:], resilient_parsing=True)
-        return
-    result = CliRunner().invoke(program, [*words, *(SMALL if words[0] == "check" else [])])
-    assert result.exit_code == 0, result.output
 
 
 @pytest.fixture(scope="module")

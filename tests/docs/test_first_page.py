@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.docs.test_docs import ROOT
+from tests.docs.pages import ROOT
 
 PAGE = ROOT / "build" / "docs" / "index.html"
 

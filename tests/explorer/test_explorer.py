@@ -277,7 +277,9 @@ class TestViewer:
         expected = renderer.render(scene, Pyramid(), (64, 36))["final"]
         assert np.array_equal(viewer.frames["a"]["final"], expected)
 
-    def test_a_file_is_opened(self, viewer: Viewer, tmp_path: Path) -> None:
+    def test_a_file_is_opened(
+        self, viewer: Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         pixels = np.random.default_rng(1).integers(0, 256, (21, 34, 3), dtype=np.uint8)
         path = vkbloom.write(tmp_path / "a.png", pixels)
         answer, _ = viewer.answer({"kind": "open", "name": "folder/photo.png"}, [path.read_bytes()])
@@ -286,7 +288,14 @@ class TestViewer:
         # A scene's settings turn photographs white.
         assert settings_from(answer["sides"]["a"]) == presets["photo"]
         assert answer["note"] == "highlights expanded up to 4"
-        frame(viewer, Separable(bloom=False))
+        facts, _ = frame(viewer, Separable(bloom=False))
+        # The code also reads the image as it is shown.
+        scope: dict[str, Any] = {"vkbloom": vkbloom}
+        monkeypatch.chdir(tmp_path)
+        vkbloom.write("photo.png", pixels)
+        exec(facts["code"], scope)
+        assert np.array_equal(scope["image"], vkbloom.read(path, expand=4))
+        assert scope["settings"] == Separable(bloom=False)
         assert np.array_equal(viewer.frames["a"]["final"], vkbloom.read(path, expand=4))
         # Of the next image, the settings stay.
         answer, _ = viewer.answer({"kind": "open", "name": "b.png"}, [path.read_bytes()])
@@ -298,6 +307,7 @@ class TestViewer:
         answer, _ = viewer.answer({"kind": "open", "name": "a.exr"}, [path.read_bytes()])
         assert settings_from(answer["sides"]["a"]) == presets["bevy_natural"]
         assert answer["note"] == ""
+        assert frame(viewer, presets["bevy_natural"])[0]["code"] == "vkbloom.BevyBloom()"
         # A photograph after it begins as one, as nothing was changed.
         photo = vkbloom.write(tmp_path / "a.png", pixels).read_bytes()
         answer, _ = viewer.answer({"kind": "open", "name": "a.png"}, [photo])

@@ -24,6 +24,7 @@ from vkbloom import (
 )
 from vkbloom.fits.losses import Measure, light, reduced
 from vkbloom.fits.space import Axis, space_of
+from vkbloom.io.srgb import decode_srgb, encode_srgb
 
 Image = NDArray[Any]
 
@@ -237,6 +238,23 @@ def found(renderer: Renderer) -> FitResult:
 
 
 class TestResult:
+    def test_every_preset(self, renderer: Renderer) -> None:
+        """Each varies those fields that it has; a field that none has is an error."""
+        image = lamps(24, 16)
+        given: Any = {"renderer": renderer, "max_calls": 3}
+        target = target_of(vkbloom.presets["kino"], "final", image)
+        found = vkbloom.fit(image, target, "all", ["threshold", "intensity"], **given)
+        assert [one.loss for one in found] == sorted(one.loss for one in found)
+        assert len(found) == len(vkbloom.presets)
+        assert found[0].settings.method == "kino"
+        varied = {one.settings.method: one.vary for one in found}
+        assert varied["hdrp"] == ("intensity",)
+        assert varied["kino"] == ("threshold", "intensity")
+        with pytest.raises(ValueError, match="has no field 'sprockets'"):
+            vkbloom.fit(image, target, "all", "sprockets", **given)
+        with pytest.raises(TypeError, match=r"'kino' is not a Settings; give vkbloom.presets"):
+            vkbloom.fit(image, target, cast("Any", "kino"), "intensity", **given)
+
     def test_figures(self, found: FitResult, renderer: Renderer) -> None:
         assert len(found.history) == found.calls
         assert found.history[0] == found.start_loss
@@ -309,9 +327,44 @@ class TestVerdict:
         )
 
     def test_another_method(self, renderer: Renderer) -> None:
-        found = self.fitted(renderer, np.roll(IMAGE, 20, axis=1)[::-1] + 0.3)
+        truth = KinoBloom(threshold=0.5, intensity=0.5, radius=2.0)
+        found = self.fitted(renderer, target_of(truth, "final"))
         assert found.verdict == "poor"
         assert found.cause.startswith("the method pyramid does not reach it")
+
+    @pytest.mark.parametrize("kind", ["float32", "uint8", "decoded"])
+    @pytest.mark.parametrize("change", ["equal", "another picture", "mirrored", "brighter"])
+    def test_no_bloom(self, renderer: Renderer, change: str, kind: str) -> None:
+        image = lamps() / 12
+        target = {
+            "equal": image,
+            "another picture": np.roll(image, 20, axis=1)[::-1],
+            "mirrored": image[:, ::-1],
+            "brighter": 1.1 * image,
+        }[change]
+        if kind != "float32":
+            image, target = (np.rint(255 * np.minimum(one, 1)) for one in (image, target))
+            image, target = (one.astype(np.uint8) for one in (image, target))
+        if kind == "decoded":
+            image, target = (decode_srgb(one / np.float32(255)) for one in (image, target))
+        start = Pyramid(levels=3, threshold=0.1, knee=0.5)
+        found = vkbloom.fit(
+            image, target, start, ["threshold", "intensity"], renderer=renderer, max_calls=40
+        )
+        assert found.verdict == "poor"
+        assert found.cause.startswith("no bloom was found"), found.cause
+        assert ("the target is mirrored" in found.cause) == (change == "mirrored")
+
+    def test_a_faint_bloom_is_judged_by_its_own_size(self, renderer: Renderer) -> None:
+        """A loss that is small beside the picture may be all of the bloom."""
+        truth = Pyramid(levels=3, threshold=1.2, knee=0.5, intensity=0.002)
+        target = target_of(truth, "final")
+        wrong = vkbloom.fit(IMAGE, target, KinoBloom(), ["radius"], renderer=renderer, max_calls=5)
+        assert wrong.verdict == "poor"
+        start = Pyramid(levels=3, threshold=1.0, knee=0.5)
+        found = vkbloom.fit(IMAGE, target, start, ["threshold", "intensity"], renderer=renderer)
+        assert (found.verdict, found.explained > 0.95) == ("good", True)
+        assert found.settings.intensity == pytest.approx(0.002, rel=0.05)
 
 
 class TestRefused:
@@ -412,6 +465,25 @@ class TestParts:
             axis = Axis(name="threshold", kind="number", low=1.0, high=5.0, scale=scale)
             ends = [axis.value(0.3 + step) for step in (-1e-6, 1e-6)]
             assert axis.slope(0.3) == pytest.approx((ends[1] - ends[0]) / 2e-6)
+
+    def test_targets_of_8_bits(self) -> None:
+        """Framebuffers are clipped and rounded alike; saturated pixels have no difference."""
+        levels = np.random.default_rng(0).integers(0, 256, (20, 30, 3)).astype(np.uint8)
+        levels[:2] = 255
+        decoded = decode_srgb(levels / np.float32(255))
+        for target, encode in ((levels, lambda one: one), (decoded, encode_srgb)):
+            measure = Measure.of(target, "relative")
+            values = light(target)
+            assert measure(values + 1e-6) < 1e-6
+            assert measure(np.where(values == 1, 7.0, values)) < 1e-6
+            assert measure(np.where(levels[:, :, :1] == 255, 0.5, values)) < 1e-6
+            held = 255 * encode(measure.compared(np.full_like(values, 0.3)))
+            np.testing.assert_allclose(held, np.rint(held), atol=1e-4)
+            scales = measure.scales(np.full_like(values, 2.0))
+            assert not scales.any()
+        for other in (decoded * 1.1, decoded - 0.1, decoded**1.3):
+            assert Measure.of(other, "relative").curve is None
+        assert np.isfinite(Measure.of(np.ones_like(decoded), "relative")(0 * decoded))
 
     def test_residuals_have_the_loss_as_their_norm(self) -> None:
         generator = np.random.default_rng(0)

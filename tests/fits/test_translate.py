@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any, cast
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import vkbloom
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
+from vkbloom.cli import fields, translate
 from vkbloom.fits.translating import lights
 
 SIZE = (96, 64)
@@ -69,6 +71,11 @@ class TestTranslate:
             vkbloom.fit(
                 renderer.upload(image), bloom, DualKawase(), ["intensity"], renderer=renderer
             )
+
+    def test_the_usual_size_is_the_same_everywhere(self) -> None:
+        (option,) = (one for one in translate.command.params if one.name == "size")
+        usual = inspect.signature(vkbloom.translate).parameters["size"].default
+        assert fields.SIZE.convert(str(option.default), None, None) == usual == (640, 360)
 
     def test_picture(self) -> None:
         image = lights((320, 180))

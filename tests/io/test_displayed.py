@@ -117,6 +117,7 @@ class TestHdr:
             frames = renderer.apply(np.full((4, 6, 3), 128, np.uint8), settings)
         frames.save(tmp_path)
         assert chunk(tmp_path / "final.png", b"cICP") == bytes([1, 18, 0, 1])
+        assert b"sRGB" not in (tmp_path / "final.png").read_bytes()
         assert np.array_equal(vkbloom.Frames.load(tmp_path)["final"], frames["final"])
 
     def test_highlights_are_not_expanded(self, tmp_path: Path) -> None:

@@ -627,14 +627,14 @@ class TestSave:
         target.write_bytes(b"before")
         seen: list[Iterable[str]] = []
 
-        def is_readable(oiio: Any, file: Path) -> bool:
+        def unreadable(oiio: Any, file: Path) -> str:
             seen.append(only_in(tmp_path))
             assert load(file).pixels.shape == (2, 2, 3)
             assert target.read_bytes() == b"before"
-            return False
+            return f"{file}: no pixels"
 
-        monkeypatch.setattr(safe_writing, "_is_readable", is_readable)
-        with pytest.raises(OSError, match="is the disk full") as caught:
+        monkeypatch.setattr(safe_writing, "_unreadable", unreadable)
+        with pytest.raises(OSError, match=rf"cannot be read after writing: {name}: no") as caught:
             save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
         assert (caught.value.errno, caught.value.filename) == (errno.EIO, str(target))
         assert len(seen) == 1

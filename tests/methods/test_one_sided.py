@@ -212,7 +212,7 @@ def test_a_grey_keeps_the_derivative_of_its_chroma(renderer: Renderer, type: Any
     image = (random.random((4, 5, 1), np.float32) * 2).repeat(3, axis=2)
     image[2, 3] = 0
     settings = BlenderGlare(type=type, threshold=0.25, saturation=1.5, color_modulation=0.0)
-    cotangent = {"bloom": np.zeros((4, 5, 4), np.float32)}
+    cotangent: Any = {"bloom": np.zeros((4, 5, 4), np.float32)}
     cotangent["bloom"][..., 0], cotangent["bloom"][..., 1] = 1, -1
     for sums in (0, 1):
         cotangent["bloom"][..., 2] = sums

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -453,3 +454,23 @@ def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines() -> Non
 
     with Renderer("software") as software:
         assert stages((500, 250)) > stages((500, 270))
+
+
+def test_texels_are_what_fused_passes_take_them_for(renderer: Renderer) -> None:
+    """The levels of 8 bits and all subnormal half floats, as a shader loads and stores them.
+
+    On a CPU a level is multiplied by the float nearest to 1 / 255, on a GPU it is divided by 255.
+    """
+    levels = np.arange(256, dtype=np.uint8)
+    factor = np.float32(1 / 255)
+    loaded = levels * factor if renderer.info.type == "cpu" else levels / np.float32(255)
+    halves = np.arange(1024, dtype=np.uint16).view(np.float16)
+    cases: list[tuple[Any, Any, Any]] = [
+        (levels, "rgba32float", loaded),
+        (halves, "rgba32float", halves.astype(np.float32)),
+        (halves.astype(np.float32), "rgba16float", halves),
+    ]
+    for values, format, expected in cases:
+        image = np.tile(values[np.newaxis, :, np.newaxis], (1, 1, 4))
+        glow = renderer.apply(image, Separable(format=format))["glow"]
+        np.testing.assert_array_equal(glow[0, :, 0], expected)

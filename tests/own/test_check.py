@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+from scipy import ndimage
 
 import vkbloom
-from vkbloom import testing
+from vkbloom import Renderer, testing
 from vkbloom.cli.program import program
 from vkbloom.own.compiler import find_compiler
+from vkbloom.testing.law_report import law_report
+from vkbloom.testing.programs import Program
 from vkbloom.verdicts import measuring
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -57,8 +63,11 @@ HELD = [
     "separable",
     "no_ringing",
     "additive",
+    "unclamped",
     "energy",
     "colour",
+    "grey",
+    "channels",
     "stability",
     "finite",
 ]
@@ -159,6 +168,34 @@ def test_a_preset() -> None:
     assert found["nearest_preset"]["name"] == "tutorial"
 
 
+FIREFLIES = {"unclamped"}
+#: Laws on colours and bright pixels that the formulas of engines break, and by what.
+BY_FORMULA = {
+    "jimenez2014": FIREFLIES,
+    "bevy_natural": FIREFLIES,
+    "unity_hdrp": FIREFLIES,
+    "photo": FIREFLIES,
+    # A limit for each channel, or a scale by the largest one.
+    "filament": {"unclamped", "colour"},
+    "godot_4_5": {"unclamped", "colour"},
+    "godot_4_6": {"unclamped", "colour"},
+    # A threshold of HSV's value, and colours of the ghosts and of the ends of the streaks.
+    "blender_simple_star": {"colour"},
+    "blender_ghosts": {"colour", "grey"},
+    "blender_streaks": {"colour", "grey"},
+    # Kernels whose channels differ.
+    "unreal_convolution": {"colour", "grey"},
+    "iris_6": {"grey"},
+}
+
+
+@pytest.mark.parametrize("name", vkbloom.presets)
+def test_presets_are_blamed_for_what_their_formulas_do(renderer: Renderer, name: str) -> None:
+    subject = measuring.of_settings(renderer, vkbloom.presets[name], (48, 48), None)
+    report = law_report(subject, ("unclamped", "colour", "grey", "channels", "finite"))
+    assert {row.name for row in report.rows if not row.held} == BY_FORMULA.get(name, set())
+
+
 PROGRAM = """\
 import sys, vkbloom
 image = vkbloom.read(sys.argv[1])
@@ -171,6 +208,73 @@ vkbloom.write(sys.argv[2], vkbloom.reference.blur(image, settings).astype("float
 def copying(tmp_path: Path) -> str:
     """A fast program: cp."""
     return "cp {input} {output}"
+
+
+def every_other_pixel(image: NDArray[Any]) -> NDArray[Any]:
+    kept = np.zeros_like(image)
+    kept[::2, ::2] = 4 * image[::2, ::2]
+    return np.asarray(ndimage.gaussian_filter(kept, (4, 4, 0)))
+
+
+@pytest.mark.parametrize(
+    ("bloom", "words", "laws"),
+    [
+        (every_other_pixel, [], {"stability"}),
+        (lambda image: 0.97 * image, [], {"gain", "energy"}),
+        (lambda image: 1.97 * image, ["--less-input"], {"gain", "energy"}),
+        (lambda image: 0.97 * image, ["--gain", "0.97"], set()),
+        (lambda image: image[..., ::-1], [], {"colour", "channels"}),
+        (lambda image: np.minimum(image, 1), [], {"unclamped"}),
+        (lambda image: np.where(np.isnan(image).any(), np.nan, image), [], {"finite"}),
+        (lambda image: image, [], set()),
+    ],
+)
+def test_a_fault_of_a_program_is_named(
+    monkeypatch: pytest.MonkeyPatch, bloom: Callable[..., Any], words: list[str], laws: set[str]
+) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: bloom(image))
+    every = "stability,gain,energy,colour,channels,grey,unclamped,finite"
+    run = ["--command", "engine {input} {output}", *SMALL, *words, "--require", every]
+    monkeypatch.setattr(measuring, "presets", {})
+    monkeypatch.setattr(measuring, "nearest_preset", lambda *_: ("", math.nan))
+    done, found = checked(*run)
+    broken = {name for name in every.split(",") if found["laws"][name]["held"] is False}
+    if bloom is every_other_pixel:
+        broken &= laws
+    assert broken == laws
+    assert done.exit_code == bool(laws)
+
+
+def test_programs_and_files_move_the_same_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: image)
+    program = measuring.of_program(
+        Program(["cp", "{input}", "{output}"], ".exr", 1), (32, 32), None, less_input=False
+    )
+    alone = testing.stability(lambda image: image, steps=2, probe=testing.Probe(size=(32, 32)))
+    np.testing.assert_array_equal(program.stability.positions, alone.positions)
+    assert program.stability.flicker == alone.flicker == pytest.approx(0.75)
+    assert program.stability.shimmer == 0
+
+
+def test_what_is_required_is_tested(copying: str) -> None:
+    """A law that cannot be tested, as that of a reference, is not held."""
+    done, found = checked("--command", copying, *SMALL, "--require", "reference")
+    assert done.exit_code == 1
+    assert found["laws"]["reference"]["held"] is None
+
+
+@pytest.mark.parametrize(("require", "colour"), [("", "33"), ("symmetric,energy", "31")])
+def test_required_laws_have_another_colour(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, require: str, colour: str
+) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: 0.9 * np.roll(image, 1, 1))
+    page = tmp_path / "page.html"
+    words = ["--command", "a {input} {output}", *SMALL, "--require", require, "--html", str(page)]
+    text = CliRunner().invoke(program, ["check", *words], color=True).output
+    for law in ("symmetric", "energy"):
+        assert f"\x1b[{colour}m{law}" in text
+    assert ("color:#c33" in page.read_text()) == bool(require)
+    assert "+1 pixels along x (half a texel of the level at 1/2 of the size)" in text
 
 
 def test_a_program(copying: str) -> None:

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vkbloom import ShaderError
+from vkbloom.own import compiler
 from vkbloom.own.compiler import compile_shader
 from vkbloom.own.file import OwnFile, read_file
 from vkbloom.own.glsl import write_shader
@@ -205,6 +206,29 @@ def test_a_name_that_glsl_does_not_accept(tmp_path: Path) -> None:
         compile_all(read_file(read_source(file)))
     assert "while" in str(caught.value)
     assert str(caught.value).startswith(f"{file}:")
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        ("kill -SEGV $$", "SIGSEGV"),
+        ("sh -c 'kill -ABRT $$'", "SIGABRT"),  # its shell has 128 and the signal as its status
+        ("exec sleep 60", "SIGKILL"),  # after MOST_SECONDS
+        ("exit 250", "status 250"),
+    ],
+)
+def test_how_the_compiler_is_ended_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, name: str
+) -> None:
+    tool, hook = tmp_path / "glslang", tmp_path / "one.hook"
+    tool.write_text(f"#!/bin/sh\n{command}\n")
+    tool.chmod(0o755)
+    hook.write_text("//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(0.125); }\n")
+    monkeypatch.setattr(compiler, "find_compiler", lambda: str(tool))
+    monkeypatch.setattr(compiler, "MOST_SECONDS", 0.5)
+    monkeypatch.setattr(compiler, "cache_file", lambda _: None)
+    with pytest.raises(ShaderError, match=f"the compiler was ended by {name}: "):
+        compile_all(read_file(read_source(hook)))
 
 
 WORDS = (

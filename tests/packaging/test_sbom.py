@@ -73,7 +73,9 @@ def added(sbom: Any, build: Path, folder: Path, *options: str) -> Path:
 
 
 def test_what_the_linker_used_is_listed(sbom: Any, build: Path, tmp_path: Path) -> None:
-    volk = ("--source", "volk", "-", str(build / "volk.h"))
+    made = build / "made.json"
+    made.write_text('{"spirv-opt": "v2023.1"}')
+    volk = ("--source", "volk", "-", str(build / "volk.h"), "--properties", str(made))
     wheel = added(sbom, build, tmp_path, *volk)
     with zipfile.ZipFile(wheel) as opened:
         assert opened.testzip() is None
@@ -81,6 +83,8 @@ def test_what_the_linker_used_is_listed(sbom: Any, build: Path, tmp_path: Path) 
         record = opened.read("tiny-1.0.dist-info/RECORD").decode()
     assert record.splitlines()[-1] == "tiny-1.0.dist-info/RECORD,,"
     assert "tiny-1.0.dist-info/sboms/tiny.cdx.json,sha256=" in record
+    what_made_spirv = [{"name": "vkbloom:spirv:spirv-opt", "value": "v2023.1"}]
+    assert said["metadata"]["component"]["properties"] == what_made_spirv
     listed = {one["name"]: one for one in said["components"]}
     assert listed.keys() == {"volk", "zlib", "GCC runtime", "glibc"}
     archive = Path(subprocess.check_output(["cc", "-print-file-name=libz.a"], text=True).strip())
@@ -119,7 +123,8 @@ def test_another_systems_packages(sbom: Any, tmp_path: Path) -> None:
 def test_it_is_valid(sbom: Any, build: Path, tmp_path: Path) -> None:
     """By CycloneDX' own schema; a changed binary is found."""
     pytest.importorskip("cyclonedx.validation.json")
-    wheel = added(sbom, build, tmp_path)
+    (build / "made.json").write_text('{"glslang": "12"}')
+    wheel = added(sbom, build, tmp_path, "--properties", str(build / "made.json"))
     sbom.check(wheel)
     with zipfile.ZipFile(wheel) as opened:
         content = {one: opened.read(one) for one in opened.namelist()}

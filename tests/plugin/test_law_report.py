@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,20 +13,28 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from vkbloom import DualKawase, Renderer, Separable, reference, testing
-from vkbloom.testing import LawReport, LawRow
+from vkbloom.testing import LawReport, LawRow, Probe
+from vkbloom.testing.law_table import LAWS
 
 Image = NDArray[Any]
-ALL = [
-    "superposition",
-    "gain",
-    "symmetric",
-    "transposed",
-    "centroid_kept",
-    "separable",
-    "no_ringing",
-    "bounded_fireflies",
-    "additive",
-]
+Bloom = Callable[[Image], Image]
+#: Without a reference there is nothing to compare with.
+ALL = [name for name in LAWS if name != "reference"]
+#: What every linear bloom of a width in pixels breaks, where it does not replace NaN.
+OF_A_BLUR = {"bounded_fireflies", "additive", "resolution", "finite"}
+
+
+#: And what a bloom does besides that reads other pixels on one side than on the other.
+OF_A_GRID = {"symmetric", "gain", "no_ringing", "colour"}
+
+
+def gaussian(image: Image, sigma: float = 2.0) -> Image:
+    return np.asarray(ndimage.gaussian_filter(image, (sigma, sigma, 0), mode="nearest"))
+
+
+def at_finite(image: Image) -> Image:
+    """Blur after NaN and infinity were replaced."""
+    return gaussian(np.nan_to_num(image, posinf=0, neginf=0))
 
 
 def box_chain(image: Image) -> Image:
@@ -46,12 +57,126 @@ def test_a_gaussian() -> None:
         lambda image: ndimage.gaussian_filter(image, (2, 2, 0), mode="nearest"), size=(64, 48)
     )
     assert [each.name for each in found.rows] == ALL
-    assert broken(found) == ["bounded_fireflies", "additive"]
+    assert set(broken(found)) == OF_A_BLUR
     assert found.gain == pytest.approx(1)
     found.assert_held("superposition", "gain", "symmetric", "centroid_kept", "separable")
     for each in found.rows:
         assert each.held == (each.off <= each.limit)
         assert bool(each.message) == (not each.held)
+        assert each.figures[max(each.figures, key=lambda name: each.figures[name] == each.off)] >= 0
+
+
+def every_other_pixel(image: Image) -> Image:
+    kept = np.zeros_like(image)
+    kept[::2, ::2] = 4 * image[::2, ::2]
+    return gaussian(kept, 4.0)
+
+
+def wider_blue(image: Image) -> Image:
+    return np.dstack([gaussian(image[..., :2]), gaussian(image[..., 2:], 2.4)])
+
+
+def thresholded(image: Image, above: float = 1.0) -> Image:
+    return gaussian(image * (image.max(axis=2, keepdims=True) > above))
+
+
+#: A fault, its correct twin, and the laws that name it.
+FAULTS: dict[str, tuple[Bloom, Bloom, set[str]]] = {
+    "gain 0.97": (lambda a: 0.97 * gaussian(a), gaussian, {"energy"}),
+    "gain 1.03": (lambda a: 1.03 * gaussian(a), gaussian, {"energy"}),
+    "half of the light lost": (lambda a: 0.5 * gaussian(a), gaussian, {"energy"}),
+    "channels swapped": (lambda a: gaussian(a)[..., ::-1], gaussian, {"colour", "channels"}),
+    "channels rotated": (lambda a: gaussian(a)[..., [1, 2, 0]], gaussian, {"colour", "channels"}),
+    "grey": (
+        lambda a: gaussian(a).mean(axis=2, keepdims=True).repeat(3, axis=2),
+        gaussian,
+        {"colour", "channels"},
+    ),
+    "a fourth of red in blue": (
+        lambda a: gaussian(a @ np.array([[0.75, 0, 0.25], [0, 1, 0], [0, 0, 1]], a.dtype)),
+        gaussian,
+        {"channels", "grey", "colour", "gain"},
+    ),
+    "input clamped at 1": (lambda a: gaussian(np.minimum(a, 1)), gaussian, {"unclamped"}),
+    "output clamped at 1": (lambda a: np.minimum(gaussian(a), 1), gaussian, {"unclamped"}),
+    "output clamped at 100": (lambda a: np.minimum(gaussian(a), 100), gaussian, {"unclamped"}),
+    "clamped above a threshold": (
+        lambda a: np.minimum(thresholded(a), 30),
+        thresholded,
+        {"unclamped"},
+    ),
+    "NaN reaches others": (gaussian, at_finite, {"finite"}),
+    "infinity reaches others": (
+        lambda a: gaussian(np.where(np.isnan(a), 0, a)),
+        at_finite,
+        {"finite"},
+    ),
+    "one channel wider": (wider_blue, gaussian, {"grey"}),
+    "every other pixel": (
+        every_other_pixel,
+        lambda a: gaussian(a, 4.0),
+        {*OF_A_GRID, "stability", "energy"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_named(name: str) -> None:
+    fault, twin, laws = FAULTS[name]
+    found, right = (testing.report(bloom, size=(64, 64)) for bloom in (fault, twin))
+    new = set(broken(found)) - set(broken(right))
+    assert new - {"bounded_fireflies"} == laws, found
+
+
+PACKAGES: dict[str, Callable[[Any, Image, float], Image]] = {
+    "scipy.ndimage": lambda ndi, a, s: ndi.gaussian_filter(a, (s, s, 0)),
+    "cv2": lambda cv2, a, s: cv2.GaussianBlur(a, (0, 0), s),
+    "skimage.filters": lambda filters, a, s: filters.gaussian(a, s, channel_axis=-1),
+}
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("package", PACKAGES)
+def test_right_blurs_are_not_blamed(package: str, sigma: float) -> None:
+    module = pytest.importorskip(package)
+    found = testing.report(lambda image: PACKAGES[package](module, image, sigma), size=(64, 64))
+    assert set(broken(found)) <= OF_A_BLUR
+
+
+def test_the_identity_is_not_blamed() -> None:
+    testing.report(lambda image: image, size=(64, 64)).assert_held()
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (
+            lambda a: np.roll(box_chain(a), -1, 1),
+            "shifted by -1 pixels along x (half a texel of the level at 1/2 of the size), on",
+        ),
+        (
+            lambda a: np.roll(box_chain(a), (2, 2), (0, 1)),
+            "+2 pixels along x (half a texel of the level at 1/4 of the size) and +2 pixels along "
+            "y (half a texel of the level at 1/4",
+        ),
+        (
+            lambda a: np.roll(box_chain(a), -3, 0),
+            "-3 pixels along y (half a texel of each of the levels at 1/2 of the size and 1/4 of",
+        ),
+        (
+            lambda a: ndimage.uniform_filter(a, (2, 1, 1), mode="nearest"),
+            "+0.5 pixels along y (half a texel of the level at full size)",
+        ),
+        (
+            lambda a: np.asarray(ndimage.shift(a, (0, 0.3, 0), order=1)),
+            "+0.3 pixels along x, on average over all positions. Measured",
+        ),
+    ],
+)
+def test_a_constant_shift_is_told_as_such(fault: Bloom, words: str) -> None:
+    found = row(testing.report(fault, size=(64, 64), laws=["centroid_kept"]), "centroid_kept")
+    assert words in found.why
+    assert "back on average" not in found.why
 
 
 def test_a_correct_chain_of_boxes_says_why_it_moves_light() -> None:
@@ -109,6 +234,47 @@ def test_html() -> None:
     assert "averages boxes" in page
     assert "<b>no</b>" in page
     assert "F(a) &gt;= a" in page
+    # A broken law that is promised, and one that is not.
+    colours = [
+        testing.report(box_chain, size=(32, 32), laws=laws)._repr_html_().count("color:#c33")
+        for laws in ("all", ["symmetric"], ["symmetric", "centroid_kept"])
+    ]
+    assert colours == [0, 0, 2]
+
+
+def test_laws_are_chosen_by_name() -> None:
+    found = testing.report(gaussian, size=(32, 32), laws=["assert_stable", "gain", "reference"])
+    assert [(each.name, each.held) for each in found.rows] == [
+        ("gain", True),
+        ("stability", True),
+        ("reference", None),
+    ]
+    assert found.required == ("stability", "gain", "reference")
+    with pytest.raises(ValueError, match="laws: 'gian' is not one of superposition, gain"):
+        testing.report(gaussian, laws=["gian"])
+
+
+def test_a_gain_that_is_promised() -> None:
+    def half(image: Image) -> Image:
+        return 0.5 * at_finite(image)
+
+    testing.report(half, size=(32, 32), gain=0.5).assert_held("gain", "energy")
+    assert {"gain", "energy"} <= set(broken(testing.report(half, size=(32, 32), gain=1.0)))
+    # A picture with its bloom, or a sum of levels, has one gain, which nobody promised.
+    assert broken(testing.report(half, size=(32, 32), laws=("gain", "energy"))) == ["energy"]
+
+
+def test_a_light_below_the_rounding_is_not_judged() -> None:
+    probe = Probe(size=(64, 64), atol=0.018)
+    found = testing.report(lambda image: gaussian(image, 3.0), probe=probe)
+    assert {row(found, name).held for name in ("centroid_kept", "separable", "energy")} == {None}
+
+
+def test_images_of_grey_have_no_laws_of_colour() -> None:
+    probe = Probe(size=(32, 32), channels=None, dtype="uint8")
+    found = testing.report(lambda image: image, probe=probe)
+    untested = [each.name for each in found.rows if each.held is None]
+    assert untested == ["bounded_fireflies", "unclamped", "colour", "grey", "channels", "finite"]
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "float16"])
@@ -139,3 +305,12 @@ def test_what_is_no_bloom() -> None:
 def test_results_that_are_not_finite() -> None:
     with pytest.raises(AssertionError, match="the bloom of finite values is finite"):
         testing.report(lambda image: image * np.nan, size=(16, 16))
+
+
+def test_the_page_lists_all_laws() -> None:
+    page = Path(__file__).parents[2] / "docs" / "check.md"
+    listed = re.findall(r"^\| `(\w+)` \|", page.read_text().split("## Programs")[0], re.MULTILINE)
+    assert listed == list(LAWS)
+    for law in LAWS.values():
+        assert law.formula
+        assert law.why

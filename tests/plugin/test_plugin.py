@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,45 @@ from vkbloom import AdapterInfo
 from vkbloom.testing import read_frame
 
 pytest.importorskip("xdist")
+
+
+def test_failures_show_the_test_alone(project: pytest.Pytester) -> None:
+    """Each assertion, and the fixtures, hide their own frames."""
+    write(
+        project,
+        """
+import inspect
+import numpy as np
+import pytest
+from vkbloom import testing
+
+def bloom(image):
+    return np.sqrt(np.roll(image, 3, axis=1) * 1.5) + image[:, ::-1] * 0.2
+
+@pytest.mark.parametrize("name", [one for one in testing.__all__ if one.startswith("assert_")])
+def test_law(name):
+    parameters = list(inspect.signature(getattr(testing, name)).parameters.values())
+    needed = [1.0 for one in parameters[1:] if one.default is one.empty]
+    getattr(testing, name)(bloom, *needed)
+
+def test_types():
+    testing.assert_gain(bloom, "one")
+
+def test_command():
+    testing.command(["false", "{input}", "{output}"])(np.zeros((16, 16, 3), np.float32))
+
+def test_frame(frame_regression):
+    frame_regression.check({"final": np.zeros((4, 4, 3), np.float32)}, name="a/b")
+
+def test_adapter(bloom_renderer):
+    pass
+""",
+    )
+    result = run(project, "--bloom-expect-adapter", "no such adapter")
+    lines = result.outlines
+    places = [line for line in lines if re.match(r"\S+\.py:\d+: ", line)]
+    assert len(places) >= 13
+    assert [line for line in places if not re.match(r"test_\w+\.py:", line)] == []
 
 
 class TestExact:

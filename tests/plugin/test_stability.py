@@ -75,6 +75,24 @@ class TestStability:
         # A quarter of it on each of four pixels, or all of it on one.
         np.testing.assert_allclose(found.peak.max() / found.peak.min(), 1 / 0.25, rtol=0.4)
 
+    @pytest.mark.parametrize("temporal", [False, True])
+    @pytest.mark.parametrize("sigma", [0.0, 0.5, 1.0, 2.0, 3.0])
+    def test_what_pixels_do_is_no_flicker_of_a_convolution(
+        self, sigma: float, temporal: bool
+    ) -> None:
+        def bloom(image: Image) -> Image:
+            return gaussian(image, sigma) if sigma else image
+
+        def sequence(images: list[Image]) -> Iterator[Image]:
+            return map(bloom, images)
+
+        found = testing.stability(bloom, texel=1, probe=SMALL)
+        assert (found.flicker > 0.1) == (sigma < 3)
+        assert found.shimmer < 1e-5
+        testing.assert_stable(
+            sequence if temporal else bloom, texel=1, temporal=temporal, probe=SMALL
+        )
+
     def test_a_chain_is_stable(self) -> None:
         testing.assert_stable(chain, texel=4, steps=4, probe=SMALL)
 

@@ -71,9 +71,9 @@ class Document:
         buffers = [{"byteLength": len(self.data), "uri": uri}]
         return json.dumps({**self.json, "buffers": buffers}).encode()
 
-    def as_glb(self) -> bytes:
+    def as_glb(self, padding: bytes = b"") -> bytes:
         text = json.dumps({**self.json, "buffers": [{"byteLength": len(self.data)}]}).encode()
-        text += b" " * (-len(text) % 4)
+        text += b" " * (-len(text + padding) % 4) + padding
         data = self.data + bytes(-len(self.data) % 4)
         chunks = struct.pack("<I4s", len(text), b"JSON") + text
         chunks += struct.pack("<I4s", len(data), b"BIN\0") + data

@@ -249,6 +249,13 @@ def test_materials_that_emit(renderer: Renderer, tmp_path: Path) -> None:
     assert 0.01 < body.mean() < 0.9
     np.testing.assert_array_equal(rgb(shown["brightness"]), body[..., np.newaxis] * (8.0, 4.0, 0.0))
     np.testing.assert_array_equal(rgb(shown["albedo"]), body[..., np.newaxis] * (0.5, 0.25, 0.125))
+    for name in ("tutorial", "bevy_natural", "camera_lens"):
+        lamp = Scene.from_gltf(tmp_path / "lamp.gltf", camera=camera)
+        frames = renderer.render(lamp, presets[name], SIZE)
+        assert (rgb(frames["scene"])[body] >= (255, 255, 0)).all()
+        assert rgb(frames["glow"]).max() >= 1.0
+        # Beyond the body, too.
+        assert rgb(frames["final"])[~body].any()
 
 
 def test_the_glow_mesh_changes_nothing_but_the_brightness(
@@ -305,7 +312,9 @@ def test_emission_needs_the_nearest_surface(renderer: Renderer) -> None:
     assert not rgb(shown["brightness"]).any()
 
 
-def test_emission_is_the_deferred_systems(renderer: Renderer, scene: Scene) -> None:
+def test_with_a_glow_mesh_emission_is_the_deferred_systems(
+    renderer: Renderer, scene: Scene
+) -> None:
     forward = renderer.render(scene, None, SIZE)
     with_lamps = renderer.render(lamps(scene), None, SIZE)
     for name, array in forward.items():

@@ -202,6 +202,52 @@ def test_emission_by_texture_and_a_glow_mesh_are_added(renderer: Renderer) -> No
     assert rgb(shown["brightness"]).max() == 65504
 
 
+# The emission of a body
+
+
+@pytest.mark.parametrize("format", ["rgba8unorm", "rgba16float"])
+@pytest.mark.parametrize("threshold", [0.0, 0.75])
+@pytest.mark.parametrize("textured", [True, False])
+def test_a_body_that_emits_glows_in_both_systems(
+    renderer: Renderer, textured: bool, threshold: float, format: Any
+) -> None:
+    size = (16, 9)
+    body = panel(size, emission=texture(half_colours(*size)), radiance=(3.0, 0.5, 0.0))
+    if not textured:
+        body = dataclasses.replace(body, surfaces=())
+    settings = Separable(bloom_size=size, format=format, threshold=threshold)
+    scene = Scene(body=body, camera=CAMERA)
+    shown = renderer.render(scene, settings, size)
+    other = renderer.render(scene, settings, size, shading="deferred")
+    brightness = rgb(other["brightness"]).astype(float)
+    kept = brightness @ (0.2126, 0.7152, 0.0722) > threshold
+    light = brightness * kept[..., np.newaxis]
+    if format == "rgba8unorm":
+        light = np.round(255 * np.clip(light, 0, 1))
+    # Half a level may be rounded either way from the half floats.
+    assert np.abs(rgb(shown["glow"]) - light).max() <= (format == "rgba8unorm")
+    np.testing.assert_array_equal(shown["glow_depth"], shown["depth"])
+    lit = np.clip(rgb(other["scene"]), 0, 1) * 255
+    assert np.abs(rgb(shown["scene"]) - lit).max() <= 0.5 + 255 * 4 * HALF
+    off = renderer.render(scene, settings.replace(bloom=False), size)
+    np.testing.assert_array_equal(off["scene"], shown["scene"])
+
+
+def test_what_a_body_hides_of_its_own_emission_does_not_glow(renderer: Renderer) -> None:
+    size = (16, 9)
+    near, behind = panel(size, across=(0.5, 1.0)), panel(size, across=(0.0, 0.9))
+    far = behind.vertices - np.array([0, 0, 1, *[0] * 6], np.float32)
+    body = Mesh(
+        np.concatenate((near.vertices, far)),
+        np.concatenate((near.indices, behind.indices + np.uint32(4))),
+        np.repeat(np.array([[0, 0, 0], [1, 1, 1]], np.float32), 4, axis=0),
+    )
+    scene = Scene(body=body, camera=CAMERA)
+    glow = rgb(renderer.render(scene, Separable(bloom_size=size), size)["glow"])
+    assert not glow[:, 8:].any()
+    assert glow[2:-2, 2:7].all()
+
+
 # Several textures
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import dataclasses
 import re
 import sys
@@ -14,6 +15,7 @@ import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.framebuffers import decode, make, mixed, noise
 from vkbloom import Separable
 from vkbloom.frames import Frames
@@ -279,3 +281,17 @@ class TestContactSheet:
     def test_empty(self) -> None:
         with pytest.raises(ValueError, match="frames"):
             contact_sheet_png(make({}))
+
+
+@pytest.mark.parametrize("name", list(vkbloom.presets))
+def test_the_sheet_says_where_glow_is_not_thresholded(
+    renderer: vkbloom.Renderer, name: str
+) -> None:
+    image = np.full((16, 16, 3), 0.3, np.float32)
+    image[6:10, 6:10] = 5
+    settings = vkbloom.presets[name]
+    with contextlib.suppress(ValueError):  # two methods have no threshold
+        settings = settings.replace(threshold=1.0)
+    frames = renderer.apply(image, settings, attachments=["glow"])
+    is_frame = settings.threshold is not None and bool(frames["glow"].min(initial=1.0) > 0.2)
+    assert ("the frame before its threshold" in frames._repr_html_()) == is_frame

@@ -23,7 +23,7 @@ import google_crc32c
 import numpy as np
 from numcodecs.zstd import Zstd
 
-from vkbloom import check_grid, grid_to_zarr
+from vkbloom import check_grid, grid_to_zarr, presets
 from vkbloom.grid import keys, store, zarr_grid
 from vkbloom.grid.filling import Tally
 from vkbloom.grid.image_folder import GridFiles
@@ -31,6 +31,7 @@ from vkbloom.grid.layout import Grid, Layout, Variable, ask
 from vkbloom.grid.running import empty_arrays
 from vkbloom.grid.store import GridStore
 
+SETTINGS = presets["bevy_natural"]
 AXES = {"exposure": [0.0, 1.0, 2.0], "threshold": [None, 0.5]}
 CHUNKS = {"exposure": 2}
 IMAGE = np.linspace(0, 1, 60, dtype=np.float32).reshape(4, 5, 3)
@@ -91,7 +92,7 @@ def _value(name: str, shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.flo
 
 def _made(path: Path, **arguments: Any) -> Any:
     with mock.patch.object(zarr_grid, "render_grid", _rendered):
-        return grid_to_zarr(IMAGE, None, AXES, path, **arguments)
+        return grid_to_zarr(IMAGE, SETTINGS, AXES, path, **arguments)
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
@@ -115,7 +116,7 @@ def _expected(chunk: tuple[int, ...]) -> dict[str, bytes]:
 def _asked() -> Grid:
     return ask(
         IMAGE,
-        None,
+        SETTINGS,
         AXES,
         size=None,
         shading="forward",

@@ -12,7 +12,7 @@ volk=$("$PYTHON" - <<'END'
 import setuptools
 setuptools.setup = lambda **_: None
 import setup
-setup.write_spirv()
+setup.write_spirv(setup.processes())
 print(setup.volk_folder())
 END
 )

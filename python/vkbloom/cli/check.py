@@ -24,17 +24,9 @@ from vkbloom.cli.terminal import detail_device, is_quiet, note, say
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
 from vkbloom.own.method import OwnMethod
-from vkbloom.suggestions import did_you_mean
-from vkbloom.testing.law_report import LAWS
+from vkbloom.testing.law_table import law_name
 from vkbloom.testing.programs import Program
-from vkbloom.verdicts import measuring, showing, subjects
-
-#: The laws by name, also by the names of their assertions.
-_NAMES = {
-    **{name: name for name in (*LAWS, *measuring.WHY)},
-    "stable": "stability",
-    "resolution_independent": "resolution",
-}
+from vkbloom.verdicts import measuring, showing
 
 
 class CheckCommand(Command):
@@ -59,13 +51,10 @@ class CheckCommand(Command):
 
 
 def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
-    names = [name.strip().replace("-", "_").removeprefix("assert_") for name in text.split(",")]
-    for name in filter(None, names):
-        if name not in _NAMES:
-            raise click.BadParameter(
-                f"{name!r} is not one of {', '.join(_NAMES)}{did_you_mean(name, _NAMES)}"
-            )
-    return tuple(dict.fromkeys(_NAMES[name] for name in names if name))
+    try:
+        return tuple(dict.fromkeys(law_name(name) for name in text.split(",") if name.strip()))
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
 
 
 @click.command(cls=CheckCommand)
@@ -100,8 +89,8 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--gain",
     type=click.FloatRange(0),
-    help="The gain that flat images should have [default: 1 for files that save BLOOM; otherwise "
-    "what is measured]",
+    help="The gain that flat images should have [default: 1 for programs and for files that save "
+    "BLOOM; otherwise what is measured]",
 )
 @click.option(
     "--measure-size",
@@ -161,40 +150,40 @@ def command(
             name = click.get_current_context().params["preset"] or settings.method
             if twin is not None:
                 _add_twin(settings, twin)
-            subject = subjects.of_settings(name, renderer, settings, measured, gain)
+            subject = measuring.of_settings(renderer, settings, measured, gain)
             passes, device = measuring.pass_times(renderer, settings, size), renderer.info.summary
         else:
+            name = program
             with as_wrong_use():
                 run = Program(shlex.split(program), suffix, timeout)
             with _notes():
-                subject = subjects.of_program(program, run, measured, gain, less_input=less_input)
+                subject = measuring.of_program(run, measured, gain, less_input=less_input)
             passes, device = measuring.run_time(run, size), "this machine"
         try:
             found = measuring.measured(
                 subject,
                 renderer,
+                name=name,
                 device=device,
+                settings=measuring.exact(settings) if program is None else None,
                 passes=passes,
                 frame=size,
-                progress=lambda text: bar.update(f"{subject.name}: {text}"),
+                required=require,
+                progress=lambda text: bar.update(f"{name}: {text}"),
             )
         except AssertionError as error:
-            raise click.ClickException(f"{subject.name}: {error}") from error
+            raise click.ClickException(f"{name}: {error}") from error
         if page is not None:
-            scene = showing.lit_scene(measuring.VIEW)
-            pictures = {"picture": subject.picture(scene), "bloom": subject.bloom(scene)}
-            text = showing.as_page(found, pictures, require)
-            safe_writing.write_file(Path(page), text.encode())
+            safe_writing.write_file(Path(page), showing.as_page(found).encode())
     if as_json:
-        click.echo(json.dumps(showing.as_values(found, require), indent=2))
+        click.echo(json.dumps(showing.as_values(found), indent=2))
     else:
-        click.echo(showing.as_text(found, required=require))
+        click.echo(showing.as_text(found))
     if page is not None:
         say(f"wrote {page}", err=as_json)
-    broken = showing.broken(found, require)
-    for row in broken:
-        note(f"{subject.name}: required law {row.name}: {row.words}")
-    return 1 if broken else 0
+    for row in showing.broken(found.report):
+        note(f"{name}: required law {row.name}: {row.words}")
+    return 1 if showing.broken(found.report) else 0
 
 
 def _check_choice(file: str | None, program: str | None, twin: str | None) -> None:

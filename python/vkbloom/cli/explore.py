@@ -22,8 +22,10 @@ from vkbloom.cli.glow_options import (
     note_step,
     refuse_glow_of_scene,
 )
+from vkbloom.cli.interrupts import INTERRUPTED
 from vkbloom.cli.live_options import live_options
-from vkbloom.cli.program import INTERRUPTED, as_wrong_use, given
+from vkbloom.cli.program import as_wrong_use, given
+from vkbloom.cli.settings_options import STARTS
 from vkbloom.cli.terminal import tell_device
 from vkbloom.explorer.viewer import GLOW, Viewer
 from vkbloom.settings import SHADINGS, Shading
@@ -53,6 +55,7 @@ _LARGEST_PORT: Final = 65535
 def command(
     *,
     image: NDArray[Any] | None,
+    origin: dict[str, Any],
     mask: str | None,
     emission: str | None,
     port: int,
@@ -84,12 +87,14 @@ def command(
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
-        if settings == vkbloom.presets["tutorial"] and not (given("preset") or given("method")):
+        if settings == vkbloom.presets["tutorial"] and not any(given(name) for name in STARTS):
             begun = None
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **glow)
+            return Viewer(
+                looked_at, begun, size=size, shading=shading, renderer=renderer, **glow, **origin
+            )
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

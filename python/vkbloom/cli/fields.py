@@ -18,6 +18,7 @@ import vkbloom
 from vkbloom import psf
 from vkbloom.cli.image_files import silenced
 from vkbloom.cli.program import given
+from vkbloom.cli.streams import as_file
 from vkbloom.fields import FieldInfo, Kind, fields_of
 from vkbloom.glare.base import Glare
 from vkbloom.named_glares import glares
@@ -85,8 +86,8 @@ def _read_psf(word: str) -> PSF:
 def read_colours(path: str) -> NDArray[Any]:
     """Read the colours of an image file, (H, W, 3), or raise OSError or click.ClickException."""
     try:
-        with silenced():
-            return vkbloom.read(path)[..., :3]
+        with silenced(), as_file(path) as file:
+            return vkbloom.read(file)[..., :3]
     except ValueError as error:
         # The file is at fault, and not the use of the option.
         raise click.ClickException(str(error)) from error

@@ -6,16 +6,23 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
+from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import Command, NameOf
-from vkbloom.cli.image_files import input_colour_option, layer_option, read_picture
+from vkbloom.cli.image_files import (
+    input_colour_option,
+    is_photograph,
+    layer_option,
+    read_picture,
+)
 from vkbloom.cli.program import as_wrong_use
 from vkbloom.cli.search_options import search_options
-from vkbloom.cli.settings_options import PRESET_OF_IMAGES
-from vkbloom.cli.terminal import detail_device
+from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, read_settings
+from vkbloom.cli.terminal import detail_device, note
 from vkbloom.interruptible import opened_renderer
+from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.registry import METHODS
 
 
@@ -26,8 +33,9 @@ from vkbloom.registry import METHODS
     "--preset",
     "presets",
     multiple=True,
-    type=NameOf("preset", vkbloom.presets),
-    help=f"Settings to start a search from; may be repeated [default {PRESET_OF_IMAGES}]",
+    type=NameOf("preset", vkbloom.presets, ("all",)),
+    help="Settings to start a search from; may be repeated. all: every preset, each with those of "
+    f"the varied settings that it has [default {PRESET_OF_IMAGES}]",
 )
 @click.option(
     "--method",
@@ -35,6 +43,14 @@ from vkbloom.registry import METHODS
     multiple=True,
     type=NameOf("method", METHODS),
     help="A method whose defaults start a search; may be repeated.",
+)
+@click.option(
+    "--settings",
+    "files",
+    metavar="FILE",
+    multiple=True,
+    type=click.Path(),
+    help="A file of settings to start a search from, as for vkbloom apply; may be repeated.",
 )
 @click.option(
     "--framebuffer",
@@ -54,6 +70,7 @@ def command(
     target: str,
     presets: tuple[str, ...],
     kinds: tuple[str, ...],
+    files: tuple[str, ...],
     framebuffer: str,
     search: dict[str, Any],
     told: Callable[[Sequence[vkbloom.FitResult]], int],
@@ -65,18 +82,45 @@ def command(
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
     Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
-    There is one search for each preset and method, which starts from its settings. --vary names the
-    settings that may change. The results are printed as Python code, sorted by loss,
-    with a verdict (good, fair or poor) and the likely cause, such as a clipped target.
+    With a TARGET of 8 bits, such as a screenshot, blooms are clipped and rounded as it is. For the
+    preset photo, the highlights of an IMAGE of integers are also expanded.
+
+    There is one search for each preset and method, which starts from its settings. --vary names
+    the settings that may change. The results are printed as Python code, sorted by loss, with a
+    verdict (good, fair or poor) and the likely cause, such as a target without bloom.
     """
-    begun = [*(vkbloom.presets[name] for name in presets), *(METHODS[kind]() for kind in kinds)]
-    begun = begun or [vkbloom.presets[PRESET_OF_IMAGES]]
-    pixels, wanted = (
-        read_picture(file, 0, input_colour, layer=layer).pixels for file in (image, target)
-    )
+    pixels = read_picture(image, 0, input_colour, layer=layer).pixels
+    wanted = read_picture(target, 0, input_colour, layer=layer).pixels
+    searches = _searches(presets, kinds, files, pixels)
+    if is_photograph(image) and (photo := _photo_of(presets, search["vary"])):
+        bright = read_picture(image, 0, input_colour, layer=layer, expand=PHOTO_EXPANSION).pixels
+        searches.append((bright, [photo]))
+        note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
-        found = vkbloom.fit(
-            pixels, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
-        )
-    return told(found)
+        found = [
+            one
+            for image_of, begun in searches
+            for one in vkbloom.fit(
+                image_of, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
+            )
+        ]
+    return told(sorted(found, key=lambda one: one.loss))
+
+
+def _searches(
+    presets: Sequence[str], kinds: Sequence[str], files: Sequence[str], pixels: NDArray[Any]
+) -> list[tuple[NDArray[Any], Any]]:
+    """Return what `vkbloom.fit` gets of each search: the image, and the settings."""
+    begun = [METHODS[kind]() for kind in kinds] + [read_settings(file)[0] for file in files]
+    if "all" in presets:
+        return [(pixels, "all"), *([(pixels, begun)] if begun else [])]
+    begun += [vkbloom.presets[name] for name in presets]
+    return [(pixels, begun or [vkbloom.presets[PRESET_OF_IMAGES]])]
+
+
+def _photo_of(presets: Sequence[str], vary: Sequence[str]) -> vkbloom.Settings | None:
+    """Return the preset for photographs if it is asked for and has the varied fields."""
+    photo = vkbloom.presets[PRESET_OF_PHOTOS]
+    is_asked = "all" in presets or PRESET_OF_PHOTOS in presets
+    return photo if is_asked and all(hasattr(photo, name) for name in vary) else None

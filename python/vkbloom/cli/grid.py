@@ -231,7 +231,7 @@ def command(
         if output.is_store:
             output.store(math.prod(grid.shape), requested, chunks=chunks, **shared, **device)
         else:
-            output.write_images(grid, pictures, **device)
+            output.write_images(grid, pictures, expand, **device)
 
 
 @dataclass(frozen=True)
@@ -289,9 +289,11 @@ class _Output:
             safe_writing.write_file(Path(self.curves), drawn.getvalue())
             say(f"wrote {self.curves}")
 
-    def write_images(self, grid: Grid, pictures: Sequence[Picture], **device: Any) -> None:
+    def write_images(
+        self, grid: Grid, pictures: Sequence[Picture], expand: float | None, **device: Any
+    ) -> None:
         """Render into image files."""
-        forms = [FileForm(one.encoding, one.numbers, one.grey) for one in pictures]
+        forms = [FileForm(one.encoding, one.numbers, one.grey, expand) for one in pictures]
 
         def prepared(layout: Layout) -> GridFiles:
             suffix = f".{self.suffix.lstrip('.')}"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import glob
 import os
-import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -15,10 +13,11 @@ import click
 import numpy as np
 
 from vkbloom.cli.program import given
+from vkbloom.cli.streams import as_file, shown
 from vkbloom.cli.terminal import detail, note
 from vkbloom.io import image_reading
+from vkbloom.io.alpha import hidden_notes
 from vkbloom.io.colour import check_space
-from vkbloom.io.displayed import has_hdr_curve
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.io.images import Colour, Picture, StoredImage
 
@@ -74,8 +73,8 @@ def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
     """Read an image file; libraries print no messages of their own."""
-    with silenced():
-        return image_reading.load(path, subimage, layer)
+    with silenced(), as_file(path) as file:
+        return image_reading.load(file, subimage, layer)
 
 
 def check_part_is_given(path: str, stored: StoredImage) -> None:
@@ -103,10 +102,15 @@ def read_picture(
     layer: str | None = None,
     raw: bool = False,
     expand: float | None = None,
+    is_blended: bool = True,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents."""
+    """Read an image file, decode it for a renderer, and print notes about its contents.
+
+    `is_blended`: Whether its colours are multiplied by alpha afterwards.
+    """
     check_input_colour(colour)
     stored = read(source, subimage, layer)
+    source = shown(source)
     if raw and stored.pixels.dtype != np.uint8:
         raise not_of_bytes(source, stored.numbers[0])
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
@@ -116,30 +120,24 @@ def read_picture(
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
-    for text in picture.notes:
+    hidden = 0.0 if is_blended else picture.hidden
+    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
         note(f"{source}: {text}")
     return picture
 
 
 def is_photograph(source: str) -> bool:
-    """Whether a file holds integers for SDR; of a folder the first file, of a pipe its content.
+    """Whether a file holds integers for SDR.
 
     False for what cannot be read: the error comes from the command that reads it.
     """
-    if source == "-":
-        peek = getattr(sys.stdin.buffer, "peek", None)
-        head = bytes(peek(4)[:4]) if peek is not None else b""
-        return bool(head) and not head.startswith((b"v/1\x01", b"#?"))
-    files = [source]
-    if os.path.isdir(source):
-        files = [os.path.join(source, name) for name in sorted(os.listdir(source))]
-    elif not os.path.exists(source):
-        files = sorted(glob.glob(re.sub(r"%0?\d*d", "*", source)))
-    for file in files:
-        with suppress(OSError, ValueError), image_reading.opened(file, "Reading images") as reader:
-            spec = reader.spec()
-            is_hdr = has_hdr_curve(image_reading.points_of(spec))
-            return str(spec.format) in ("uint8", "uint16") and not is_hdr
+    with (
+        suppress(OSError, ValueError),
+        silenced(),
+        as_file(source) as file,
+        image_reading.opened(file, "Reading images") as reader,
+    ):
+        return image_reading.is_photograph(reader)
     return False
 
 

@@ -21,9 +21,10 @@ from vkbloom.cli.device_options import device_options
 from vkbloom.cli.image_files import is_photograph, layer_option, read_picture
 from vkbloom.cli.sequences import check_drawing
 from vkbloom.cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
-from vkbloom.cli.terminal import hides_progress, say, show, tell_device
+from vkbloom.cli.terminal import hides_progress, note, say, show, tell_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.io import safe_writing
+from vkbloom.io.displayed import scaled_to_1
 from vkbloom.io.expansion import PHOTO_EXPANSION
 from vkbloom.settings import Settings
 from vkbloom.views import pictures
@@ -34,6 +35,10 @@ __all__ = ["Entry", "base_settings", "listing_command"]
 _LARGEST_SIDE: Final = 1280
 _COLUMNS: Final = 4
 _WIDTH: Final = 480
+# What highlights are expanded to for a glare that shows nothing otherwise.
+_MORE_LIGHT: Final = (16, 64, 256, 1024)
+# Levels by which pixels differ visibly, and the least shares of such pixels.
+_SEEN, _SEEN_SHARE, _SEEN_DIRT = 16, 2e-3, 0.15
 
 
 @dataclasses.dataclass(frozen=True)
@@ -146,18 +151,68 @@ def _sheet(
     tiles = [(_tile(plain, cell), "without bloom", Path(file).name)]
     with opened_renderer(*device) as renderer:
         tell_device(renderer)
+
+        def tile_of(image: NDArray[Any], settings: Settings) -> NDArray[Any]:
+            return _tile(renderer.apply(image, settings, attachments=["final"])["final"], cell)
+
+        def brighter(limit: float) -> NDArray[Any]:
+            return _reduced(read_picture(file, 0, None, layer=layer, expand=limit).pixels)
+
         for one in tqdm(entries, unit="picture", leave=False, disable=hides_progress()):
             settings = shown(one, base)
             if settings is None:
                 continue
             for_photos = settings.replace(glare=()) == base_settings(is_photo=True)
             image = expanded if one.needs_hdr or for_photos else plain
-            final = renderer.apply(image, settings, attachments=["final"])["final"]
             words = f"{one.composite}{', needs HDR' * one.needs_hdr}"
             if is_photo and one.needs_hdr:
                 words += f": --expand {PHOTO_EXPANSION:g}"
-            tiles.append((_tile(final, cell), one.name, words))
+            tile = tile_of(image, settings)
+            if settings.glare and not _is_seen(
+                one, tile, tile_of(image, settings.replace(glare=()))
+            ):
+                tried = _with_more_light(one, settings, brighter if is_photo else None, tile_of)
+                tile, words = tried or (tile, f"{one.composite}: shows nothing here")
+                if tried is None:
+                    note(f"{one.name} shows nothing on {file}{_above(one)}")
+            tiles.append((tile, one.name, words))
     return pictures.sheet_png(tiles, _COLUMNS, cell)
+
+
+def _with_more_light(
+    entry: Entry,
+    settings: Settings,
+    brighter: Callable[[float], NDArray[Any]] | None,
+    tile_of: Callable[[NDArray[Any], Settings], NDArray[Any]],
+) -> tuple[NDArray[Any], str] | None:
+    """Return the tile of a glare that needs brighter lights, and its line; None: none shows it.
+
+    - `brighter`: Returns the picture with highlights that are expanded to a value.
+    """
+    for limit in _MORE_LIGHT if brighter is not None else ():
+        assert brighter is not None
+        image = brighter(limit)
+        if entry.composite == "multiply":
+            lit = settings
+        else:
+            # The bloom of brighter lights would cover the glare.
+            lit = settings.replace(intensity=settings.intensity * PHOTO_EXPANSION / limit)
+        tile = tile_of(image, lit)
+        if _is_seen(entry, tile, tile_of(image, lit.replace(glare=()))):
+            return tile, f"{entry.composite}: --expand {limit:g} --intensity {lit.intensity:.2g}"
+    return None
+
+
+def _is_seen(entry: Entry, tile: NDArray[Any], bare: NDArray[Any]) -> bool:
+    """Whether an eye sees a glare; dirt only in a large part of the picture."""
+    share = float((np.abs(tile.astype(int) - bare) > _SEEN).any(axis=2).mean())
+    return share >= (_SEEN_DIRT if entry.composite == "multiply" else _SEEN_SHARE)
+
+
+def _above(entry: Entry) -> str:
+    """Return what the values must be above for a glare to show something, as words."""
+    limits = [stage.get("threshold", 0) for stage in entry.values.get("glare", ())]
+    return f": it takes values above {max(limits):g}" if any(limits) else ""
 
 
 def _reduced(image: NDArray[Any]) -> NDArray[Any]:
@@ -166,5 +221,6 @@ def _reduced(image: NDArray[Any]) -> NDArray[Any]:
 
 
 def _tile(final: NDArray[Any], cell: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return a picture in the size of a cell."""
-    return pictures.picture(final, "final", size=cell)
+    """Return a picture in the size of a cell, with the colours of a file of integers."""
+    shown = final if final.dtype == np.uint8 else scaled_to_1(final)
+    return pictures.picture(shown, "final", size=cell)

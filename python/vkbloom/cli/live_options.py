@@ -13,6 +13,7 @@ from vkbloom.cli.image_files import expand_option, layer_option, read_picture, s
 from vkbloom.cli.program import given
 from vkbloom.cli.scene_options import scene_options
 from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.streams import is_stream
 
 __all__ = ["live_options"]
 
@@ -23,8 +24,9 @@ _OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
 def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
-    The command gets the pixels of IMAGE as `image`, which is None for a scene. `image_has_size`:
-    ``--size`` may be given with an IMAGE.
+    The command gets the pixels of IMAGE as `image`, which is None for a scene, and as `origin` the
+    arguments `file` and `expand` of a `Viewer`. `image_has_size`: ``--size`` may be given with an
+    IMAGE.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -47,14 +49,17 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
             if source is None:
                 if given("expand"):
                     raise click.UsageError("--expand is only for an IMAGE")
-                return command(image=None, **arguments)
+                return command(image=None, origin={}, **arguments)
             for name, option in _OF_SCENE.items():
                 if given(name) and not (name == "size" and image_has_size):
                     raise click.UsageError(
                         f"{option} is only for scenes; leave it out with an IMAGE"
                     )
-            image = read_picture(source, subimage, None, layer=layer, expand=expand).pixels
-            return command(image=image, **arguments)
+            picture = read_picture(source, subimage, None, layer=layer, expand=expand)
+            is_expanded = picture.numbers.startswith("uint") and expand not in (None, 1)
+            origin: dict[str, Any] = {"file": "" if is_stream(source) else source}
+            origin |= {"expand": expand} if is_expanded else {}
+            return command(image=picture.pixels, origin=origin, **arguments)
 
         return run
 

@@ -1,4 +1,4 @@
-"""Sequences of images, which are read while the device works on another image."""
+"""Images that are read while the device works on another one."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from typing import Any, Final, TypeVar
 import click
 
 import vkbloom
-from vkbloom.io.images import Picture
 
 __all__ = ["read_ahead", "rendered"]
 
 # Number of images that are read ahead.
 _AHEAD: Final = 1
 
+Source = TypeVar("Source")
 Read = TypeVar("Read")
+# Errors of one image. All others, such as that of a lost device, end the sequence.
+_FAILURES: Final = (OSError, TypeError, ValueError, MemoryError)
 
 
-def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[Read]:
+def read_ahead(read: Callable[[Source], Read], sources: Iterable[Source]) -> Iterator[Read]:
     """Read each source and yield the result; a thread reads the next source at the same time."""
     context = click.get_current_context()
 
-    def read_in_context(source: str) -> Read:
+    def read_in_context(source: Source) -> Read:
         with context.scope(cleanup=False):
             return read(source)
 
@@ -43,18 +45,31 @@ def read_ahead(read: Callable[[str], Read], sources: Iterable[str]) -> Iterator[
 
 def rendered(
     renderer: vkbloom.Renderer,
-    pictures: Iterable[Picture],
+    pictures: Iterable[Read],
     settings: vkbloom.Settings,
     attachments: str | list[str],
-    prepared: Callable[[Picture], Any],
-) -> Generator[tuple[Picture, vkbloom.Frames], None, None]:
-    """Yield each picture with its frames; `prepared` makes the renderer's argument of it."""
-    waiting: deque[Picture] = deque()
+    prepared: Callable[[Read], Any],
+) -> Generator[tuple[Read, vkbloom.Frames | Exception], None, None]:
+    """Yield each picture with its frames, or with its error.
+
+    `prepared` makes the renderer's argument of a picture.
+    """
+    waiting: deque[Read] = deque()
+    following = iter(pictures)
 
     def pixels() -> Iterator[Any]:
-        for picture in pictures:
+        # Those that were taken before the image that failed.
+        yield from [prepared(picture) for picture in waiting]
+        for picture in following:
             waiting.append(picture)
             yield prepared(picture)
 
-    for frames in renderer.apply_each(pixels(), settings, attachments=attachments):
-        yield waiting.popleft(), frames
+    while True:
+        try:
+            for frames in renderer.apply_each(pixels(), settings, attachments=attachments):
+                yield waiting.popleft(), frames
+            return
+        except _FAILURES as error:
+            if not waiting:
+                raise
+            yield waiting.popleft(), error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -17,6 +18,7 @@ from click.shell_completion import CompletionItem
 
 import vkbloom
 from vkbloom.cli import terminal
+from vkbloom.cli.interrupts import INTERRUPTED, raise_interrupts
 from vkbloom.free_memory import ADVICE, memory_left
 from vkbloom.registry import METHODS
 from vkbloom.suggestions import did_you_mean
@@ -39,9 +41,6 @@ COMMANDS: Final = (
     "doctor",
     "warm",
 )
-
-#: The status after Ctrl-C, as shells report it.
-INTERRUPTED: Final = 130
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -67,6 +66,7 @@ class Program(click.Group):
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"vkbloom.cli.{cmd_name}").command
+        raise_interrupts()
         if terminal.PRINTING_OPTIONS[0] not in command.params:
             command.params += terminal.PRINTING_OPTIONS
         return command
@@ -76,6 +76,8 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that a call names, or say which one was meant."""
         if args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            if os.path.exists(args[0]):
+                ctx.fail(f"{args[0]} is a file, not a command; did you mean {ctx.info_name} apply?")
             ctx.fail(f"No such command {args[0]!r}{did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
@@ -93,6 +95,22 @@ class Program(click.Group):
         ]
         # Not the group's own: it would list the commands again.
         return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
+    ) -> click.Context:
+        """Parse the words of a call; Ctrl-C is click.Abort, before click prints an empty line."""
+        try:
+            return super().make_context(info_name, args, *rest, **extra)
+        except KeyboardInterrupt:
+            raise click.Abort from None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; Ctrl-C is click.Abort."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise click.Abort from None
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
@@ -114,15 +132,18 @@ class Program(click.Group):
         except click.ClickException as error:
             _exit(1, error.format_message())
         except click.Abort:
+            if sys.stderr is not None and sys.stderr.isatty():
+                # It ends the line on which a terminal shows ^C.
+                click.echo(err=True)
             _exit(INTERRUPTED, "interrupted")
         except Exception as error:
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
             no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
             if any(one in str(error) for one in no_memory):
-                _exit(1, _described(MemoryError(str(error))))
+                _exit(1, described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
-                _exit(1, _described(error))
+                _exit(1, described(error))
             raise
         terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
         sys.exit(status)
@@ -165,8 +186,16 @@ def _is_from_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _described(error: BaseException) -> str:
+def described(error: BaseException) -> str:
+    """Return an error in one sentence, with the name of its file."""
+    if isinstance(error, click.ClickException):
+        return error.format_message()
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        folder = os.path.dirname(os.fsdecode(error.filename))
+        if error.errno == errno.ENOENT and folder and not os.path.lexists(folder):
+            while (above := os.path.dirname(folder)) and not os.path.lexists(above):
+                folder = above
+            return f"{error.filename}: there is no folder {folder}"
         return f"{error.filename}: {error.strerror}"
     text = str(error) or type(error).__name__
     if isinstance(error, MemoryError) and "memory is short" not in text:
@@ -177,7 +206,7 @@ def _described(error: BaseException) -> str:
 
 
 def _exit(status: int, message: str) -> NoReturn:
-    click.echo(f"vkbloom: {' '.join(message.split())}", err=True)
+    terminal.complain(message)
     sys.exit(status)
 
 

@@ -48,7 +48,7 @@ def _shown(entry: Entry, _: Settings) -> Settings | None:
         return None
     # A function that describes scattered light alone has that share as the intensity of the mix.
     share = min(1.0, float(spread.energy().mean()))
-    return vkbloom.Convolution(spread, boundary="edge", composite="mix", intensity=share)
+    return vkbloom.Convolution(spread, composite="mix", intensity=share)
 
 
 command = listing_command(

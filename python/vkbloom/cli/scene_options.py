@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any, Final
 
 import click
@@ -12,6 +13,7 @@ import click
 from vkbloom import Camera, Scene
 from vkbloom.cli import fields
 from vkbloom.cli.program import as_wrong_use
+from vkbloom.cli.streams import as_file
 from vkbloom.scene import gltf, skybox
 
 _BUILT_IN: Final = "ufo"
@@ -32,7 +34,11 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         metavar="ufo|PATH",
         help=f"The lit mesh: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
     )
-    @click.option("--glow", type=click.Path(), help="The glowing mesh: a glTF file.")
+    @click.option(
+        "--glow",
+        type=click.Path(),
+        help="The glowing mesh: a glTF file. Without it, materials that emit glow.",
+    )
     @click.option(
         "--skybox",
         "sky",
@@ -72,12 +78,16 @@ def _load(
     glow_intensity: float,
     camera: dict[str, Any],
 ) -> Scene:
-    scene = Scene.ufo() if base == _BUILT_IN else Scene.from_gltf(base)
-    changes: dict[str, Any] = {"glow_intensity": glow_intensity}
-    if glow is not None:
-        changes["glow"] = gltf.load_mesh(glow)
-    if sky:
-        changes["skybox"] = skybox.load(sky[0] if len(sky) == 1 else list(sky))
+    with ExitStack() as stack:
+        files = [stack.enter_context(as_file(face)) for face in sky]
+        scene = Scene.ufo()
+        if base != _BUILT_IN:
+            scene = Scene.from_gltf(stack.enter_context(as_file(base)))
+        changes: dict[str, Any] = {"glow_intensity": glow_intensity}
+        if glow is not None:
+            changes["glow"] = gltf.load_mesh(stack.enter_context(as_file(glow)))
+        if files:
+            changes["skybox"] = skybox.load(files[0] if len(files) == 1 else files)
     with as_wrong_use():
         changes["camera"] = dataclasses.replace(scene.camera, **camera)
         return dataclasses.replace(scene, **changes)

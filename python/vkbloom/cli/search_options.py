@@ -125,7 +125,7 @@ def _tell(
         for one in found:
             click.echo(
                 f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
-                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s"
+                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s{_begun(one)}"
             )
             click.echo(f"  {as_code(one.settings)}")
             click.echo(f"  {one.words}")
@@ -138,6 +138,16 @@ def _tell(
     return 0
 
 
+def _begun(found: vkbloom.FitResult) -> str:
+    """Return the preset that a search started from, as words; "" if none has the other fields."""
+    for name, preset in vkbloom.presets.items():
+        if preset.method == found.settings.method:
+            values = {field: getattr(preset, field) for field in found.vary}
+            if found.settings.replace(**values) == preset:
+                return f", from the preset {name}"
+    return ""
+
+
 def _object(found: vkbloom.FitResult) -> dict[str, Any]:
     """Return the object of one result that --json prints."""
     return {
@@ -146,6 +156,7 @@ def _object(found: vkbloom.FitResult) -> dict[str, Any]:
         "loss": found.loss,
         "start_loss": found.start_loss,
         "loss_name": found.loss_name,
+        "explained": found.explained,
         "verdict": found.verdict,
         "cause": found.cause,
         "calls": found.calls,

@@ -13,13 +13,11 @@ from typing import Final
 
 import click
 
+from vkbloom.cli.streams import PIPE, is_stream
 from vkbloom.cli.terminal import note
 from vkbloom.io.image_reading import readable_extensions
 
-__all__ = ["PIPE", "check_drawing", "check_targets", "is_terminal", "pairs"]
-
-#: Stands for standard input and standard output.
-PIPE: Final = "-"
+__all__ = ["check_drawing", "check_targets", "is_terminal", "pairs"]
 
 #: The most names in a note.
 _MOST_NAMES: Final = 5
@@ -51,6 +49,8 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
         )
     if PIPE in (name for name, _ in found) and written != [target]:
         raise click.UsageError("standard input needs one file, or standard output, as OUT")
+    if is_stream(target) and len(found) > 1:
+        raise click.UsageError(f"{target}: one pipe cannot hold {len(found)} images")
     if len(set(written)) < len(written):
         raise click.UsageError(f"{target}: two images have the same name; use a pattern")
     return [(name, file) for (name, _), file in zip(found, written, strict=True)]
@@ -63,11 +63,13 @@ def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool)
     """
     read = [source for source, _ in work if os.path.isfile(source)]
     for _, target in work:
-        if target == PIPE:
-            if is_terminal():
-                raise click.UsageError(
-                    "standard output is a terminal; redirect it to a file or a program"
-                )
+        if target == PIPE and sys.stdout is None:
+            raise OSError(errno.EBADF, "is closed", "standard output")
+        if target == PIPE and is_terminal():
+            raise click.UsageError(
+                "standard output is a terminal; redirect it to a file or a program"
+            )
+        if is_stream(target):
             continue
         _check_folder(target, makes=target != out)
         for source in read if os.path.exists(target) and not overwrite else ():
@@ -85,8 +87,9 @@ def _check_folder(target: str, *, makes: bool) -> None:
     # A missing folder is made with its first file.
     existing = folder if os.path.lexists(folder) or not makes else os.path.dirname(folder) or "."
     if not os.path.isdir(existing):
-        code = errno.ENOTDIR if os.path.lexists(existing) else errno.ENOENT
-        raise OSError(code, os.strerror(code), existing)
+        is_there = os.path.lexists(existing)
+        code, name = (errno.ENOTDIR, existing) if is_there else (errno.ENOENT, target)
+        raise OSError(code, os.strerror(code), name)
     if not os.access(existing, os.W_OK | os.X_OK):
         raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
 

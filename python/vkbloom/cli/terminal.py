@@ -73,6 +73,11 @@ def say(text: str, *, err: bool = False) -> None:
         click.echo(text, err=err)
 
 
+def complain(text: str) -> None:
+    """Print an error as one line on standard error."""
+    click.echo(f"vkbloom: {' '.join(text.split())}", err=True)
+
+
 def note(text: str) -> None:
     """Print a note that is not an error on standard error, unless --quiet."""
     say(f"vkbloom: note: {text}", err=True)

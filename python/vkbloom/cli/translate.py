@@ -12,7 +12,7 @@ from vkbloom.cli.device_options import device_options
 from vkbloom.cli.fields import SIZE, Command, NameOf
 from vkbloom.cli.program import as_wrong_use, given
 from vkbloom.cli.search_options import search_options
-from vkbloom.cli.settings_options import settings_options
+from vkbloom.cli.settings_options import STARTS, settings_options
 from vkbloom.cli.terminal import detail_device
 from vkbloom.interruptible import opened_renderer
 from vkbloom.registry import METHODS
@@ -29,7 +29,7 @@ from vkbloom.registry import METHODS
 @click.option(
     "--size",
     type=SIZE,
-    default="1920x1080",
+    default="640x360",
     show_default=True,
     help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
     "of the frame at every size but this.",
@@ -49,12 +49,14 @@ def command(
 ) -> int:
     """Find another method's parameters whose bloom comes closest.
 
-    --preset or --method, with further options, are the settings to translate; --to names the other
-    method. Both get a black picture with four small lights. The result is printed as Python code,
-    with its loss and a verdict.
+    --preset, --method or --settings, with further options, are the settings to translate; --to
+    names the other method. Both get a black picture with four small lights. The result is printed
+    as Python code, with its loss and a verdict.
     """
-    if not (given("preset") or given("method")):
-        raise click.UsageError("give what to translate: --preset NAME or --method NAME")
+    if not any(given(name) for name in STARTS):
+        raise click.UsageError(
+            "give what to translate: --preset NAME, --method NAME or --settings FILE"
+        )
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)

@@ -34,6 +34,7 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"12
 def command(
     *,
     image: NDArray[Any] | None,
+    origin: dict[str, Any],
     size: tuple[int, int] | None,
     shading: Shading,
     mailbox: bool,

@@ -138,8 +138,16 @@ def _software(adapters: list[Mapping[str, Any]]) -> Finding:
             "To use it: install the package vkbloom-lavapipe, or apt install "
             "mesa-vulkan-drivers (Debian, Ubuntu).",
         )
-    described = found[0]["driver_info"] or "no version"
+    described = found[0]["driver_info"]
     tested = " and ".join(TESTED_MESA)
+    if "Mesa" not in described:
+        return Finding(
+            topic,
+            "note",
+            f"the software adapter is {found[0]['name']}, not lavapipe, whose versions {tested} "
+            "are tested; it should work",
+            "Check the test render below.",
+        )
     # As in "Mesa 22.3.6 (LLVM 15.0.6)"; a distribution may append its own revision.
     version = re.match(r"Mesa ([\d.]+)", described)
     if version and version[1] in TESTED_MESA:
@@ -159,7 +167,10 @@ def _chosen(chosen: child.Answer) -> Finding:
         reason = f'VKBLOOM_ADAPTER is {wanted!r} and replaces "auto"'
         advice = "Correct or unset VKBLOOM_ADAPTER."
     else:
-        reason = '"auto" prefers discrete, integrated, virtual, cpu, in that order'
+        reason = (
+            '"auto" prefers discrete, integrated, virtual, cpu, in that order, and any of them to '
+            "a driver that is not conformant"
+        )
         advice = "Set VKBLOOM_ADAPTER to software, hardware, or a part of another adapter's name."
     if chosen.value is None:
         return Finding(topic, "problem", f"{reason}; it fails: {chosen.failure}", advice)

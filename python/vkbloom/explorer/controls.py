@@ -16,7 +16,7 @@ from vkbloom.psf.base import PSF, functions
 from vkbloom.registry import METHODS, STAGES
 from vkbloom.settings import Settings
 
-__all__ = ["as_code", "as_fields", "controls", "described", "settings_from"]
+__all__ = ["as_code", "as_fields", "code_with_image", "controls", "described", "settings_from"]
 
 # Fields of everyday use: these, in this order, with the numbers that only this method has between
 # them.
@@ -175,6 +175,15 @@ def settings_from(fields: object) -> Settings:
     """Return the settings that a page sent."""
     made: Settings = Settings.from_dict(fields)  # type: ignore[arg-type]
     return made
+
+
+def code_with_image(settings: Settings, file: str, expand: float | None) -> str:
+    """Return Python code of the settings, and of the image if its highlights are expanded."""
+    if not file or expand is None:
+        return as_code(settings)
+    # Quotes and separators of paths as in Python.
+    read = f"image = vkbloom.read({json.dumps(file)}, expand={expand:g})"
+    return f"{read}\nsettings = {as_code(settings)}"
 
 
 def as_code(settings: Settings) -> str:

@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom.checks import check_emission, check_image, check_mask, check_number, check_size
 from vkbloom.core_access import core_of
-from vkbloom.explorer.controls import as_code, as_fields, controls, described, settings_from
+from vkbloom.explorer.controls import as_fields, code_with_image, controls, described, settings_from
 from vkbloom.explorer.fast_pictures import picture_of, texts_of
 from vkbloom.explorer.own_files import OwnFiles, current
 from vkbloom.io.expansion import PHOTO_EXPANSION
@@ -80,7 +80,8 @@ Answer = tuple[dict[str, Any], list[bytes]]
 class Viewer:
     """A source and the settings of both sides.
 
-    Arguments are those of `vkbloom.explore`, and the adapter of a new renderer.
+    Arguments are those of `vkbloom.explore`, the adapter of a new renderer, the file of an image,
+    and what its highlights were expanded up to.
 
     - `settings`, `frames`: The latest ones of the sides "a" and "b".
     """
@@ -97,13 +98,15 @@ class Viewer:
         shading: Shading = "deferred",
         renderer: Renderer | None = None,
         adapter: str = "auto",
+        file: str = "",
+        expand: float | None = None,
     ) -> None:
         from vkbloom.scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
         if source is None:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
-        self._name = self._note = ""
+        self._named(file, expand)
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
         self._files = OwnFiles()
@@ -140,6 +143,12 @@ class Viewer:
         begun = check_settings(settings)
         self._default = begun if is_default else None
         self.settings = {"a": begun, "b": begun.replace(bloom=False)}
+
+    def _named(self, file: str, expand: float | None) -> None:
+        """Keep the file of the source, and what its highlights were expanded up to."""
+        self._file, self._expand = file, expand
+        self._name = PurePath(file).name
+        self._note = f"highlights expanded up to {expand:g}" if expand is not None else ""
 
     def _show_image(
         self,
@@ -226,8 +235,7 @@ class Viewer:
         image, is_photo = _read(name, files, expand=PHOTO_EXPANSION)
         was_scene = self._scene is not None
         self._show_image(image)
-        self._name = name
-        self._note = f"highlights expanded up to {PHOTO_EXPANSION:g}" if is_photo else ""
+        self._named(name, PHOTO_EXPANSION if is_photo else None)
         self._shown.clear()
         # With a scene's settings a photograph would be white.
         if was_scene or self.settings["a"] == self._default:
@@ -300,7 +308,7 @@ class Viewer:
                 "size": [frames[shown].shape[1], frames[shown].shape[0]],
                 "dtype": str(frames[shown].dtype),
                 "note": _note_of(settings, shown),
-                "code": as_code(settings),
+                "code": code_with_image(settings, self._file, self._expand),
                 "plan": [one._asdict() for one in plan],
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
@@ -405,7 +413,9 @@ def _read(
 
 
 def _note_of(settings: Settings, shown: str) -> str:
-    """Return what a page says of a framebuffer that it cannot show as it is; "" for all others."""
+    """Return what a page says of a framebuffer that is not what its name or its colours tell."""
+    if shown == "glow":
+        return settings.glow_note and f"glow is {settings.glow_note}"
     if shown != "final" or settings.encoding not in ("pq", "hlg"):
         return ""
     return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"

@@ -77,16 +77,16 @@ class Descent(Search):
         """Search from the start, and as without derivatives where that ends far from the target."""
         try:
             self._follow(points[0])
-            if self.loss > CLOSE:
+            if self.loss > self._close:
                 # Differences see over the kinks at which taps move from texel to texel.
                 self._descend(self.best, STEPS[0], most=3)
                 self._follow(self.best, "dogbox")
-            if ENOUGH < self.loss <= CLOSE:
+            if ENOUGH < self.loss <= self._close:
                 # At an end, as that of a knee of 0, a derivative may be 0.
                 self._follow(np.clip(self.best, _INSIDE, 1 - _INSIDE))
         except SpentError:
             return
-        if self.loss > CLOSE:
+        if self.loss > self._close:
             super().run(points)
 
     def refine(self, points: list[Point]) -> None:

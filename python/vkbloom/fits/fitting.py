@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, Final, overload
+from typing import Any, Final, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,11 @@ from vkbloom.checks import check_image, check_index, import_extra
 from vkbloom.fits.descent import Descent, check_derivatives
 from vkbloom.fits.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom.fits.result import FitResult, loss_text
-from vkbloom.fits.search import Search
-from vkbloom.fits.space import Bounds, Space, space_of
+from vkbloom.fits.search import CLOSE, ENOUGH, Search
+from vkbloom.fits.space import Bounds, Space, spaces_of, spaces_of_all
 from vkbloom.gradients import pullback_of
 from vkbloom.image import Image
+from vkbloom.named_settings import presets
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings, check_settings
 from vkbloom.sources import Inputs, image_source
@@ -35,6 +37,8 @@ Maker = Callable[[NDArray[Any]], NDArray[Any]]
 # Longer side of the image of the first search in pixels, and its share of the calls.
 _COARSE_SIDE: Final = 384
 _COARSE_CALLS: Final = 0.6
+# Share of the loss of an image without bloom that is close to a target.
+_FAINT: Final = 0.02
 
 
 @overload
@@ -56,7 +60,7 @@ def fit(
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
-    settings: Sequence[Settings],
+    settings: Sequence[Settings] | Literal["all"],
     vary: str | Sequence[str],
     *,
     framebuffer: str = ...,
@@ -71,7 +75,7 @@ def fit(
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
-    settings: Settings | Sequence[Settings],
+    settings: Settings | Sequence[Settings] | Literal["all"],
     vary: str | Sequence[str],
     *,
     framebuffer: str = "final",
@@ -90,11 +94,14 @@ def fit(
         As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
     target : ndarray, shape (H, W, 3) or (H, W, 4), or callable
         The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
-        Alpha is not compared. Of a callable, such as `vkbloom.testing.command` makes of a program,
-        what it makes of the image, which is then an array.
-    settings : Settings or sequence of Settings
+        Alpha is not compared. With a target of 8 bits, such as a screenshot from `vkbloom.read`,
+        framebuffers are clipped and rounded as it is, and its saturated pixels are left out. Of a
+        callable, such as `vkbloom.testing.command` makes of a program, what it makes of the image,
+        which is then an array.
+    settings : Settings, sequence of Settings, or "all"
         Where the search starts, and the fields that stay as they are. Of several, such as presets
-        of several engines, each is searched by itself.
+        of several engines, each is searched by itself. "all": every preset; of a preset those of
+        the varied fields vary that it has and that have an effect.
     vary : str or sequence of str
         The fields to find: numbers, integers, flags and choices.
     framebuffer : str
@@ -114,15 +121,16 @@ def fit(
     max_calls : int
         The most renders of a candidate.
     gradient : bool
-        Whether to search by the derivatives of `Renderer.vjp`: fewer renders for many fields. The
-        varied fields must have a derivative and the loss must be "relative", "l2" or "log".
+        Whether to search by the derivatives of `Renderer.vjp`: fewer renders for many fields, but
+        pullbacks take longer than renders. The varied fields must have a derivative and the loss
+        must be "relative", "l2" or "log".
     progress : bool
         Whether to show a progress bar.
 
     Returns
     -------
     FitResult or list of FitResult
-        Of a sequence of settings a list, the smallest loss first.
+        Of "all" and of a sequence of settings a list, the smallest loss first.
 
     Raises
     ------
@@ -174,11 +182,9 @@ def fit(
     >>> round(found.settings.threshold, 2), found.settings.levels
     (1.3, 3)
     """
-    candidates = [settings] if isinstance(settings, Settings) else list(settings)
-    if not candidates:
-        raise ValueError("settings: there are none; give at least one")
+    is_all = isinstance(settings, str) and settings == "all"
+    candidates = _candidates(settings)
     names = _checked_names(vary)
-    measured = loss_named(loss)
     check_index("max_calls", max_calls, 1, 10_000_000)
     for name in bounds or {}:
         if name not in names:
@@ -190,21 +196,22 @@ def fit(
         if pixels is None:
             raise TypeError("image: a callable target needs an array, not an uploaded image")
         target = target(pixels)
-    wanted = light(check_image(target, "target"))
+    measure = Measure.of(check_image(target, "target"), loss_named(loss))
     brightest = math.inf if pixels is None else float(light(pixels).max())
-    spaces = [
-        space_of(check_settings(one), names, bounds or {}, brightest, len(wanted))
-        for one in candidates
-    ]
+    limits = (bounds or {}, brightest, len(measure.target))
+    varied = spaces_of_all if is_all else spaces_of
+    spaces = varied(candidates, names, *limits)
     if gradient:
-        check_derivatives(spaces, measured, pixels)
+        check_derivatives(spaces, measure.loss, pixels)
     opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
     with opened as used:
-        stages = _stages(used, image, pixels, wanted, measured)
+        stages = _stages(used, image, pixels, measure)
         # All of them before the first is searched: the most likely failures come at once.
-        costs = [_costs(used, stages[-1], space, framebuffer) for space in spaces]
+        priced = [_priced(used, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
         found = []
-        for space, cost in zip(spaces, costs, strict=True):
+        for space, cost in priced:
+            if not space.axes:
+                continue
             with _bar(progress, space.start.method, max_calls) as told:
                 one = _fitted(
                     used,
@@ -219,6 +226,16 @@ def fit(
                 found.append(one)
     found.sort(key=lambda one: one.loss)
     return found[0] if isinstance(settings, Settings) else found
+
+
+def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]:
+    """Return where the searches start."""
+    if isinstance(settings, str) and settings == "all":
+        return list(presets.values())
+    some: list[Any] = [settings] if isinstance(settings, Settings | str) else list(settings)
+    if not some:
+        raise ValueError("settings: there are none; give at least one")
+    return [check_settings(one) for one in some]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -244,27 +261,31 @@ def _stages(
     renderer: Renderer,
     image: NDArray[Any] | Image,
     pixels: NDArray[Any] | None,
-    target: NDArray[np.float64],
-    loss: Loss,
+    measure: Measure,
 ) -> list[_Stage]:
     """Return the image at its own size, and before it a smaller one where it is large."""
     handle = image if isinstance(image, Image) else renderer.upload(image)
+    target = measure.target
     if handle.shape[:2] != target.shape[:2]:
         raise ValueError(
             f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
             f"{handle.shape[1]} x {handle.shape[0]}"
         )
-    stages = [_Stage(handle, pixels, Measure(target, loss), 1)]
+    stages = [_Stage(handle, pixels, measure, 1)]
     factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
     if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
         small = reduced(pixels, factor)
-        measure = Measure(reduced(target, factor), loss)
-        stages.insert(0, _Stage(renderer.upload(small), small, measure, factor))
+        stages.insert(0, _Stage(renderer.upload(small), small, measure.reduced(factor), factor))
     return stages
 
 
-def _costs(renderer: Renderer, stage: _Stage, space: Space, framebuffer: str) -> NDArray[np.int_]:
-    """Return how many passes run after a change of each varied field alone."""
+def _priced(
+    renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
+) -> tuple[Space, NDArray[np.int_]]:
+    """Return a space, and how many passes run after a change of each varied field alone.
+
+    `drop`: Whether to leave out fields without an effect; otherwise they are errors.
+    """
     plan = renderer.plan(stage.image, space.start, attachments=[framebuffer])
     shape = plan.outputs[framebuffer][0]
     if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
@@ -272,23 +293,29 @@ def _costs(renderer: Renderer, stage: _Stage, space: Space, framebuffer: str) ->
             f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
             f"not the size of the target; it can be bloom or final"
         )
-    source = image_source(stage.image)
-    costs = []
-    for index, axis in enumerate(space.axes):
-        steps = []
-        # From several places: at one of them a field may be without effect.
-        for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
-            point = space.origin.copy()
-            point[index] = place
-            one = space.settings(point)
-            steps.append((source, _core.plan(source, one, (framebuffer,))))
-        costs.append(max(map(len, _core.dry_run(tuple(steps))[1:])))
-        if not costs[-1]:
+    costs = np.array(
+        [_cost(stage.image, space, index, framebuffer) for index in range(len(space.axes))]
+    )
+    for axis, cost in zip(space.axes, costs, strict=True):
+        if not (cost or drop):
             raise ValueError(
                 f"vary: {axis.name} has no effect on {framebuffer}"
                 + ("; give framebuffer='final'" if framebuffer != "final" else "")
             )
-    return np.array(costs)
+    kept = tuple(itertools.compress(space.axes, costs))
+    return dataclasses.replace(space, axes=kept), costs[costs > 0]
+
+
+def _cost(image: Image, space: Space, index: int, framebuffer: str) -> int:
+    """Return how many passes run after a change of one varied field."""
+    steps = []
+    # From several places: at one of them a field may be without effect.
+    for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
+        point = space.origin.copy()
+        point[index] = place
+        one = space.settings(point)
+        steps.append((image_source(image), _core.plan(image_source(image), one, (framebuffer,))))
+    return max(map(len, _core.dry_run(tuple(steps))[1:]))
 
 
 @contextlib.contextmanager
@@ -342,6 +369,7 @@ def _fitted(
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
             told=told,
+            close=_close(stage, framebuffer),
         )
         with _one_thread():
             if number:
@@ -354,8 +382,14 @@ def _fitted(
     last = searches[-1]
     settings = space.settings(last.best)
     seconds = time.perf_counter() - began
+    measure = stages[-1].measure
     frames = renderer.apply(stages[-1].image, settings)
-    target = stages[-1].measure.target
+    plain = np.zeros_like(measure.target)
+    if framebuffer == "final":
+        bare = settings.replace(bloom=False, glare=())
+        plain = light(renderer.apply(stages[-1].image, bare, attachments=["final"])["final"])
+    with _one_thread():
+        explained = measure.explained(last.loss, plain)
     return FitResult(
         settings=settings,
         loss=last.loss,
@@ -364,12 +398,22 @@ def _fitted(
         history=np.array(history),
         seconds=seconds,
         framebuffer=framebuffer,
-        loss_name=loss_text(stages[-1].measure.loss),
+        loss_name=loss_text(measure.loss),
         vary=tuple(axis.name for axis in space.axes),
         frames=frames,
-        target=target,
-        residual=light(frames[framebuffer]) - target,
+        target=measure.target,
+        residual=measure.compared(light(frames[framebuffer])) - measure.target,
+        plain=measure.compared(plain),
+        explained=explained,
     )
+
+
+def _close(stage: _Stage, framebuffer: str) -> float:
+    """Return the loss below which a search only polishes, less for a faint bloom."""
+    if framebuffer != "final" or stage.pixels is None:
+        return CLOSE
+    with _one_thread():
+        return float(np.clip(_FAINT * stage.measure(light(stage.pixels)), ENOUGH, CLOSE))
 
 
 def _derivatives(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.io.srgb import decode_srgb, encode_srgb
 from vkbloom.views.comparison import flip_map
 
 __all__ = ["Loss", "LossName", "Measure", "light", "loss_named", "reduced"]
@@ -22,23 +24,90 @@ _NAMES: Final = get_args(LossName)
 # Values under this share of the largest one count as it in "log".
 _DARK: Final = 1e-4
 _MOST_PIXELS: Final = 2**13
+# How far decoded levels may be from those computed here: curves of profiles have 16 bits.
+_LEVEL: Final = 2e-5
+
+
+class Curve(NamedTuple):
+    """The levels of 8 bits; without a decoder, all values."""
+
+    encode: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    decode: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
+
+    def rounded(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values of 0 to 1 at their nearest levels."""
+        if self.decode is None:
+            return values
+        return self.decode(np.rint(255 * self.encode(values)) / 255)
+
+
+_CONTINUOUS: Final = Curve(np.asarray, None)
+_CURVES: Final = (
+    Curve(np.asarray, np.asarray),
+    Curve(encode_srgb, decode_srgb),
+    Curve(lambda values: values ** (1 / 2.2), lambda values: values**2.2),
+)
 
 
 @dataclass(frozen=True)
 class Measure:
     """A loss against one target.
 
-    `target`: ndarray of float64, shape (H, W, 3).
+    - `target`: ndarray of float64, shape (H, W, 3).
+    - `curve`: Of a target of 8 bits, the curve of its levels. Framebuffers are clipped and rounded
+      to them, as the target was: where a bloom is less than half a level, the target has none.
+    - `saturated`: ndarray of bool, shape (H, W): pixels that are not compared. A saturated pixel
+      tells only that the light is at least 1, and each program clips its colour in its own way.
     """
 
     target: NDArray[np.float64]
     loss: Loss
+    curve: Curve | None = None
+    saturated: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if self.loss in ("relative", "log") and not self.target.max() > 0:
             raise ValueError(
                 f'target: it is black, so the loss {self.loss!r} is undefined; use "l2"'
             )
+
+    @classmethod
+    def of(cls, target: NDArray[Any], loss: Loss) -> Measure:
+        """Return the measure for an array as it was given."""
+        values = light(target)
+        curve = _curve_of(target)
+        whole = cls(values, loss, curve)
+        return whole if curve is None else whole._without(values.max(axis=2) >= 1)
+
+    def reduced(self, factor: int) -> Measure:
+        """Return the measure for an image that is reduced by boxes."""
+        # Means of levels are not levels, but they are still at most 1.
+        curve = None if self.curve is None else _CONTINUOUS
+        target = reduced(self.target, factor)
+        smaller = dataclasses.replace(self, target=target, curve=curve, saturated=None)
+        if self.saturated is None:
+            return smaller
+        shares = reduced(self.saturated[:, :, np.newaxis].astype(np.float64), factor)
+        return smaller._without(shares[:, :, 0] > 0)
+
+    def _without(self, saturated: NDArray[np.bool_]) -> Measure:
+        """Return the measure without some pixels, or with all if nothing else would be left."""
+        is_partial = saturated.any() and not saturated.all()
+        return dataclasses.replace(self, saturated=saturated) if is_partial else self
+
+    def compared(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a framebuffer as a target of 8 bits has it, equal to it where it is saturated."""
+        if self.curve is None:
+            return array
+        held = self.curve.rounded(np.clip(array, 0.0, 1.0))
+        if self.saturated is not None:
+            held[self.saturated] = self.target[self.saturated]
+        return held
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether framebuffers are rounded to levels of 8 bits."""
+        return self.curve is not None and self.curve.decode is not None
 
     @property
     def is_sum(self) -> bool:
@@ -52,20 +121,26 @@ class Measure:
         values take longer than the renders.
         """
         factor = math.ceil(math.sqrt(array.shape[0] * array.shape[1] / _MOST_PIXELS))
-        return self._differences(reduced(array, factor), reduced(self.target, factor))
+        return self._differences(
+            reduced(self.compared(array), factor), reduced(self.target, factor)
+        )
 
     def differences(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the differences of all values, of the array's shape, whose norm is the loss."""
-        return self._differences(array, self.target).reshape(array.shape)
+        return self._differences(self.compared(array), self.target).reshape(array.shape)
 
     def scales(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivative of each difference by its value."""
-        if self.loss == "relative":
-            return np.full(array.shape, 1 / float(np.linalg.norm(self.target)))
         scales = np.full(array.shape, 1 / math.sqrt(array.size))
-        if self.loss == "log":
+        if self.loss == "relative":
+            scales[:] = 1 / float(np.linalg.norm(self.target))
+        elif self.loss == "log":
             bright = array > _DARK * float(self.target.max())
             scales *= np.where(bright, 1 / (math.log(10) * np.where(bright, array, 1.0)), 0.0)
+        if self.curve is not None:
+            scales[(array < 0) | (array > 1)] = 0
+            if self.saturated is not None:
+                scales[self.saturated] = 0
         return scales
 
     def _differences(
@@ -82,6 +157,7 @@ class Measure:
 
     def __call__(self, array: NDArray[np.float64]) -> float:
         """Return the loss of a framebuffer; what is not finite counts as the largest float."""
+        array = self.compared(array)
         if self.is_sum:
             with np.errstate(over="ignore"):
                 value = float(np.linalg.norm(self._differences(array, self.target)))
@@ -92,6 +168,11 @@ class Measure:
             value = float(self.loss(array, self.target))
         return value if math.isfinite(value) else float(np.finfo(np.float64).max)
 
+    def explained(self, loss: float, plain: NDArray[np.float64]) -> float:
+        """Return the share of the loss of a picture without bloom that is gone."""
+        without = self(plain)
+        return 1 - loss / without if without > 0 else 0.0
+
 
 def loss_named(loss: Any) -> Loss:
     """Return a loss, or raise ValueError."""
@@ -100,6 +181,18 @@ def loss_named(loss: Any) -> Loss:
     if not isinstance(loss, str) or loss not in _NAMES:
         raise ValueError(f"loss: {loss!r} is not one of {', '.join(_NAMES)}, or a callable")
     return loss  # type: ignore[return-value]
+
+
+def _curve_of(target: NDArray[Any]) -> Curve | None:
+    """Return the curve of an array of 8-bit levels, also if `vkbloom.read` has decoded them."""
+    if target.dtype.kind == "u":
+        return _CURVES[0]
+    values = target[:, :, :3].astype(np.float64)
+    if not (values.min() >= 0 and values.max() <= 1):  # also NaN
+        return None
+    return next(
+        (one for one in _CURVES if np.abs(one.rounded(values) - values).max() < _LEVEL), None
+    )
 
 
 def light(array: NDArray[Any]) -> NDArray[np.float64]:

@@ -131,6 +131,7 @@ def fit_pyramid(
     framebuffer = "final" if direct else "bloom"
     found = light(frames[framebuffer])
     history = np.array([measure(light(start)), measure(found)])
+    plain = light(point) if direct else np.zeros_like(measure.target)
     return FitResult(
         settings=settings,
         loss=float(history[-1]),
@@ -144,6 +145,8 @@ def fit_pyramid(
         frames=frames,
         target=measure.target,
         residual=found - measure.target,
+        plain=plain,
+        explained=measure.explained(float(history[-1]), plain),
     )
 
 

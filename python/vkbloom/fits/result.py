@@ -8,11 +8,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.fits.causes import is_found, likely_cause
 from vkbloom.fits.losses import Loss
 from vkbloom.frames import Frames
 from vkbloom.settings import Settings
@@ -20,10 +21,8 @@ from vkbloom.views import pictures
 
 __all__ = ["FitResult"]
 
-# The largest loss that is good, and that is fair, by its name.
-_LIMITS: Final = {"relative": (0.02, 0.15), "log": (0.05, 0.2), "flip": (0.02, 0.1)}
-# A target is clipped if at least this share of its pixels has its largest value.
-_CLIPPED: Final = 1e-3
+# The smallest shares of the loss without bloom that a good and a fair fit explain.
+_GOOD, _FAIR = 0.95, 0.8
 
 _WIDTH, _HEIGHT = 300, 180  # pixels of a diagram
 _COLOURS = ("#5b8def", "#d9822b")
@@ -55,13 +54,20 @@ class FitResult:
         With these settings.
     target : ndarray of float64, shape (H, W, 3)
     residual : ndarray of float64, shape (H, W, 3)
-        The framebuffer less the target, in real units.
+        The framebuffer less the target, in real units. With a target of 8 bits the framebuffer is
+        clipped to 0..1, and saturated pixels of the target are not compared: they are 0.
+    plain : ndarray of float64, shape (H, W, 3)
+        The picture without bloom, compared like the framebuffer; black if the framebuffer is not
+        ``final``.
+    explained : float
+        The share of the difference between target and `plain` that the bloom explains: 1 less the
+        ratio of `loss` to the loss of `plain`. At most 1, and 0 or less if it explains nothing.
     verdict : {"good", "fair", "poor"}
-        Good: a relative loss of at most 0.02, a "log" of at most 0.05 decades, or a mean FLIP of at
-        most 0.02. Fair: 0.15, 0.2 and 0.1. The relative loss decides for the other losses.
+        Good: at least 0.95 are explained. Fair: 0.8. Poor: less, or no more than a change of each
+        pixel's colour explains, such as brightness or contrast.
     cause : str
-        What the likely cause is if the verdict is not good: a target that is clipped, encoded or
-        turned, or another method.
+        What the likely cause is if the verdict is not good: no bloom in the target; a target that
+        is clipped, encoded or turned; or another method.
 
     See Also
     --------
@@ -94,6 +100,8 @@ class FitResult:
     frames: Frames
     target: NDArray[np.float64]
     residual: NDArray[np.float64]
+    plain: NDArray[np.float64]
+    explained: float
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={_shown(getattr(self.settings, name))}" for name in self.vary)
@@ -102,21 +110,19 @@ class FitResult:
             f"{self.calls} calls; {self.verdict}>"
         )
 
-    @property
+    @cached_property
     def verdict(self) -> Literal["good", "fair", "poor"]:
         """Whether the search found the picture."""
-        good, fair = _LIMITS.get(self.loss_name, _LIMITS["relative"])
-        loss = self.loss
-        if self.loss_name not in _LIMITS:
-            loss = float(np.linalg.norm(self.residual)) / (
-                float(np.linalg.norm(self.target)) or 1e-300
-            )
-        return "good" if loss <= good else "fair" if loss <= fair else "poor"
+        if self.explained < _FAIR or not is_found(self.target, self.residual, self.plain):
+            return "poor"
+        return "good" if self.explained >= _GOOD else "fair"
 
     @cached_property
     def cause(self) -> str:
         """The likely cause of a verdict that is not good; empty if it is good."""
-        return "" if self.verdict == "good" else likely_cause(self)
+        if self.verdict == "good":
+            return ""
+        return likely_cause(self.target, self.residual, self.plain, self.settings.method, self.vary)
 
     @property
     def words(self) -> str:
@@ -161,39 +167,6 @@ class FitResult:
             f"{html.escape(repr(self.settings))}</code></div>",
         ]
         return "".join(parts)
-
-
-def likely_cause(found: FitResult) -> str:
-    """Return why a fit is not good."""
-    target, result = found.target, found.target + found.residual
-    for text, turned in (
-        ("upside down", result[::-1]),
-        ("mirrored", result[:, ::-1]),
-        ("in the order b, g, r", result[..., ::-1]),
-    ):
-        if np.linalg.norm(turned - target) < np.linalg.norm(found.residual) / 2:
-            return f"the target is {text}"
-    peak = float(target.max())
-    share = float((target >= peak).any(axis=2).mean())
-    if share >= _CLIPPED and result.max() > 1.05 * peak:
-        return (
-            f"the target is clipped at {peak:.4g} ({100 * share:.2g} % of its pixels); fit a "
-            "target of floats, or an image that is clipped alike"
-        )
-    lit = (target > 0.01 * peak) & (result > 0.01 * result.max()) & (target < peak)
-    if np.count_nonzero(lit) > 100:
-        x, y = np.log(result[lit]), np.log(target[lit])
-        exponent = float(np.cov(x, y)[0, 1] / max(np.var(x), 1e-12))
-        straight = float(np.corrcoef(x, y)[0, 1])
-        if straight > 0.9 and not 0.75 < exponent < 1.3:
-            return (
-                f"the target has another encoding: about the power of {exponent:.2g}; decode it to "
-                "linear light (vkbloom.read, --input-colour)"
-            )
-    return (
-        f"the method {found.settings.method} does not reach it with {', '.join(found.vary)}; vary "
-        "more fields, start from another preset, or raise max_calls"
-    )
 
 
 def radial_profiles(

@@ -27,7 +27,8 @@ _ENDLESS: Final = 100.0
 # Samples for each varied field. Least squares start from _STARTS points, one of them given.
 _SAMPLES: Final = 6
 _STARTS: Final = 5
-#: The search ends at ENOUGH, the loss of rounding to half floats. Below CLOSE it only polishes.
+#: The search ends at ENOUGH, the loss of rounding to half floats. Below CLOSE it only polishes, or
+#: below a share of the loss without bloom, where that is less.
 ENOUGH: Final = 2e-5
 CLOSE: Final = 5e-4
 # After a change of integers, choices or one number, numbers are optimized for the best _FOLLOWED.
@@ -47,6 +48,7 @@ class Search:
     - `max_calls`: How often it may be called.
     - `costs`: Passes that run after a change of each varied field alone.
     - `told`: Is called with the loss of each call.
+    - `close`: Below this loss the search only polishes.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Search:
         max_calls: int,
         costs: NDArray[np.int_],
         told: Callable[[float], None],
+        close: float = CLOSE,
     ) -> None:
         self._space = space
         self._measure = measure
@@ -65,6 +68,7 @@ class Search:
         self._left = max_calls
         self._costs = costs
         self._told = told
+        self._close = close
         self.best = space.origin
         self.loss = np.inf
         self.history: list[float] = []
@@ -114,11 +118,14 @@ class Search:
             before = self.loss
             self._walk()
             self._descend(self.best, STEPS[1])
-            if self.loss > CLOSE:
+            if self.loss > self._close:
                 # Where pixels cross a hard threshold one by one, the derivative is 0.
                 self._along_lines()
                 self._descend(self.best, STEPS[0])
-            if self.loss > CLOSE:
+                if self._measure.is_rounded:
+                    # Levels make a valley rough, and derivatives along it are lost in them.
+                    self._simplex(self.best, STEPS[0], 10)
+            if self.loss > self._close:
                 self._leap()
 
     def _values(self, point: Point) -> NDArray[np.float64]:
@@ -169,9 +176,9 @@ class Search:
         free = np.flatnonzero(self._space.is_number)
         if not free.size:
             return np.inf, point
-        optimize = import_extra("scipy.optimize", "fit", "Fitting")
         if not self._measure.is_sum:
-            return self._simplex(optimize, point, free, step, most)
+            return self._simplex(point, step, most)
+        optimize = import_extra("scipy.optimize", "fit", "Fitting")
         # Cheap fields first: the render for the next field also resets the field before it.
         order = free[np.argsort(self._costs[free], kind="stable")]
 
@@ -213,9 +220,10 @@ class Search:
         )
         return float(found.cost), at(found.x)
 
-    def _simplex(
-        self, optimize: Any, point: Point, free: NDArray[np.int_], step: float, most: int
-    ) -> tuple[float, Point]:
+    def _simplex(self, point: Point, step: float, most: int) -> tuple[float, Point]:
+        """Find the minimum of the loss itself near a point."""
+        optimize = import_extra("scipy.optimize", "fit", "Fitting")
+        free = np.flatnonzero(self._space.is_number)
         begun = point[free]
         simplex = np.repeat(begun[np.newaxis], len(free) + 1, axis=0)
         for index in range(len(free)):
@@ -271,7 +279,7 @@ class Search:
                 tried.append((self._loss(point), point))
             for _, point in sorted(tried, key=lambda one: one[0])[:_FOLLOWED]:
                 self._descend(point, STEPS[0], most=6)
-                if self.loss <= CLOSE:
+                if self.loss <= self._close:
                     return
 
     def _walk(self) -> None:

@@ -15,7 +15,7 @@ from vkbloom.fields import FieldInfo, fields_of
 from vkbloom.settings import Settings
 from vkbloom.suggestions import did_you_mean
 
-__all__ = ["Axis", "Bounds", "Point", "Space", "space_of"]
+__all__ = ["Axis", "Bounds", "Point", "Space", "space_of", "spaces_of", "spaces_of_all"]
 
 #: Coordinates, 0 to 1, one for each axis.
 Point = NDArray[np.float64]
@@ -116,6 +116,40 @@ class Space:
             for axis, place in zip(self.axes, point, strict=True)
         }
         return self.start.replace(**values)
+
+
+def spaces_of(
+    candidates: Sequence[Settings],
+    names: Sequence[str],
+    bounds: Bounds,
+    brightest: float,
+    height: int,
+) -> list[Space]:
+    """Return the space of each candidate, which has all of the varied fields."""
+    return [space_of(one, names, bounds, brightest, height) for one in candidates]
+
+
+def spaces_of_all(
+    candidates: Sequence[Settings],
+    names: Sequence[str],
+    bounds: Bounds,
+    brightest: float,
+    height: int,
+) -> list[Space]:
+    """Return the space of each candidate that has some of the varied fields."""
+    spaces, refused = [], None
+    for one in candidates:
+        axes: list[Axis] = []
+        for name in names:
+            try:
+                axes += space_of(one, [name], bounds, brightest, height).axes
+            except ValueError as error:
+                refused = error
+        if axes:
+            spaces.append(Space(start=one, axes=tuple(axes)))
+    if not spaces and refused is not None:
+        raise refused
+    return spaces
 
 
 def space_of(

@@ -53,7 +53,7 @@ def translate(
     settings: Settings | Maker,
     to: Settings | type[Settings],
     *,
-    size: tuple[int, int] = (1920, 1080),
+    size: tuple[int, int] = (640, 360),
     renderer: Renderer | None = None,
     vary: Sequence[str] | None = None,
     loss: Loss = "log",

@@ -7,11 +7,8 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
-import itertools
-import json
 import os
 import threading
-import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, cast
 
@@ -22,17 +19,17 @@ from vkbloom.core_access import core_of
 from vkbloom.device_arrays import DeviceArray, merged, take
 from vkbloom.fields import Record, fields_of
 from vkbloom.gradients.pulling import pull_each, pullback_of
-from vkbloom.psf.values import ArrayValue
+from vkbloom.psf.values import ARRAYS, ArrayValue
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference.derivatives import check_cotangents
-from vkbloom.renderer import Renderer
+from vkbloom.renderer import RENDERERS, Renderer
 from vkbloom.settings import Settings
 from vkbloom.sources import Inputs, checked_inputs
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
-__all__ = ["number_of", "replaced", "text_of"]
+__all__ = ["number_of", "refuse_capture", "replaced", "text_of"]
 
 
 @functools.lru_cache(64)
@@ -70,12 +67,7 @@ def _parts(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         # Dynamo computes with other numbers as unknown ones, but not with the text of one.
         return (float, type(value), float(value).hex())
-    return (str, _stored(value)) if isinstance(value, ArrayValue) else value
-
-
-@torch.compiler.assume_constant_result  # type: ignore[untyped-decorator]
-def _stored(value: ArrayValue) -> str:
-    return json.dumps(value.to_plain())
+    return (ArrayValue, value.name) if isinstance(value, ArrayValue) else value
 
 
 def _whole(parts: Any) -> Any:
@@ -87,8 +79,8 @@ def _whole(parts: Any) -> Any:
         return tuple(map(_whole, rest))
     if kind is float:
         return rest[0](float.fromhex(rest[1]))
-    if kind is str:
-        return json.loads(rest[0])
+    if kind is ArrayValue:
+        return ARRAYS[rest[0]]
     names = fields_of(rest[0])
     return rest[0](**dict(zip(names, map(_whole, rest[1:]), strict=True)))
 
@@ -115,12 +107,8 @@ def _field_value(value: Any) -> Any:
     return tuple(map(_field_value, value)) if isinstance(value, list) else value
 
 
-#: Renderers by the number that the operator takes, which no later one gets; `_OWN` is the one of
-#: this module.
-_RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
-_NUMBERS: Final[weakref.WeakKeyDictionary[Renderer, int]] = weakref.WeakKeyDictionary()
+#: The number that stands for this module's own renderer. Those of others begin at 1.
 _OWN: Final = 0
-_counter = itertools.count(_OWN + 1)
 _opening = threading.Lock()
 
 
@@ -151,22 +139,18 @@ def _renderer(number: int, image: Any = None) -> Renderer:
     if number == _OWN:
         with _opening:
             return _own_renderer() if image is None else _renderer_on(image.device.index)
-    renderer = _RENDERERS.get(number)
+    renderer = RENDERERS.get(number)
     if renderer is None:
         raise ValueError("renderer: it was collected; keep a reference to it until the last call")
     return renderer
 
 
-# (As `_constant`.)
-@torch.compiler.assume_constant_result  # type: ignore[untyped-decorator]
 def number_of(renderer: Renderer | None) -> int:
-    """Return the number of a renderer that the operator takes; None: of this module's own."""
-    if renderer is None:
-        return _OWN
-    with _opening:
-        number = _NUMBERS.setdefault(renderer, next(_counter))
-        _RENDERERS[number] = renderer
-    return number
+    """Return the number of a renderer that the operator takes; None: of this module's own.
+
+    (Dynamo reads and guards an attribute in each version of PyTorch.)
+    """
+    return _OWN if renderer is None else renderer._number
 
 
 def _each(  # noqa: PLR0917
@@ -241,11 +225,11 @@ def _operator(name: str, parameters: str, result: str) -> Any:
 
 #: What `torch.compile` must not put into a graph of CUDA. (PyTorch has the tag since 2.8.)
 _TAGS: Final[dict[str, Any]] = (
-    {"tags": torch.Tag.cudagraph_unsafe} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
+    {"tags": (torch.Tag.cudagraph_unsafe,)} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
 )
 
 
-def _refuse_capture(image: Any) -> None:
+def refuse_capture(image: Any) -> None:
     """Raise RuntimeError in a capture, whose graph would leave out what Vulkan does."""
     if image.is_cuda and torch.cuda.is_current_stream_capturing():
         raise RuntimeError(
@@ -264,7 +248,7 @@ def _bloom(  # noqa: PLR0917
     settings: str,
     renderer: int,
 ) -> Any:
-    _refuse_capture(image)
+    refuse_capture(image)
     if image.is_cuda and image.dtype != torch.float64:
         return _on_device(image, mask, emission, values, names, settings, renderer)
     final = np.empty(image.shape, _dtype(image))
@@ -338,7 +322,7 @@ def _backward(  # noqa: PLR0917
 
     Of a batch, the derivatives by values are added.
     """
-    _refuse_capture(image)
+    refuse_capture(image)
     inputs = {"image": image, "mask": mask, "emission": emission}
     images = {name: part for name, part in inputs.items() if part is not None}
     fields = dict(zip(_split(names), values, strict=True))
@@ -396,7 +380,7 @@ def _(  # noqa: PLR0917
 def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
     image, mask, emission, values, *ctx.texts = inputs
     # Held until the backward pass, also if the caller lets it go before.
-    ctx.renderer = _RENDERERS.get(ctx.texts[-1])
+    ctx.renderer = RENDERERS.get(ctx.texts[-1])
     ctx.given = [part is not None for part in (image, mask, emission)]
     ctx.save_for_backward(*(part for part in (image, mask, emission) if part is not None), *values)
 

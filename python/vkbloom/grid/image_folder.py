@@ -20,6 +20,7 @@ from vkbloom.grid.parts import WHOLE, Part
 from vkbloom.grid.running import Writer
 from vkbloom.grid.sources import ImageSource
 from vkbloom.io import image_writing, safe_writing
+from vkbloom.io.files import settings_facts
 from vkbloom.io.images import Picture, SavedColour, check_name
 
 __all__ = ["FileForm", "GridFiles"]
@@ -29,11 +30,15 @@ _INDEX: Final = "grid.json"
 
 @dataclass(frozen=True)
 class FileForm:
-    """Encoding and number type of an image's `final` files, as in `vkbloom.io.images.Picture`."""
+    """Encoding and number type of an image's `final` files, as in `vkbloom.io.images.Picture`.
+
+    `expand`: What the image's highlights were expanded up to.
+    """
 
     encoding: SavedColour | None
     numbers: str
     grey: bool
+    expand: float | None = None
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class _FileWriter:
                 encoding=form.encoding if encoded == "none" else encoded,
                 grey=form.grey,
             )
-            facts = {"vkbloom:settings": json.dumps(point.settings.to_dict())}
+            facts = settings_facts(point.settings, form.expand)
             image_writing.save(picture, path, None, facts)
             return
         info = {"adapter": self.layout.adapter, "driver": self.layout.driver}

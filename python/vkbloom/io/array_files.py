@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom.argument_types import checked
-from vkbloom.checks import check_index, import_extra
+from vkbloom.checks import check_index, import_extra, native_order
 from vkbloom.io import displayed, image_reading, safe_writing
+from vkbloom.io.alpha import divided, hidden_notes, multiplied
 from vkbloom.io.displayed import Saved, check_saved
 from vkbloom.io.expansion import check_expansion
-from vkbloom.io.image_writing import as_numbers, check_quality, described_as, put
+from vkbloom.io.image_writing import BITS, as_numbers, check_quality, described_as, put
 from vkbloom.io.images import PIXEL_TYPES, Picture, check_name, is_exr
 
-__all__ = ["divided", "has_straight", "multiplied", "premultiplied", "read", "write"]
+__all__ = ["has_straight", "premultiplied", "read", "write"]
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
@@ -28,9 +29,7 @@ _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
 # The file's number types for floats, in order of preference, by the requested bits.
 _FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
     None: ("half", "float", "uint8"),
-    8: ("uint8",),
-    16: ("uint16", "half"),
-    32: ("float",),
+    **BITS,
 }
 # Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
@@ -148,10 +147,11 @@ def read(
         raise ValueError(f"{os.fspath(path)}: {error}") from error
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
-    if has_alpha and stored.associated is not premultiplied:
+    if has_alpha and picture.stored.associated is not premultiplied:
         pixels = multiplied(pixels) if premultiplied else divided(pixels)
     if not metadata:
         return pixels
+    hidden = 0.0 if premultiplied else picture.hidden
     facts: dict[str, Any] = {
         name: _plain(value) for name, (_, value) in picture.stored.attributes.items()
     }
@@ -160,7 +160,7 @@ def read(
         colour=picture.colour,
         alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
         parts=stored.parts,
-        notes=picture.notes,
+        notes=(*picture.notes, *hidden_notes(hidden, picture.visible)),
     )
     return pixels, facts
 
@@ -206,8 +206,9 @@ def write(
         another name. An existing file is replaced when the new one is complete.
     array : ndarray, shape (H, W), (H, W, 1), (H, W, 2), (H, W, 3) or (H, W, 4)
         Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written unchanged. Floats are
-        linear light: encoded and clipped to 0..1 in files of integers (PNG, JPEG, ...), unchanged
-        in files of floats (OpenEXR, Radiance HDR, TIFF).
+        linear light: encoded in files of integers (PNG, JPEG, ...), unchanged in files of floats
+        (OpenEXR, Radiance HDR, TIFF). Files of integers end at 1: colours with a component above 1
+        are divided by their largest component, which keeps their hue; negative ones become 0.
     encoding : {"srgb", "gamma22", "linear", "pq", "hlg", "none"}, optional
         The curve of the file's colours, for floats. Default: "srgb" for files of integers and
         "linear" for files of floats. "pq" and "hlg" are those of Rec. ITU-R BT.2100, with 203
@@ -246,7 +247,7 @@ def write(
         The array's dtype is not uint8, uint16 or a float.
     ValueError
         The array's shape or an argument is not one of the above; or the format cannot store the
-        array: JPEG and Radiance HDR have no alpha, OpenEXR has no integers.
+        array: JPEG, GIF and Radiance HDR have no alpha, OpenEXR has no integers.
     OSError
         The file cannot be written. The error names it, and no partial file is left.
     ModuleNotFoundError
@@ -286,7 +287,7 @@ def write(
         picture = Picture.of_values(values, numbers, None, _typed(oiio, metadata or {}))
         if is_float:
             curve = encoding or ("srgb" if is_integer else "linear")
-            values, what = displayed.converted(oiio, values, saved, curve)
+            values, what = displayed.converted(oiio, values, saved, curve, is_integer=is_integer)
             picture = described_as(oiio, picture, target, what)
         put(
             oiio,
@@ -315,8 +316,7 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
         raise ValueError(
             f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
         )
-    kept = np.float32 if values.dtype.name == "float64" else values.dtype.newbyteorder("=")
-    return values.astype(kept, copy=False)
+    return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
 
 
 def _numbers(
@@ -330,7 +330,7 @@ def _numbers(
     channels = values.shape[2]
     writer = oiio.ImageOutput.create(str(temporary))
     kind = writer.format_name()
-    if channels in (2, 4) and not writer.supports("alpha"):
+    if channels in (2, 4) and not safe_writing.has_alpha(writer):
         raise ValueError(f"{target}: {kind} has no alpha; write array[..., :{channels - 1}]")
     for numbers in wanted:
         if safe_writing.holds(oiio, temporary, channels, numbers):
@@ -357,30 +357,7 @@ def premultiplied(picture: Picture) -> Picture:
     """Return a picture whose colours are multiplied by alpha, if there is one."""
     if not has_straight(picture):
         return picture
-    return replace(picture, pixels=multiplied(picture.pixels))
-
-
-def multiplied(values: NDArray[Any]) -> NDArray[Any]:
-    """Return colours multiplied by alpha, in the same dtype."""
-    return _with_alpha(values, values[:, :, -1:])
-
-
-def divided(values: NDArray[Any]) -> NDArray[Any]:
-    """Return colours divided by alpha, in the same dtype; unchanged where alpha is 0."""
-    alpha = values[:, :, -1:].astype(np.float32)
-    one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
-    return _with_alpha(values, np.where(alpha == 0, one, one * one / np.where(alpha, alpha, one)))
-
-
-def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
-    """Return values with colours times a factor; for integers, times factor / largest value."""
-    made = values.astype(np.float32)
-    made[:, :, :-1] *= factor
-    if values.dtype.kind == "u":
-        largest = np.iinfo(values.dtype).max
-        made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
-    with np.errstate(over="ignore"):
-        return made.astype(values.dtype)
+    return replace(picture, pixels=multiplied(picture.pixels), hidden=0.0)
 
 
 def _plain(value: Any) -> Any:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from vkbloom.checks import import_extra
 from vkbloom.io.displayed import from_primaries, of_code_points
 from vkbloom.io.hdr_curves import DECODERS
-from vkbloom.io.icc import Profile, read_profile
+from vkbloom.io.icc import Profile, from_lab, read_profile
 from vkbloom.io.images import SPACES, Colour, StoredImage
 from vkbloom.io.srgb import decode_srgb
 
-__all__ = ["check_space", "linear"]
+__all__ = ["LAB", "check_space", "linear"]
 
 _CONFIGURATION: Final = "ocio://default"
 _LINEAR: Final = SPACES["linear"]
@@ -28,6 +28,10 @@ _LINEAR: Final = SPACES["linear"]
 _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
 # Spaces with the curves of code points.
 _CURVES: Final[Mapping[str, str]] = {"gamma22": SPACES["gamma22"]}
+#: Spaces of TIFF, whose numbers are not those of red, green and blue.
+LAB: Final = ("CIELAB", "ICCLAB")
+# OpenImageIO's name of the space of every PNM file.
+_OF_PNM: Final = "Rec709"
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
 # Red, green, blue, white.
@@ -54,30 +58,53 @@ def linear(
     - `stored`: What the file says of its colours.
     - `colour`: The colour space, whatever the file says.
     """
+    if stored.space in LAB:
+        made = _scaled(values)
+        made[:, :, :3] = from_lab(values[:, :, :3], stored.space)
+        return stored.space, made, []
     if colour is not None:
         if colour not in ("linear", "srgb"):
             check_space(colour)
         return colour, _decoded(values, colour), []
+    if stored.is_ultra_hdr:
+        return _of_ultra_hdr(values, stored)
     if values.dtype.kind == "f":
         return "linear", values, _notes_of_floats(stored)
-    notes = []
     if stored.profile is not None and stored.code_points is None:
-        said = f"its ICC profile {stored.profile_name!r}"
-        try:
-            profile = read_profile(stored.profile)
-        except ValueError:
-            notes = [f"{said} is not one of RGB by a matrix and curves"]
-        else:
-            if _is_srgb(profile):
-                return "srgb", _decoded(values, "srgb"), []
-            made = _scaled(values)
-            made[:, :, :3] = profile.decode(values[:, :, :3])
-            name = stored.profile_name or "ICC profile"
-            return name, made, [f"converted to linear Rec. 709 by {said}"]
-    space, made, said_of_space = _by_space(values, stored)
-    if notes:
-        return space, made, [f"{notes[0]}; taken as {space}"]
-    return space, made, said_of_space
+        return _by_profile(values, stored, stored.profile)
+    return _by_space(values, stored)
+
+
+def _by_profile(
+    values: NDArray[Any], stored: StoredImage, content: bytes
+) -> tuple[str, NDArray[Any], list[str]]:
+    """As `linear`, of an image of integers with a profile."""
+    said = f"its ICC profile {stored.profile_name!r}"
+    try:
+        profile = read_profile(content)
+    except ValueError:
+        space, made, _ = _by_space(values, stored)
+        return space, made, [f"{said} is not one of RGB by a matrix and curves; taken as {space}"]
+    if _is_srgb(profile):
+        return "srgb", _decoded(values, "srgb"), []
+    made = _scaled(values)
+    made[:, :, :3] = profile.decode(values[:, :, :3])
+    name = stored.profile_name or "ICC profile"
+    return name, made, [f"converted to linear Rec. 709 by {said}"]
+
+
+def _of_ultra_hdr(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
+    """As `linear`, of linear floats with the primaries of a file's profile."""
+    try:
+        profile = read_profile(stored.profile or b"")
+    except ValueError:
+        return "linear", values, []
+    if _is_srgb(profile):
+        return "linear", values, []
+    made = values.astype(np.float32)
+    made[:, :, :3] = made[:, :, :3] @ profile.matrix.T.astype(np.float32)
+    said = "converted to linear Rec. 709 from the primaries of its ICC profile "
+    return "linear", made.astype(values.dtype), [f"{said}{stored.profile_name!r}"]
 
 
 def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
@@ -91,7 +118,9 @@ def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[A
         space = stored.space if is_known else f"gamma {stored.gamma:.4g}"
         made = _decoded(values, space, stored.gamma)
         return space, made, [f"the file says {space} of its colours; converted to linear Rec. 709"]
-    space = {name: plain for plain, name in SPACES.items()}.get(stored.space, stored.space)
+    # PNM's standard has the curve of BT.709. Programs write sRGB.
+    stated = "" if stored.space == _OF_PNM else stored.space
+    space = {name: plain for plain, name in SPACES.items()}.get(stated, stated)
     if space in ("", "srgb", "linear"):
         return space or "srgb", _decoded(values, space or "srgb"), []
     said = f"the file says {stored.space} of its colours"
@@ -106,7 +135,8 @@ def _by_code_points(
     values: NDArray[Any], stored: StoredImage, primaries: str, curve: str
 ) -> tuple[str, NDArray[Any], list[str]]:
     """As `linear`. OpenImageIO takes several of these spaces as sRGB."""
-    made = _decoded(values, _CURVES.get(curve, curve))
+    is_narrow = stored.code_points is not None and stored.code_points[3] == 0
+    made = _decoded(values, _CURVES.get(curve, curve), is_narrow=is_narrow)
     if primaries == "rec709" and curve in ("srgb", "linear"):
         return curve, made, []
     is_named = stored.space not in ("", SPACES["srgb"])
@@ -131,7 +161,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
     notes: list[str] = []
     if stored.space == SPACES["srgb"]:
         notes.append("the file says srgb of its colours, which as floats are taken as linear")
-    elif stored.space not in ("", SPACES["linear"]):
+    elif stored.space not in ("", _OF_PNM, SPACES["linear"]):
         notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
     _, primaries = stored.attributes.get("chromaticities", (None, None))
     if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):
@@ -143,10 +173,13 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
     return notes
 
 
-def _decoded(values: NDArray[Any], space: str, exponent: float | None = None) -> NDArray[Any]:
+def _decoded(
+    values: NDArray[Any], space: str, exponent: float | None = None, *, is_narrow: bool = False
+) -> NDArray[Any]:
     """Return linear floats from colours of a space; alpha is only scaled.
 
-    `exponent` replaces that of the space.
+    - `exponent`: Replaces that of the space.
+    - `is_narrow`: Black is 16 and white is 235 of 8 bits, as in Rec. ITU-R BT.709; for integers.
     """
     exponent = exponent or _EXPONENTS.get(space)
     if values.dtype.kind == "f":
@@ -157,10 +190,14 @@ def _decoded(values: NDArray[Any], space: str, exponent: float | None = None) ->
             made[:, :, :3] = _to_light(made[:, :, :3], space, exponent)
             return made.astype(values.dtype)
     made = _scaled(values)
-    if space in ("srgb", *DECODERS) or exponent is not None:
+    if space in ("srgb", *DECODERS) or exponent is not None or is_narrow:
         # A table with one entry per integer value, computed in float64.
         scale = np.iinfo(values.dtype).max
-        table = _to_light(np.arange(scale + 1) / scale, space, exponent).astype(np.float32)
+        levels = np.arange(scale + 1) / scale
+        if is_narrow:
+            step = (scale + 1) >> 8
+            levels = np.clip((levels * scale - 16 * step) / (219 * step), 0, 1)
+        table = _to_light(levels, space, exponent).astype(np.float32)
         made[:, :, :3] = table[values[:, :, :3]]
     elif space != "linear":
         made[:, :, :3] = _to_light(made[:, :, :3], space, None)
@@ -176,6 +213,8 @@ def _scaled(values: NDArray[Any]) -> NDArray[np.float32]:
 
 def _to_light(colours: NDArray[Any], space: str, exponent: float | None) -> NDArray[Any]:
     """Return linear colours from floats of a space."""
+    if space == "linear":
+        return colours
     if space == "srgb":
         return decode_srgb(colours)
     if space in DECODERS:

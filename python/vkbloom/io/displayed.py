@@ -29,6 +29,7 @@ __all__ = [
     "has_hdr_curve",
     "is_hdr",
     "of_code_points",
+    "scaled_to_1",
     "with_names",
 ]
 
@@ -49,8 +50,15 @@ _PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
 _CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
 #: Curves for displays of HDR.
 HDR_CURVES: Final = ("pq", "hlg")
+# Of files, in addition: the curve of Rec. ITU-R BT.709, which BT.601 and BT.2020 have, too.
+_READ_CURVES: Final = {
+    **{point: curve for curve, point in _CURVE_POINTS.items() if curve != "none"},
+    **dict.fromkeys((1, 6, 14, 15), "rec709"),
+}
 # Curves that readers know or assume without code points.
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
+# Curves whose values end at 1 in files of integers.
+_ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
 _CHROMATICITIES: Final = {
     "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
@@ -110,11 +118,12 @@ def is_hdr(saved: Saved) -> bool:
 
 
 def converted(
-    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str
+    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
 ) -> tuple[NDArray[Any], tuple[str, str] | str]:
     """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
 
     - `curve`: That of `saved`, or the file's own.
+    - `is_integer`: Whether the file ends at 1, so that colours above it are `scaled_to_1`.
     - Returns: The values, and their primaries and curve or their display. With the curve "none"
       values do not change.
     """
@@ -126,7 +135,26 @@ def converted(
         return _with_colours(values, made), display
     if curve != "none" and saved.primaries != "rec709":
         values = _between(oiio, values, "rec709", saved.primaries).astype(values.dtype)
+    if is_integer and curve in _ENDING_AT_1:
+        values = scaled_to_1(values)
     return encoded(values, curve), (saved.primaries, curve)
+
+
+def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
+    """Return linear floats (H, W, C), colours with a component above 1 divided by the largest one.
+
+    A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
+    problem", IEEE Transactions on Image Processing 12(12), 2003. A clip of each component makes
+    bright orange yellow, and cream white.
+    """
+    count = values.shape[2] - (values.shape[2] in (2, 4))
+    peak = values[:, :, :count].max(axis=2, keepdims=True)
+    is_over = np.isfinite(peak) & (peak > 1)
+    if not is_over.any():
+        return values
+    made = values.copy()
+    made[:, :, :count] /= np.where(is_over, peak, values.dtype.type(1))
+    return made
 
 
 def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:
@@ -183,7 +211,11 @@ def with_names(
         known = ", ".join(_DISPLAYS)
         raise ValueError(f"view: files cannot name the colours of {name}; take one of {known}")
     if writer.supports("cicp"):
-        return False, {**kept, "CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        named: dict[str, tuple[Any, Any]] = {"CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        if points != _DISPLAYS["sRGB - Display"]:
+            # Without a space, OpenImageIO adds chunks of sRGB. It has no name for some spaces.
+            named["oiio:ColorSpace"] = (oiio.TypeDesc("string"), "unknown")
+        return False, {**kept, **named}
     if points == _DISPLAYS["sRGB - Display"]:
         return False, kept
     cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
@@ -193,8 +225,8 @@ def with_names(
 def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
     """Return primaries and curve of a file's code points; None: one of them is not known."""
     primaries = [name for name, point in _PRIMARY_POINTS.items() if point == points[0]]
-    curves = [name for name, point in _CURVE_POINTS.items() if point == points[1] != 2]
-    return (primaries[0], curves[0]) if primaries and curves else None
+    curve = _READ_CURVES.get(points[1])
+    return (primaries[0], curve) if primaries and curve else None
 
 
 @functools.cache

@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import import_extra
+from vkbloom.checks import import_extra, native_order
 from vkbloom.framebuffers import Framebuffers, leading
 from vkbloom.io import image_reading, safe_writing
 from vkbloom.io.displayed import HDR_CURVES, with_names
 from vkbloom.io.images import PIXEL_TYPES, check_name, complete, is_exr
 from vkbloom.settings import Settings
+from vkbloom.version import installed_version
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["load", "save"]
+__all__ = ["facts_of", "load", "save", "settings_facts"]
 
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
@@ -64,7 +65,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             if not is_exr(file):
                 if _write_image(oiio, frames, names[0], *files[-1]):
                     continue
-                files.pop()[0].unlink()
+                safe_writing.remove(files.pop()[0])
                 beside = file.with_suffix(".exr")
                 files.append((safe_writing.reserve(beside, size), beside))
             _write_exr(oiio, frames, names, *files[-1])
@@ -72,7 +73,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             safe_writing.put_in_place(temporary, file)
     finally:
         for temporary, _ in files:
-            temporary.unlink(missing_ok=True)
+            safe_writing.remove(temporary)
     return [file for _, file in files]
 
 
@@ -133,14 +134,36 @@ def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
         reader.seek_subimage(index, 0)
         spec = reader.spec()
         image_reading.check_plausible(spec, file)
-        said = {
-            attribute.name.removeprefix("vkbloom:"): str(attribute.value)
-            for attribute in spec.extra_attribs
-            if attribute.name.startswith("vkbloom:")
-        } or _described(spec.get_string_attribute("ImageDescription"))
+        said = _facts(spec)
         pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
         pixels = complete(pixels, reader, file)
     return pixels.reshape(spec.height, spec.width, spec.nchannels), said
+
+
+def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
+    """Return what vkbloom wrote into an image file: "settings" and others, as text."""
+    with image_reading.opened(path, "Reading settings") as reader:
+        return _facts(reader.spec())
+
+
+def settings_facts(settings: Settings, expand: float | None) -> dict[str, str]:
+    """Return what an image file holds of the settings that made it, for `facts_of`.
+
+    `expand`: What the highlights of the source were expanded up to.
+    """
+    facts = {
+        "Software": f"vkbloom {installed_version()}",
+        "vkbloom:settings": json.dumps(settings.to_dict()),
+    }
+    return facts if expand is None else {**facts, "vkbloom:expand": f"{expand:g}"}
+
+
+def _facts(spec: OpenImageIO.ImageSpec) -> dict[str, str]:
+    return {
+        attribute.name.removeprefix("vkbloom:"): str(attribute.value)
+        for attribute in spec.extra_attribs
+        if attribute.name.startswith("vkbloom:")
+    } or _described(spec.get_string_attribute("ImageDescription"))
 
 
 def _described(text: str) -> dict[str, str]:
@@ -187,7 +210,7 @@ def _write_image(
     """Write one framebuffer to a file of any format; False if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(str(temporary))
-    if pixels.shape[2] == 4 and not writer.supports("alpha"):
+    if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
         opaque = 255 if pixels.dtype == np.uint8 else 1.0
         if not (pixels[:, :, 3] == opaque).all():
             return False
@@ -204,7 +227,7 @@ def _write_image(
             spec.attribute(attribute, kind, value)
     if not (
         writer.open(str(temporary), spec)
-        and writer.write_image(np.ascontiguousarray(pixels))
+        and writer.write_image(np.ascontiguousarray(native_order(pixels)))
         and writer.close()
     ):
         raise safe_writing.write_error(writer, temporary, file)
@@ -237,7 +260,7 @@ def _write_exr(
     for index, (pixels, spec) in enumerate(zip(parts, specs, strict=True)):
         if index and not writer.open(str(temporary), spec, "AppendSubimage"):
             raise safe_writing.write_error(writer, temporary, file)
-        if not writer.write_image(np.ascontiguousarray(pixels)):
+        if not writer.write_image(np.ascontiguousarray(native_order(pixels))):
             raise safe_writing.write_error(writer, temporary, file)
     if not writer.close():
         raise safe_writing.write_error(writer, temporary, file)

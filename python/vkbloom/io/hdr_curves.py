@@ -1,4 +1,4 @@
-"""The curves of Rec. ITU-R BT.2100-3 in files: PQ, where 1 is 203 cd/m2, and HLG."""
+"""The curves of Rec. ITU-R BT.2100-3 in files: PQ, where 1 is 203 cd/m2, and HLG; and of BT.709."""
 
 from __future__ import annotations
 
@@ -49,7 +49,17 @@ def _from_hlg(signal: NDArray[Any]) -> NDArray[np.float64]:
     return np.where(values <= 0.5, values**2 / 3, bright) / _SCENE
 
 
+def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:
+    """Rec. ITU-R BT.709-6, item 1.2."""
+    values = signal.astype(float)
+    return np.where(values < 0.081, values / 4.5, ((values + 0.099) / 1.099) ** (1 / 0.45))
+
+
 #: From linear colours to the signal, 0..1.
 ENCODERS: Final[Mapping[str, Curve]] = {"pq": _pq, "hlg": _hlg}
 #: From a signal of 0..1 to linear colours.
-DECODERS: Final[Mapping[str, Curve]] = {"pq": _from_pq, "hlg": _from_hlg}
+DECODERS: Final[Mapping[str, Curve]] = {
+    "pq": _from_pq,
+    "hlg": _from_hlg,
+    "rec709": _from_rec709,
+}

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Profile", "read_profile"]
+__all__ = ["Profile", "from_lab", "read_profile"]
 
 #: A curve for values of 0..1.
 Curve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -69,11 +69,39 @@ def read_profile(content: bytes) -> Profile:
         columns = [_xyz(tags[f"{colour}XYZ".encode()]) for colour in _COLOURS]
     except (KeyError, struct.error, ZeroDivisionError) as error:
         raise ValueError("the profile is damaged or has no matrix and curves") from error
+    red, green, blue = curves
+    return Profile((red, green, blue), _from_d50() @ np.stack(columns, axis=1))
+
+
+def _from_d50() -> NDArray[np.float64]:
+    """Return the matrix from XYZ of profiles to linear Rec. 709."""
     white = _REC_709.sum(axis=1)
     adapt = np.diag((_BRADFORD @ white) / (_BRADFORD @ _D50)) @ _BRADFORD
-    to_rec_709 = np.linalg.inv(_REC_709) @ np.linalg.inv(_BRADFORD) @ adapt
-    red, green, blue = curves
-    return Profile((red, green, blue), to_rec_709 @ np.stack(columns, axis=1))
+    made: NDArray[np.float64] = np.linalg.inv(_REC_709) @ np.linalg.inv(_BRADFORD) @ adapt
+    return made
+
+
+def from_lab(values: NDArray[np.unsignedinteger], space: str) -> NDArray[np.float32]:
+    """Return linear Rec. 709, not clipped, from a TIFF file's L*, a* and b* of D50, (H, W, 3).
+
+    `space`: "CIELAB", whose a* and b* are signed (TIFF 6.0, section 23), or "ICCLAB", where they
+    have an offset (TIFF technical note 4).
+    """
+    bits = 8 * values.dtype.itemsize
+    numbers = values.astype(np.float64)
+    light, ab = numbers[:, :, :1], numbers[:, :, 1:] / (1 << (bits - 8))
+    if space == "CIELAB":
+        light = light / ((1 << bits) - 1)
+        ab = np.where(ab < 128, ab, ab - 256)
+    else:
+        light = light / (255 << (bits - 8))
+        ab = ab - 128
+    y = (100 * light[:, :, 0] + 16) / 116
+    roots = np.stack([y + ab[:, :, 0] / 500, y, y - ab[:, :, 1] / 200], -1)
+    # CIE 15:2018, 8.2.1.1.
+    xyz = np.where(roots > 6 / 29, roots**3, (roots - 4 / 29) * 3 * (6 / 29) ** 2) * _D50
+    made: NDArray[np.float32] = (xyz @ _from_d50().T).astype(np.float32)
+    return made
 
 
 def _tags(content: bytes) -> dict[bytes, bytes]:

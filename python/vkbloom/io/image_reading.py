@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
-from vkbloom.io.colour import linear
-from vkbloom.io.displayed import has_hdr_curve
+from vkbloom.io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
+from vkbloom.io.colour import LAB, linear
+from vkbloom.io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
+from vkbloom.io.displayed import has_hdr_curve, of_code_points
 from vkbloom.io.expansion import expanded
 from vkbloom.io.images import (
     DTYPES,
@@ -25,6 +28,7 @@ from vkbloom.io.images import (
     complete,
     failure_of,
     is_kept,
+    warnings_of,
 )
 from vkbloom.io.png_gamma import png_gamma
 
@@ -37,10 +41,12 @@ __all__ = [
     "decode",
     "decode_file",
     "describe",
+    "is_photograph",
     "listed_parts",
     "load",
     "of_layer",
     "opened",
+    "points_of",
     "readable_extensions",
     "size_of",
     "specials_note",
@@ -53,6 +59,10 @@ _LARGEST_AREA: Final = 1 << 28
 # PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
 _LARGEST_RATIO: Final = 4096
+# OpenImageIO's names of channels of which a file does not say what they are.
+_UNNAMED: Final = re.compile(r"channel\d+\Z|\Z")
+# The code point of an unspecified curve.
+_UNSPECIFIED: Final = 2
 # The most parts that are listed. Some files have thousands, and each takes time.
 _MOST_PARTS: Final = 100
 
@@ -73,15 +83,28 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    reader = oiio.ImageInput.open(name, plain)
+    with padded(name) as file:
+        reader = oiio.ImageInput.open(file, plain)
+    reason = failure_of(oiio) if reader is None else ""
+    if _is_lab(reader, reason):
+        # libtiff converts to 8 bits without adapting the white of D50, or does not convert.
+        plain.attribute("oiio:RawColor", 1)
+        reader = oiio.ImageInput.open(name, plain)
     if reader is None:
-        reason = failure_of(oiio) or "unknown format"
+        reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
         raise ValueError(f"{name}: is not a readable image: {reason}")
     try:
         yield reader
     finally:
         failure_of(reader)
         reader.close()
+
+
+def _is_lab(reader: OpenImageIO.ImageInput | None, reason: str) -> bool:
+    """Whether a file has L*, a* and b*, or may have; `reason`: why it cannot be opened."""
+    if reader is None:
+        return "PhotometricInterpretation" in reason
+    return reader.spec().get_string_attribute("tiff:ColorSpace") in LAB
 
 
 def readable_extensions() -> set[str]:
@@ -120,19 +143,25 @@ def _read(
     width, height = _covered(spec)
     dtype = DTYPES[stored_as]
     wanted = stored_as if stored_as != "double" else "float"
-    data = complete(reader.read_image(subimage, 0, 0, spec.nchannels, wanted), reader, name)
-    pixels = np.asarray(data, dtype).reshape(spec.height, spec.width, spec.nchannels)
+    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
+    notes = warnings_of(reader, name)
+    pixels = np.asarray(complete(data, reader, name), dtype).reshape(
+        spec.height, spec.width, spec.nchannels
+    )
+    pixels = in_order(pixels, reader.format_name(), name)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    described = of_layer(replace(describe(reader, name), pixels=pixels), spec, layer)
+    described = describe(reader, name)
+    described = replace(described, pixels=pixels, notes=(*described.notes, *notes))
+    described = of_layer(described, spec, layer)
     pixels = described.pixels
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
-        pixels = _upright(pixels[y : y + display[3], x : x + display[2]], orientation)
+        pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
         left, top = 0, 0
         display = (0, 0, pixels.shape[1], pixels.shape[0])
     return replace(
@@ -149,12 +178,19 @@ def chosen_part(
     """Make the part to read the current one, and return its number and what it is."""
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
-    if subimage < 0 or not reader.seek_subimage(subimage, 0):
+    if subimage < 0 or not _seek(reader, subimage):
         count = 0
-        while reader.seek_subimage(count, 0):
+        while _seek(reader, count):
             count += 1
         raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
+    if spec.width < 1 or spec.height < 1:
+        more = f"; subimage {subimage + 1} is another" if _seek(reader, subimage + 1) else ""
+        raise ValueError(f"{name}: there are no pixels in this part of the file{more}")
+    spec.attribute(
+        "Orientation",
+        orientation_of(name, reader.format_name(), spec.getattribute("Orientation")),
+    )
     if spec.deep or spec.depth > 1:
         raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
     if str(spec.format) not in DTYPES:
@@ -201,33 +237,80 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
 
 def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
     """Return the description of a file's current part; this may change the current part."""
+    notes = warnings_of(reader, name)
     spec = reader.spec()
     space, gamma = _stated_curve(reader, spec, name)
+    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
+    points, known = spec.getattribute("CICP"), points_of(spec)
+    if points is not None and known is None and points[1] != _UNSPECIFIED:
+        listed = " ".join(map(str, points))
+        notes.append(f"the code points {listed} of its colours are not known, and are ignored")
     # Before the reader goes to other parts.
     found = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
-        channels=tuple(spec.channelnames),
+        channels=tuple(
+            "" if channel == "A" and meaning is Meaning.NONE else channel
+            for channel in channels_of(spec, kind)
+        ),
         numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
         origin=(spec.x, spec.y),
         display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
-        associated=spec.alpha_channel >= 0 and not spec.get_int_attribute("oiio:UnassociatedAlpha"),
+        associated=meaning is Meaning.MULTIPLIED,
         space=space,
         gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
-            for attribute in spec.extra_attribs
+            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
-        code_points=points_of(spec),
+        code_points=known,
+        is_ultra_hdr=_is_ultra_hdr(reader, spec),
+        notes=tuple(notes),
     )
     return replace(found, parts=tuple(_parts(reader)))
 
 
+def _late_attributes(kind: str, name: str) -> Iterator[Any]:
+    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
+    if kind != "png" or (exif := late_exif(name)) is None:
+        return
+    with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        file.write(exif)
+        file.flush()
+        # Damaged metadata do not matter to the pixels.
+        with suppress(ValueError), opened(file.name, "Reading images") as reader:
+            yield from reader.spec().extra_attribs
+
+
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
-    """Return the code points of a file's colours, if it has them."""
+    """Return the code points of a file's colours, if it has them and they are known."""
     points = spec.getattribute("CICP")
-    return None if points is None else tuple(points)
+    if points is not None and spec.nchannels < 3:
+        # Grey has no primaries.
+        points = (1, *points[1:])
+    return None if points is None or of_code_points(points) is None else tuple(points)
+
+
+def _is_ultra_hdr(reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec) -> bool:
+    """Whether OpenImageIO applies the gain map of a JPEG file."""
+    return reader.format_name() == "jpeg" and str(spec.format) == "half"
+
+
+def is_photograph(reader: OpenImageIO.ImageInput) -> bool:
+    """Whether a file holds integers for SDR, if only in its base image."""
+    spec = reader.spec()
+    is_integer = str(spec.format) in ("uint8", "uint16") and not has_hdr_curve(points_of(spec))
+    return is_integer or _is_ultra_hdr(reader, spec)
+
+
+def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
+    """Make a part the current one, if there is such a part."""
+    is_there: bool = reader.seek_subimage(subimage, 0)
+    if not is_there:
+        # Some readers leave an error, which would be taken for damaged pixels.
+        failure_of(reader)
+    return is_there
 
 
 def _stated_curve(
@@ -253,7 +336,7 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
     """Return the first part, from `subimage` on, that has a layer."""
     found: dict[str, None] = {}
     for index in range(max(subimage, 0), subimage + _MOST_PARTS):
-        if not reader.seek_subimage(index, 0):
+        if not _seek(reader, index):
             break
         layers = _layers(reader.spec())
         if layer in layers:
@@ -265,7 +348,7 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
 
 def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
     for index in range(_MOST_PARTS):
-        if not reader.seek_subimage(index, 0):
+        if not _seek(reader, index):
             return
         yield reader.spec().get_string_attribute("oiio:subimagename")
 
@@ -284,17 +367,6 @@ def specials_note(nan: int, infinite: int) -> str | None:
         f"has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, and stay in "
         "the picture"
     )
-
-
-def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Undo an orientation of TIFF 6.0 and Exif, 1 to 8: the sides of the first row and column."""
-    if orientation in (5, 6, 7, 8):
-        pixels = pixels.swapaxes(0, 1)
-    if orientation in (3, 4, 7, 8):
-        pixels = pixels[::-1]
-    if orientation in (2, 3, 6, 7):
-        pixels = pixels[:, ::-1]
-    return pixels
 
 
 def decode(
@@ -325,18 +397,29 @@ def decode(
     if numbers == "half":
         # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
-    notes = [f"left out the channels {', '.join(left_out)}"] if left_out else []
+    notes = [*stored.notes]
+    if left_out:
+        notes.append(f"left out the channels {', '.join(left_out)}")
     grey = len(chosen) < 3
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
+    has_alpha = values.shape[2] == 4
     taken_as = ""
     if not raw:
+        if stored.associated and has_alpha and values.dtype.kind == "u":
+            # 16 bits hold the quotients of 8 bits.
+            scale = 65535 // np.iinfo(values.dtype).max
+            values = divided(values.astype(np.uint16) * np.uint16(scale))
+            stored = replace(stored, associated=False)
         taken_as, values, said = linear(values, stored, colour)
         notes += said
         is_hdr = colour is None and has_hdr_curve(stored.code_points)
         if numbers in ("uint8", "uint16") and not is_hdr:
             values = expanded(values, expand)
         stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
+    hidden = visible = 0.0
+    if has_alpha and not stored.associated:
+        hidden, visible = light_of(values)
     return Picture(
         pixels=np.ascontiguousarray(values),
         encoding=None if raw else "linear",
@@ -345,6 +428,8 @@ def decode(
         stored=stored,
         notes=tuple(notes),
         colour=taken_as,
+        hidden=hidden,
+        visible=visible,
     )
 
 
@@ -372,8 +457,9 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
     if {"R", "G", "B"} <= places.keys():
         chosen = [places["R"], places["G"], places["B"], *alpha]
-    elif len(names) == 1 + len(alpha):
-        chosen = [index for index in range(len(names)) if index not in alpha] + alpha
+    elif len([name for name in names if name and not _UNNAMED.match(name)]) == 1 + len(alpha):
+        grey = [index for index in range(len(names)) if index not in alpha]
+        chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]
     elif len(layers) > 1:
         raise ValueError(
             f"the layers are {', '.join(filter(None, layers))}; name one as the layer to read"
@@ -383,7 +469,7 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
             f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
             "alpha"
         )
-    return chosen, [name for index, name in enumerate(names) if index not in chosen]
+    return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
 
 
 def _attributes_of_linear(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -26,7 +27,16 @@ from vkbloom.io.images import (
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["as_numbers", "check_quality", "check_writable", "put", "save"]
+__all__ = [
+    "BITS",
+    "as_numbers",
+    "check_bits",
+    "check_quality",
+    "check_writable",
+    "is_straight",
+    "put",
+    "save",
+]
 
 # Number types to write, in order of preference, by the number type of the picture. For floats
 # uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
@@ -37,8 +47,16 @@ _PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
     "float": ("float", "half", "uint8", "uint16"),
     "double": ("float", "half", "uint8", "uint16"),
 }
+# Those of files that hold linear light.
+_FLOATS: Final = ("half", "float", "double")
 # What HDR curves need, whatever the picture has.
 _DEEP: Final = ("uint16", "half", "float", "uint8")
+#: Number types to write, in order of preference, by the size of a number.
+BITS: Final[Mapping[int | None, tuple[str, ...]]] = {
+    8: ("uint8",),
+    16: ("uint16", "half"),
+    32: ("float",),
+}
 # OpenImageIO's names of the formats that have a quality, 1 to 100.
 _LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
@@ -63,12 +81,40 @@ def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
         raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
 
 
+def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
+    """Return whether readers of a file expect alpha, and colours that are not multiplied by it.
+
+    `is_associated`: Whether the picture has multiplied colours, which TIFF can record.
+    """
+    file = Path(path)
+    if is_exr(file) or (is_associated and file.suffix.lower() in (".tif", ".tiff")):
+        return False
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    return bool(oiio.ImageOutput.create(f"image{file.suffix}").supports("alpha"))
+
+
+def check_bits(path: str | os.PathLike[str], bits: int | None) -> None:
+    """Check that a file's format has numbers of a size, if one is given."""
+    if bits is None:
+        return
+    if bits not in BITS:
+        raise ValueError(f"bits: {bits!r} is not one of {', '.join(map(str, BITS))}")
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    with tempfile.TemporaryDirectory() as folder:
+        tried = Path(folder, f"image{Path(path).suffix}")
+        if not any(safe_writing.holds(oiio, tried, 3, numbers) for numbers in BITS[bits]):
+            kind = oiio.ImageOutput.create(tried.name).format_name()
+            raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
+
+
 def save(
     picture: Picture,
     path: str | os.PathLike[str],
     saved: Saved | None = None,
     attributes: Mapping[str, str] | None = None,
     quality: int | None = None,
+    *,
+    bits: int | None = None,
 ) -> tuple[str, ...]:
     """Write a picture to a file, with its own number type or the closest one of the format.
 
@@ -78,6 +124,7 @@ def save(
 
     `saved`: The colours in the file, for linear pictures. With HDR curves, files of integers have
     16 bits where the format has them.
+    `bits`: Size of a number. None: that of the picture, or the closest one of the format.
     """
     saved = saved or Saved()
     if saved != Saved() and picture.encoding != "linear":
@@ -93,7 +140,13 @@ def save(
     added = {} if quality is None else {"CompressionQuality": quality}
     with safe_writing.replacing(oiio, target, picture.values.nbytes) as temporary:
         return _write(
-            oiio, picture, saved, temporary, target, attributes={**(attributes or {}), **added}
+            oiio,
+            picture,
+            saved,
+            temporary,
+            target,
+            attributes={**(attributes or {}), **added},
+            bits=bits,
         )
 
 
@@ -105,10 +158,12 @@ def _write(
     target: Path,
     *,
     attributes: Mapping[str, str | int],
+    bits: int | None,
 ) -> tuple[str, ...]:
     picture = in_colour(picture, saved)
     writer = oiio.ImageOutput.create(str(temporary))
-    layout = chosen_layout(oiio, picture, writer, temporary, target, is_hdr=displayed.is_hdr(saved))
+    is_hdr = displayed.is_hdr(saved)
+    layout = chosen_layout(oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits)
     values, described, notes = prepared(oiio, picture, layout, saved, target)
     put(oiio, values, described, temporary, target, attributes=attributes)
     return notes
@@ -136,11 +191,17 @@ def prepared(
     if picture.encoding is None:
         return as_numbers(values, numbers), picture, tuple(notes)
     what: tuple[str, str] | str = ("rec709", picture.encoding)
+    is_shown = saved.view is not None or displayed.is_hdr(saved)
     if picture.encoding == "linear":
+        if integer and not is_shown and picture.numbers in _FLOATS and _is_above_1(picture.pixels):
+            notes.append(
+                f"{target} has integers: values above 1 are clipped; --tonemap aces or --view "
+                "keeps them apart"
+            )
         if saved.view is not None and not integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
         curve = saved.curve or ("srgb" if integer else "linear")
-        values, what = displayed.converted(oiio, values, saved, curve)
+        values, what = displayed.converted(oiio, values, saved, curve, is_integer=integer)
     try:
         described = described_as(oiio, picture, target, what)
     except ValueError as error:
@@ -150,6 +211,12 @@ def prepared(
         described = dataclasses.replace(picture, encoding=None)
         notes.append(str(error))
     return as_numbers(values, numbers), described, tuple(notes)
+
+
+def _is_above_1(pixels: NDArray[Any]) -> bool:
+    """Whether colours are above 1, also after the rounding of half floats."""
+    colours = pixels[:, :, :3]
+    return bool((colours[np.isfinite(colours)] > 1.001).any())
 
 
 def described_as(
@@ -197,6 +264,8 @@ def put(
         and writer.write_image(np.ascontiguousarray(values))
         and writer.close()
     )
+    # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
+    is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
     if not is_written:
         raise safe_writing.write_error(writer, temporary, target)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
@@ -238,13 +307,18 @@ def chosen_layout(
     target: Path,
     *,
     is_hdr: bool,
+    bits: int | None,
 ) -> tuple[int, str]:
     """Return the closest number of channels and number type that the format supports.
 
     `is_hdr`: The curve needs more than 8 bits.
+    `bits`: Size of a number, as for `save`.
     """
-    for values in _layouts(picture, writer.supports("alpha") != 0):
-        for numbers in _DEEP if is_hdr else _PREFERENCES[picture.numbers]:
+    wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
+    if bits is not None:
+        wanted = BITS[bits]
+    for values in _layouts(picture, safe_writing.has_alpha(writer)):
+        for numbers in wanted:
             if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
                 return values.shape[2], numbers
     raise ValueError(

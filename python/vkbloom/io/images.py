@@ -16,6 +16,7 @@ half, float          linear                    linear
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ __all__ = [
     "failure_of",
     "is_exr",
     "is_kept",
+    "warnings_of",
 ]
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
@@ -82,6 +84,11 @@ _KEPT_ATTRIBUTES: Final = frozenset(
     )
 )
 _KEPT_GROUPS: Final = ("Exif:", "GPS:", "IPTC:")
+# libjpeg's warning about bytes after the pixels of a scan. Before a restart marker, 0xd0 to 0xd7,
+# pixels were lost.
+_EXTRA_BYTES: Final = re.compile(
+    r"\AJPEG error: Corrupt JPEG data: (\d+) extraneous bytes before marker 0x(?!d[0-7])[^\n]*\Z"
+)
 # Attributes that a conversion or rotation makes wrong.
 _LOST_ATTRIBUTES: Final = frozenset(
     ("Exif:ColorSpace", "Exif:PixelXDimension", "Exif:PixelYDimension")
@@ -95,12 +102,13 @@ class StoredImage:
     - `pixels`: ndarray, shape (H, W, C); uint8, uint16, float16 or float32 (also for doubles), top
       row first, turned upright if the file has an orientation. They cover the data window and the
       display window; pixels without data are 0.
-    - `channels`: The names of the C channels, such as ("R", "G", "B", "A").
+    - `channels`: The names of the C channels, such as ("R", "G", "B", "A"); "" for one without a
+      meaning.
     - `numbers`: OpenImageIO's name of each channel's number type: "uint8", "uint16", "half",
       "float" or "double".
     - `origin`: Position of the first pixel in the file's coordinates.
     - `display`: The display window (x, y, width, height), in the file's coordinates.
-    - `associated`: Whether the file's format says that colours are multiplied by alpha.
+    - `associated`: Whether colours are multiplied by alpha: encoded ones in files of integers.
     - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
     - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
       than `space`, and has precedence unless there are `code_points`.
@@ -109,7 +117,10 @@ class StoredImage:
       part without a name.
     - `profile_name`: The name in the ICC profile; "" without a profile.
     - `code_points`: Those of the file's colours (Rec. ITU-T H.273), as in a cICP chunk, which has
-      precedence over a profile (PNG, third edition): primaries, curve, matrix, range.
+      precedence over a profile (PNG, third edition): primaries, curve, matrix, range. None: there
+      are none, or they are not known.
+    - `is_ultra_hdr`: Whether floats were made of integers: light with the profile's primaries.
+    - `notes`: Notes for the user about how the file was read.
     """
 
     pixels: NDArray[Any]
@@ -124,6 +135,8 @@ class StoredImage:
     profile_name: str = ""
     code_points: tuple[int, ...] | None = None
     gamma: float | None = None
+    is_ultra_hdr: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def profile(self) -> bytes | None:
@@ -145,6 +158,7 @@ class Picture:
     - `notes`: Notes for the user about how the file was interpreted.
     - `colour`: The colour space from which colours were decoded: "linear", "srgb", the name of
       another space or of the file's profile; "" if the values were not decoded.
+    - `hidden`, `visible`: The sum of straight colours where alpha is 0, and that of the others.
     """
 
     pixels: NDArray[Any]
@@ -154,6 +168,8 @@ class Picture:
     stored: StoredImage
     notes: tuple[str, ...] = ()
     colour: str = ""
+    hidden: float = 0.0
+    visible: float = 0.0
 
     @classmethod
     def of_values(
@@ -223,11 +239,21 @@ def complete(pixels: NDArray[Any] | None, reader: Any, file: object) -> NDArray[
     return pixels
 
 
+def warnings_of(reader: Any, file: object) -> list[str]:
+    """Return notes about warnings that a reader has left, or raise ValueError for an error."""
+    reason = failure_of(reader)
+    if (extra := _EXTRA_BYTES.search(reason)) is not None:
+        return [f"{extra[1]} bytes of the file belong to no pixel and are ignored"]
+    if reason:
+        raise ValueError(f"{file}: damaged: {reason}")
+    return []
+
+
 def failure_of(source: Any) -> str:
-    """Return and clear the error of an OpenImageIO object; "" if there is none."""
+    """Return and clear the error of an OpenImageIO object in one line; "" if there is none."""
     try:
         text: str = source.geterror()
     except UnicodeDecodeError as error:
         # The message quotes bytes of a damaged file.
         text = error.object.decode(errors="replace")
-    return text.strip()
+    return "; ".join(dict.fromkeys(filter(None, map(str.strip, text.splitlines()))))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from vkbloom.checks import import_extra
 from vkbloom.io import displayed, image_reading, image_writing, safe_writing
+from vkbloom.io.alpha import in_order
 from vkbloom.io.displayed import Saved
-from vkbloom.io.images import DTYPES, Picture, StoredImage, complete
+from vkbloom.io.images import DTYPES, Picture, StoredImage, complete, warnings_of
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -85,21 +86,25 @@ def opened_rows(
         subimage, spec = image_reading.chosen_part(reader, name, subimage, layer)
         orientation = spec.get_int_attribute("Orientation", 1)
         display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
-        if orientation == 1 and display == (spec.x, spec.y, spec.width, spec.height):
-            empty = image_reading.describe(reader, name)
-            reader.seek_subimage(subimage, 0)
-
-            def read(first: int, end: int) -> StoredImage:
-                pixels = _read_rows(reader, name, subimage, first, end)
-                return image_reading.of_layer(replace(empty, pixels=pixels), spec, layer)
-
-            size = spec.width, spec.height
-            yield Rows(size, str(spec.format), read, max(spec.tile_height, 1))
+        if orientation != 1 or display != (spec.x, spec.y, spec.width, spec.height):
+            width, height = image_reading.size_of(spec)
+            size = (height, width) if orientation > 4 else (width, height)
+            whole = functools.cache(lambda: image_reading.load(name, subimage, layer))
+            yield Rows(size, str(spec.format), lambda first, end: _cut(whole(), first, end))
             return
-        width, height = image_reading.size_of(spec)
-        size = (height, width) if orientation > 4 else (width, height)
-        whole = functools.cache(lambda: image_reading.load(name, subimage, layer))
-        yield Rows(size, str(spec.format), lambda first, end: _cut(whole(), first, end))
+        empty = image_reading.describe(reader, name)
+    # WebP's reader does not come back from other parts.
+    with image_reading.opened(path, "Reading images") as reader:
+        image_reading.chosen_part(reader, name, subimage, None)
+
+        def read(first: int, end: int) -> StoredImage:
+            pixels, notes = _read_rows(reader, name, subimage, first, end)
+            notes = [*dict.fromkeys((*empty.notes, *notes))]
+            found = replace(empty, pixels=pixels, notes=tuple(notes))
+            return image_reading.of_layer(found, spec, layer)
+
+        size = spec.width, spec.height
+        yield Rows(size, str(spec.format), read, max(spec.tile_height, 1))
 
 
 def _cut(stored: StoredImage, first: int, end: int) -> StoredImage:
@@ -107,9 +112,13 @@ def _cut(stored: StoredImage, first: int, end: int) -> StoredImage:
 
 
 def _read_rows(
-    reader: OpenImageIO.ImageInput, name: str, subimage: int, first: int, end: int
-) -> NDArray[Any]:
-    """Return rows of the current part, which has that number."""
+    reader: OpenImageIO.ImageInput,
+    name: str,
+    subimage: int,
+    first: int,
+    end: int,
+) -> tuple[NDArray[Any], list[str]]:
+    """Return rows of the current part, which has that number, and notes."""
     spec = reader.spec()
     numbers = str(spec.format)
     wanted = numbers if numbers != "double" else "float"
@@ -121,8 +130,10 @@ def _read_rows(
         )
     else:
         data = reader.read_scanlines(*place, y + first, y + end, 0, 0, spec.nchannels, wanted)
+    notes = warnings_of(reader, name)
     data = complete(data, reader, name)
-    return np.asarray(data, DTYPES[numbers]).reshape(end - first, spec.width, spec.nchannels)
+    pixels = np.asarray(data, DTYPES[numbers]).reshape(end - first, spec.width, spec.nchannels)
+    return in_order(pixels, reader.format_name(), name), notes
 
 
 @contextmanager
@@ -132,6 +143,8 @@ def written_rows(
     saved: Saved,
     attributes: Mapping[str, str],
     quality: int | None,
+    *,
+    bits: int | None,
 ) -> Iterator[Callable[[Picture], tuple[str, ...]]]:
     """Yield a function that writes the next rows, and returns notes as `image_writing.save` does.
 
@@ -141,6 +154,7 @@ def written_rows(
     target = Path(path)
     safe_writing.check_extension(oiio, target.suffix)
     image_writing.check_quality(target, quality)
+    image_writing.check_bits(target, bits)
     displayed.check_saved(saved)
     told: dict[str, str | int] = {**attributes}
     if quality is not None:
@@ -154,7 +168,7 @@ def written_rows(
         if layout is None:
             is_hdr = displayed.is_hdr(saved)
             layout = image_writing.chosen_layout(
-                oiio, picture, writer, temporary, target, is_hdr=is_hdr
+                oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits
             )
         values, described, notes = image_writing.prepared(oiio, picture, layout, saved, target)
         if row == 0:

@@ -6,7 +6,7 @@ A file is written to a temporary file beside it, which is renamed when it is com
 2. `reserve` the temporary file; `holds` tests on it what the format supports
 3. write it; `write_error` converts a failure of OpenImageIO
 4. `check_complete`, then `put_in_place`
-5. remove the temporary file if it still exists
+5. `remove` the temporary file if it still exists
 
 `replacing` does steps 2, 4 and 5 for one file, and `writing` also closes a writer for it.
 """
@@ -17,6 +17,8 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -24,7 +26,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
 
 import numpy as np
 
-from vkbloom.io.images import check_name
+from vkbloom.io.containers import padded
+from vkbloom.io.images import check_name, failure_of
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -33,9 +36,12 @@ __all__ = [
     "Steps",
     "check_complete",
     "check_extension",
+    "has_alpha",
     "holds",
+    "is_stream",
     "is_temporary",
     "put_in_place",
+    "remove",
     "replacing",
     "reserve",
     "write_error",
@@ -57,7 +63,11 @@ _MISSING: Final = dict.fromkeys(
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _READ_BYTES: Final = 64 << 20  # bytes read at a time
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
+_TRIED: Final = 32  # pixels on a side that every format can have
 _ZEROS: Final = 1 << 20  # bytes written at a time
+
+# Temporary files of this process.
+_unfinished: set[Path] = set()
 
 
 def check_extension(oiio: ModuleType, suffix: str) -> None:
@@ -84,40 +94,68 @@ def reserve(file: Path, size: int) -> Path:
     return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 
 
+def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
+    """Return whether a format keeps alpha. OpenImageIO says so of GIF, and writes it opaque."""
+    return writer.supports("alpha") != 0 and writer.format_name() != "gif"
+
+
 def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
     """Return whether a format supports a number of channels and a number type.
 
-    OpenImageIO knows this only for an open file. One pixel is written, because libpng prints a
-    message about a file without pixels.
+    OpenImageIO knows this only for a complete file: a small one is written and opened again.
     """
-    spec = oiio.ImageSpec(1, 1, channels, numbers)
+    spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
     writer = oiio.ImageOutput.create(str(temporary))
     is_kept = False
     if writer.open(str(temporary), spec):
         opened = writer.spec()
-        is_kept = (str(opened.format), opened.nchannels) == (numbers, channels)
-        writer.write_image(np.zeros((1, 1, channels), np.float32))
-        writer.close()
+        is_written = writer.write_image(np.zeros((_TRIED, _TRIED, channels), np.float32))
+        is_written = writer.close() and is_written
+        is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
     # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
     writer.geterror()
+    if is_kept:
+        reader = oiio.ImageInput.open(str(temporary))
+        # FITS takes halves for another type. OpenImageIO needs 128 bytes of JPEG XL.
+        is_kept = reader is None or str(reader.spec().format) == numbers
+        failure_of(oiio)
     return is_kept
 
 
 def write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
     """Convert a writer's error to an exception."""
-    reason = writer.geterror().replace(str(temporary), file.name).strip() or "not written"
+    reason = failure_of(writer).replace(str(temporary), file.name) or "not written"
     return OSError(errno.EIO, reason, str(file))
 
 
 def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
     """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk."""
-    if not _is_readable(oiio, temporary):
-        raise OSError(errno.EIO, "not written completely; is the disk full?", str(file))
+    reason = _unreadable(oiio, temporary)
+    if reason is None:
+        return
+    reason = reason.replace(str(temporary), file.name)
+    if shutil.disk_usage(temporary.parent).free < _LARGEST_HEADER:
+        raise OSError(errno.ENOSPC, f"not written completely: {reason}", str(file))
+    # Some formats cannot hold a few pixels, or OpenImageIO cannot read such files.
+    raise OSError(
+        errno.EIO, f"cannot be read after writing: {reason}; try another format", str(file)
+    )
 
 
 def put_in_place(temporary: Path, file: Path) -> None:
-    """Rename a temporary file to its final name, with the permissions of the file it replaces."""
+    """Rename a temporary file to its final name, with the permissions of the file it replaces.
+
+    The content is written to a pipe or a device, which is not replaced.
+    """
     target = _link_target(file)
+    if is_stream(target):
+        try:
+            with temporary.open("rb") as content, file.open("wb") as stream:
+                shutil.copyfileobj(content, stream)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        temporary.unlink()
+        return
     with contextlib.suppress(OSError):
         shutil.copymode(target, temporary)
     try:
@@ -138,7 +176,7 @@ def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
         check_complete(oiio, temporary, file)
         put_in_place(temporary, file)
     finally:
-        temporary.unlink(missing_ok=True)
+        remove(temporary)
 
 
 @contextlib.contextmanager
@@ -165,7 +203,23 @@ def write_file(file: Path, content: bytes) -> None:
     try:
         put_in_place(temporary, file)
     finally:
+        remove(temporary)
+
+
+def remove(*files: Path) -> None:
+    """Remove temporary files that still exist; without arguments, all of this process."""
+    for temporary in files or [*_unfinished]:
         temporary.unlink(missing_ok=True)
+        _unfinished.discard(temporary)
+
+
+def is_stream(path: str | os.PathLike[str]) -> bool:
+    """Return whether a name is that of a pipe, a socket or a device."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def is_temporary(path: Path) -> bool:
@@ -176,14 +230,17 @@ def is_temporary(path: Path) -> bool:
 def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
     """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
-    temporary = _link_target(file).with_name(f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}")
+    target = _link_target(file)
+    folder = Path(tempfile.gettempdir()) if is_stream(target) else target.parent
+    temporary = folder / f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}"
+    _unfinished.add(temporary)
     try:
         with temporary.open("xb") as stream:
             fill(stream)
     except BaseException as error:
         # BaseException includes Ctrl-C, which may arrive while a large file is written.
         with contextlib.suppress(OSError):
-            temporary.unlink()
+            remove(temporary)
         if isinstance(error, OSError):
             raise OSError(error.errno, error.strerror, str(file)) from error
         raise
@@ -213,11 +270,12 @@ def _link_target(file: Path) -> Path:
         raise OSError(error.errno, error.strerror, str(file)) from error
 
 
-def _is_readable(oiio: ModuleType, file: Path) -> bool:
-    reader = oiio.ImageInput.open(str(file))
+def _unreadable(oiio: ModuleType, file: Path) -> str | None:
+    """Return why a file cannot be read; None: it can."""
+    with padded(file) as name:
+        reader = oiio.ImageInput.open(name)
     if reader is None:
-        oiio.geterror()
-        return False
+        return failure_of(oiio) or "unknown format"
     spec = reader.spec()
     # Some rows at a time, so that large files are not completely in memory.
     rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
@@ -233,6 +291,6 @@ def _is_readable(oiio: ModuleType, file: Path) -> bool:
             for y in range(spec.y, bottom, rows)
         )
     )
-    reader.geterror()
+    reason = failure_of(reader) or "the pixels are missing"
     reader.close()
-    return readable
+    return None if readable else reason

@@ -43,9 +43,9 @@ class BevyBloom(Settings):
     Notes
     -----
     ``down_0`` is `max_mip_dimension` high; its width follows from the aspect of the frame
-    (rounded, at most 16384). It is the sum of the five groups of the 13 taps of Jimenez, in texels
-    of the frame. Each group p, multiplied by its share, is divided by 1 + luminance(p) / 4. The sum
-    is at least 0.0001; then the threshold is applied. There are
+    (rounded, at most 16384 or the adapter's limit). It is the sum of the five groups of the 13
+    taps of Jimenez, in texels of the frame. Each group p, multiplied by its share, is divided by
+    1 + luminance(p) / 4. The sum is at least 0.0001; then the threshold is applied. There are
     N = floor(log2(max_mip_dimension)) - 1 levels. Each next level has half the size, floored, by
     the plain 13 taps. For level m, with x = m / (N - 1), f_m is
 

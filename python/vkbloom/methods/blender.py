@@ -140,6 +140,8 @@ class BlenderGlare(Settings):
 
     method: ClassVar[str] = "blender"
     published: ClassVar[bool] = True
+    #: `glow` is the node's output Highlights.
+    glow_note: ClassVar[str] = ""
 
     threshold: float | None = 1.0
     knee: float = no_knee("blender")

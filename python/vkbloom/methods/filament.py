@@ -37,8 +37,8 @@ class FilamentBloom(Settings):
     Notes
     -----
     The width of ``down_0`` follows from the aspect of the frame, floored to a multiple of 16, at
-    most 16384. While
-    ``down_0`` is less than half of the frame in width or height, the frame is halved first. All
+    most 16384 or the adapter's limit. While ``down_0`` is less than half of the frame in width or
+    height, the frame is halved first. All
     these steps are a bilinear sample of the image convolved with (1 2 1)^2 / 16. The first one
     includes the threshold: its four bilinear taps are weighted by 1 / (1 + brightest channel);
     then c = max(0, c - threshold); then c / (1 + brightest channel of c / highlight). Each further

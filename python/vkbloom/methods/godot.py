@@ -42,7 +42,7 @@ class GodotBloom(Settings):
         Seven weights, one for each level, 0 or more.
     bicubic : bool
         Whether to enlarge the levels by the cubic B-spline, as Godot does on desktop systems,
-        instead of bilinearly.
+        instead of bilinearly, as its mobile renderer did up to 4.5.
     white : float
         Largest brightness of the composite "screen", 0.01 to 65504.
     composite : {"screen", "soft_light", "add", "replace", "mix"}

@@ -9,6 +9,7 @@ import importlib
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -152,7 +153,7 @@ def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
-            return -1, ""
+            return process.returncode, ""
         except BaseException:
             process.kill()
             raise
@@ -179,9 +180,12 @@ def explained(file: OwnFile, one: OwnPass, status: int, text: str) -> str:
     """Return the message of a pass that does not compile."""
     source = file.source
     if status < 0 or status > 128:
+        number = -status if status < 0 else status - 128
+        known = number in set(signal.Signals)
+        name = signal.Signals(number).name if known else f"status {status}"
         return source.where(
             one.line,
-            f"the compiler ended early: it may take {MOST_PROCESSOR_SECONDS} s and "
+            f"the compiler was ended by {name}: it may take {MOST_PROCESSOR_SECONDS} s and "
             f"{MOST_MEMORY >> 20} MiB for a pass",
         )
     last = one.body_line + one.body.count("\n")

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import base64
+import itertools
+import weakref
 import zlib
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ArrayValue"]
+__all__ = ["ARRAYS", "ArrayValue"]
+
+#: The arrays of this process by names that are never used again: PyTorch compiles with strings as
+#: constants, but not with objects.
+ARRAYS: Final[weakref.WeakValueDictionary[str, ArrayValue]] = weakref.WeakValueDictionary()
+_numbers = itertools.count(1)
 
 
 class ArrayValue:
@@ -19,7 +26,7 @@ class ArrayValue:
     `array`: Anything that NumPy can convert, or the result of `to_plain`. It is copied.
     """
 
-    __slots__ = ("_hash", "array")
+    __slots__ = ("__weakref__", "_hash", "array", "name")
 
     def __init__(self, array: Any, name: str = "array") -> None:
         try:
@@ -38,6 +45,8 @@ class ArrayValue:
         values.flags.writeable = False
         self.array: NDArray[np.float32] = values
         self._hash = hash((values.shape, zlib.crc32(values.tobytes())))
+        self.name = f"array {next(_numbers)}"
+        ARRAYS[self.name] = self
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.array, dtype=dtype, copy=copy)

@@ -31,7 +31,8 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     array = as_array(image, name)
     if array.dtype.name not in _FORMATS:
         raise TypeError(
-            f"{name} must be uint8, float16, float32 or float64, not {array.dtype.name}"
+            f"{name} must be uint8, float16, float32 or float64, not {array.dtype}"
+            + f"; convert it: ({name} / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         )
     if array.ndim != 3 or 0 in array.shape:
         raise ValueError(f"{name} must have the shape (H, W, C), not {array.shape}")

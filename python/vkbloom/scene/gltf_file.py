@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import base64
 import binascii
+import json
 import os
 import re
 import reprlib
 import struct
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, Final, NoReturn, TypeAlias
 from urllib.parse import unquote
 
@@ -38,6 +39,11 @@ FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 MAX_VERTICES: Final = 2**24
 _COMPONENTS: Final = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+# Of any object. They are dropped before pygltflib sees them, since it refuses odd values in them.
+_UNREAD: Final = (
+    *("cameras", "copyright", "extras", "generator", "max", "min", "name", "skins", "target"),
+    "weights",
+)
 _EXTENSIONS: Final = frozenset({EMISSIVE_STRENGTH, TEXTURE_TRANSFORM})
 # Of compressed bytes. The number of texels is checked when the image is decoded.
 _MAX_IMAGE_BYTES: Final = 2**30
@@ -54,18 +60,7 @@ class GltfFile:
         self._buffers: dict[object, bytes] = {}
         data = path.read_bytes()
         text, self._blob = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
-        try:
-            self.root: Parsed = pygltflib.GLTF2.from_json(
-                text.decode("utf-8-sig"), infer_missing=True, object_hook=_without_extras
-            )
-        except MemoryError:
-            raise
-        # For malformed JSON, the parser raises any error of its Python code: AttributeError,
-        # KeyError, RecursionError and others. All of them mean the same.
-        except Exception as error:
-            raise ValueError(
-                f"{path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
-            ) from error
+        self.root = self._parsed(text, pygltflib)
         self._kinds: dict[str, type] = {
             "accessors": pygltflib.Accessor,
             "bufferViews": pygltflib.BufferView,
@@ -78,13 +73,38 @@ class GltfFile:
             "scenes": pygltflib.Scene,
             "textures": pygltflib.Texture,
         }
-        self._check_asset()
 
     def fail(self, what: str) -> NoReturn:
         """Raise a ValueError that names the file and what is wrong with it."""
         raise ValueError(f"{self.path}: {what}")
 
     # The container and its header
+
+    def _parsed(self, text: bytes, pygltflib: Any) -> Parsed:
+        try:
+            # Some exporters pad the JSON chunk with NUL, where 4.4.3.2 requires spaces.
+            document = json.loads(
+                text.rstrip(b"\0").decode("utf-8-sig"),
+                object_hook=_read_parts,
+                parse_float=_number,
+            )
+        except (ValueError, RecursionError) as error:
+            raise ValueError(
+                f"{self.path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
+            ) from error
+        if not isinstance(document, dict):
+            self.fail("not a glTF 2.0 document: a JSON object is needed")
+        self._check_asset(document)
+        try:
+            return pygltflib.GLTF2.from_json(json.dumps(document), infer_missing=True)
+        except MemoryError:
+            raise
+        # For values of a wrong type, the parser raises any error of its Python code:
+        # AttributeError, KeyError and others. All of them mean the same.
+        except Exception as error:
+            raise ValueError(
+                f"{self.path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
+            ) from error
 
     def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
         """Split a GLB (4.4) into its JSON and its binary chunk."""
@@ -106,19 +126,23 @@ class GltfFile:
             offset += size
         if chunks[0][0] != b"JSON":
             self.fail("damaged: its first chunk is not JSON")
+        # The binary chunk is the second one (4.4.3.3); others are ignored.
         blob = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
         return chunks[0][1], blob
 
-    def _check_asset(self) -> None:
-        asset = self.root.asset
-        version = getattr(asset, "version", None)
+    def _check_asset(self, document: dict[str, Any]) -> None:
+        # Optional in glTF 1.0.
+        asset = document.get("asset")
+        asset = asset if isinstance(asset, dict) else {}
+        version = asset.get("version")
         if not isinstance(version, str) or not version.startswith("2."):
-            self.fail(f"glTF version {reprlib.repr(version)}; 2.0 is needed")
-        minimum = getattr(asset, "minVersion", None)
-        if minimum not in (None, "2.0"):
+            given = "missing" if version is None else reprlib.repr(version)
+            self.fail(f"glTF version (asset.version) is {given}; 2.0 is needed")
+        minimum = asset.get("minVersion", "2.0")
+        if not isinstance(minimum, str) or not re.fullmatch(r"1\.\d+|2\.0", minimum):
             self.fail(f"needs at least glTF {reprlib.repr(minimum)}; 2.0 is supported")
         for field in ("extensionsRequired", "extensionsUsed"):
-            names = getattr(self.root, field) or []
+            names = document.get(field, [])
             if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
                 self.fail(f"{field} is not a list of names")
             unknown = [name for name in names if name not in _EXTENSIONS]
@@ -126,7 +150,7 @@ class GltfFile:
                 self.fail(f"needs extensions that are not supported: {', '.join(unknown)}")
             for name in unknown:
                 self.leave_out(f"extension {name}")
-        if self.root.animations:
+        if document.pop("animations", None):
             self.leave_out("animations")
 
     # Checked access to the parsed JSON
@@ -216,8 +240,6 @@ class GltfFile:
         dtype = np.dtype(_COMPONENTS[accessor.componentType])
         width = _WIDTHS[accessor.type]
         count = self.integer(accessor.count, f"{what}.count", 1, 3 * MAX_VERTICES)
-        if accessor.bufferView is None and accessor.sparse is None:
-            self.fail(f"damaged: {what} has neither a bufferView nor sparse values")
         if accessor.bufferView is None:
             elements: NDArray[Any] = np.zeros((count, width), dtype)
         else:
@@ -338,7 +360,7 @@ class GltfFile:
         if not comma or not header.lower().endswith(";base64"):
             self.fail(f"{what}: a data URI that is not base64")
         try:
-            return base64.b64decode(payload, validate=True)
+            return base64.b64decode(unquote(payload), validate=True)
         except (binascii.Error, ValueError) as error:
             raise ValueError(f"{self.path}: damaged: base64 of {what}: {error}") from error
 
@@ -346,18 +368,18 @@ class GltfFile:
         """Read `length` bytes (None: all) of a file in the glTF file's folder or below it."""
         name = unquote(uri)
         shown = reprlib.repr(uri)
-        if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", uri) or PureWindowsPath(name).drive:
             self.fail(f"{what}: URI {shown} has a scheme or a drive; only relative paths are read")
         # A backslash separates folders only on some systems. Here it always does.
         parts = re.split(r"[/\\]", name)
-        if "\0" in name or name.startswith(("/", "\\")) or ".." in parts:
+        if "\0" in name or name.startswith(("/", "\\")):
             self.fail(f"{what}: URI {shown} leads out of the file's folder")
         folder = self.path.parent.resolve()
         try:
-            target = folder.joinpath(*parts).resolve()
+            # "sub/.." is removed before links are resolved (RFC 3986, 5.2.4).
+            target = Path(os.path.normpath(folder.joinpath(*parts))).resolve()
         except (OSError, RuntimeError) as error:
             raise OSError(f"{self.path}: {what}: URI {shown}: {error}") from error
-        # Checked again, with symbolic links resolved.
         if not target.is_relative_to(folder):
             self.fail(f"{what}: URI {shown} leads out of the file's folder")
         try:
@@ -376,7 +398,12 @@ class GltfFile:
             ) from error
 
 
-def _without_extras(value: dict[str, Any]) -> dict[str, Any]:
-    """Drop "extras": they may have any type, but pygltflib expects objects."""
-    value.pop("extras", None)
-    return value
+def _read_parts(value: dict[str, Any]) -> dict[str, Any]:
+    """Drop what is not read, and null, which some exporters write for what is missing."""
+    return {key: part for key, part in value.items() if part is not None and key not in _UNREAD}
+
+
+def _number(text: str) -> float:
+    """Return an int for an integer with a fractional part of 0, as some exporters write it."""
+    number = float(text)
+    return int(number) if number.is_integer() and abs(number) < 2**53 else number

@@ -26,8 +26,9 @@ class Mesh:
     indices
         ``(M,)`` uint32, each less than N: the triangles. M is a positive multiple of 3.
     emission
-        ``(N, 3)`` float32, finite: emitted radiance rgb of each vertex, which the deferred system
-        adds to `brightness`. None: nothing emits.
+        ``(N, 3)`` float32, finite: emitted radiance rgb of each vertex. The deferred system adds it
+        to `brightness`. The forward system draws it, and it glows, if the scene has no glow mesh.
+        None: nothing emits.
     texcoords
         ``(N, 4)`` float32, finite: the position of each vertex in the base texture, then in the
         emission texture. (0, 0) is the top left corner of a texture, (1, 1) the bottom right one.

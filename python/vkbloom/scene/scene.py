@@ -112,7 +112,7 @@ class Scene:
     body : Mesh
         The mesh that is lit.
     glow : Mesh or None
-        The mesh that glows, or None.
+        The mesh that glows. None: what the body emits glows.
     skybox : Cubemap or None
         The sky, or None for black.
     camera : Camera
@@ -227,7 +227,7 @@ class Scene:
         base : str or path-like
             File of the mesh that is lit. `vkbloom.scene.gltf.load_mesh` lists what is read.
         glow : str or path-like, optional
-            File of the mesh that glows, or None.
+            File of the mesh that glows. None: what the materials of `base` emit glows.
         skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
             A path to a KTX 1 cubemap or to an equirectangular image, six paths to face images
             (+x, -x, +y, -y, +z, -z), an array ``(6, N, N, C)`` of uint8, float16 or float32 with C

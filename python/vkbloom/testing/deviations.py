@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -12,16 +13,17 @@ import numpy as np
 
 from vkbloom.testing.probe import Image
 
-__all__ = ["Deviation", "compare_with_law", "fail", "is_within", "measuring"]
+__all__ = ["Deviation", "compare_with_law", "fail", "figure", "is_within", "measuring"]
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """A deviation from a law, and the largest that is allowed."""
+    """A deviation from a law, and the largest that is allowed; infinity for a mere figure."""
 
     law: str
     off: float
     allowed: float
+    name: str
 
 
 _measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
@@ -38,12 +40,17 @@ def measuring() -> Iterator[list[Deviation]]:
         _measured.reset(token)
 
 
-def is_within(law: str, off: float, allowed: float) -> bool:
+def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     """Return whether a deviation is within its limit; NaN is not."""
     found = _measured.get()
     if found is not None:
-        found.append(Deviation(law, off, allowed))
+        found.append(Deviation(law, off, allowed, name))
     return off <= allowed
+
+
+def figure(name: str, value: float) -> None:
+    """Collect a figure that has no limit."""
+    is_within("", value, math.inf, name)
 
 
 def compare_with_law(

@@ -2,48 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import html
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from vkbloom.argument_types import checked
-from vkbloom.testing import laws, point_spread
+from vkbloom.checks import check_number
 from vkbloom.testing.deviations import measuring
+from vkbloom.testing.law_table import LAWS, Law, law_name
 from vkbloom.testing.probe import Bloom, Probe
+from vkbloom.testing.subject import Subject, fitting_probe
 
-__all__ = ["LAWS", "LawReport", "LawRow", "report"]
+__all__ = ["COLOURS", "LawReport", "LawRow", "law_report", "report"]
 
-# A threshold of 1, the usual one, lets nothing of an image of 1 through.
-_BRIGHT: Final = 16.0
-# Positions along the diagonal: a period of a chain of four halvings.
-_PERIOD: Final = 16
-
-#: Why a bloom that is no fault may break a law, by the law's name.
-LAWS: Final = {
-    "superposition": "A threshold, a clamp, a firefly filter and a median are not linear. They "
-    "break this law on purpose.",
-    "gain": "With a threshold, the gain depends on the value. A method that reads black outside "
-    "the image loses light at the border.",
-    "symmetric": "An even number of taps, a missing half texel and boxes of an odd number of "
-    "pixels are not the same from both sides.",
-    "transposed": "Blades, streaks and passes of different widths along x and y treat rows and "
-    "columns differently.",
-    "centroid_kept": "A chain of halved images averages boxes of 2 x 2 pixels. The light of a "
-    "pixel moves to the centre of its box, and back on average over all positions.",
-    "separable": "A sum of several widths, such as the levels of a pyramid, is not a row times a "
-    "column, even where each level is.",
-    "no_ringing": "Negative weights ring, as in a sharpening filter. A method that reads black "
-    "outside the image darkens the border.",
-    "bounded_fireflies": "A linear bloom spreads a share of any brightness. Only a clamp, or an "
-    "average weighted by 1 / (1 + luminance), limits it.",
-    "additive": "The bloom alone lacks the image. The composite mix takes light from bright "
-    "pixels, and screen and a tone curve compress it.",
-}
+#: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
+COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +39,8 @@ class LawRow:
         The deviation that is the largest share of its limit; NaN where nothing was measured.
     limit : float
         The allowed deviation there.
+    figures : mapping of str to float
+        What was measured, by name: the deviations, and figures such as the gain.
     law : str
         The law in words.
     message : str
@@ -82,6 +63,7 @@ class LawRow:
     held: bool | None
     off: float
     limit: float
+    figures: Mapping[str, float]
     law: str
     message: str
     why: str
@@ -102,7 +84,10 @@ class LawReport:
     probe : Probe
         The test images: size, dtype and brightest value.
     gain : float
-        Of a flat image of that value, in its middle; the law of the gain is tested with it.
+        Of a flat image of that value, in its middle. Where none is promised, the law of the gain is
+        tested with it.
+    required : tuple of str
+        Names of the laws that the bloom promises.
 
     See Also
     --------
@@ -115,13 +100,14 @@ class LawReport:
     ...     return reference.blur(image, vkbloom.Separable())
     >>> found = testing.report(bloom, size=(64, 64))
     >>> [row.name for row in found.rows if not row.held]
-    ['bounded_fireflies', 'additive']
+    ['bounded_fireflies', 'additive', 'energy', 'resolution']
     >>> found.assert_held("superposition", "gain", "symmetric")
     """
 
     rows: tuple[LawRow, ...]
     probe: Probe
     gain: float
+    required: tuple[str, ...] = ()
 
     def assert_held(self, *names: str) -> None:
         """Assert that the laws of these names hold; without a name, all of them.
@@ -148,9 +134,11 @@ class LawReport:
         """
         __tracebackhide__ = True
         known = {row.name: row for row in self.rows}
-        if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"names: {unknown[0]!r} is not one of {', '.join(known)}")
-        broken = [known[name] for name in names or known if not known[name].held]
+        try:
+            chosen = [law_name(name, known) for name in names] or list(known)
+        except ValueError as error:
+            raise ValueError(f"names: {error}") from None
+        broken = [known[name] for name in chosen if not known[name].held]
         if broken:
             raise AssertionError(
                 "\n".join(f"{row.name}: {row.message}\n  why: {row.why}" for row in broken)
@@ -165,12 +153,21 @@ class LawReport:
             f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
         ]
         for row in self.rows:
-            figures = "" if math.isnan(row.off) else f"{row.off:9.3g} {row.limit:9.3g}"
-            lines.append(f"{row.name:<18} {row.words:<11} {figures}".rstrip())
+            figures = "".join(f"{cell:>10}" for cell in _cells(row))
+            mark = " required" if row.name in self.required else ""
+            lines.append(f"{row.name:<18} {row.words:<11}{figures}{mark}".rstrip())
         for row in self.rows:
             if not row.held:
                 lines += [f"{row.name}: {row.message}", f"  why: {row.why}"]
         return "\n".join(lines)
+
+    def kind(self, row: LawRow) -> str:
+        """Return whether a row is held, untested, broken, or broken and required."""
+        if row.held:
+            return "held"
+        if row.name in self.required:
+            return "required"
+        return "untested" if row.held is None else "broken"
 
     def _repr_html_(self) -> str:
         """Return the same as a table."""
@@ -180,13 +177,16 @@ class LawReport:
         )
         body = []
         for row in self.rows:
-            figures = ["", ""] if math.isnan(row.off) else [f"{row.off:.3g}", f"{row.limit:.3g}"]
+            kind = self.kind(row)
             words = f"<b>{row.words}</b>" if not row.held else row.words
+            words += " (required)" if row.name in self.required else ""
             why = "" if row.held else f"{html.escape(row.message)}<br><i>{html.escape(row.why)}</i>"
             body.append(
-                f'<tr><th scope="row" style="text-align:left" title="{html.escape(row.law)}">'
-                f"{row.name}</th><td>{words}</td><td>{figures[0]}</td><td>{figures[1]}</td>"
-                f'<td style="text-align:left">{why}</td></tr>'
+                f'<tr class="{kind}"><th scope="row" style="text-align:left;color:{COLOURS[kind]}" '
+                f'title="{html.escape(row.law)}">{row.name}</th>'
+                f'<td style="color:{COLOURS[kind]}">{words}</td>'
+                + "".join(f"<td>{cell}</td>" for cell in _cells(row))
+                + f'<td style="text-align:left">{why}</td></tr>'
             )
         return (
             f'<table style="color:inherit"><caption>{html.escape(str(self).splitlines()[0])}'
@@ -194,9 +194,18 @@ class LawReport:
         )
 
 
+def _cells(row: LawRow) -> tuple[str, str]:
+    return ("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")
+
+
 @checked
 def report(
-    bloom: Bloom, *, size: tuple[int, int] = (256, 256), probe: Probe | None = None
+    bloom: Bloom,
+    *,
+    size: tuple[int, int] = (256, 256),
+    laws: str | Sequence[str] = "all",
+    gain: float | None = None,
+    probe: Probe | None = None,
 ) -> LawReport:
     """Test a bloom against every law.
 
@@ -207,6 +216,11 @@ def report(
         picture with its bloom.
     size : (int, int)
         Width and height of the test images. A wide bloom needs a large one.
+    laws : "all" or sequence of str
+        Names of the laws to test; they are promised: `LawReport.required`.
+    gain : float, optional
+        The gain of flat images that the bloom promises. Default: `gain` tests that there is one,
+        and `energy` that no light is lost or added.
     probe : Probe, optional
         Replaces `size`. Default: float32 with values up to 1, or up to 16 where a bloom of 1 is
         black, as after a threshold.
@@ -218,7 +232,7 @@ def report(
     Raises
     ------
     TypeError, ValueError
-        `bloom` is not such a callable.
+        `bloom` is not such a callable, or a law is unknown.
 
     See Also
     --------
@@ -233,111 +247,60 @@ def report(
     >>> [row.name for row in found.rows if row.held][:3]
     ['superposition', 'gain', 'symmetric']
     """
-    return law_report(bloom, probe or fitting_probe(bloom, Probe(size=size)))
-
-
-def fitting_probe(bloom: Bloom, probe: Probe) -> Probe:
-    """Return the probe with a higher value if a bloom of its own value is black."""
-    if probe.dtype.kind == "u" or probe.apply(bloom, probe.noise(0, probe.value))[0].any():
-        return probe
-    return dataclasses.replace(probe, value=_BRIGHT * probe.value)
+    if gain is not None:
+        check_number("gain", gain, 0.0, math.inf)
+    names = [] if laws == "all" else [laws] if isinstance(laws, str) else laws
+    try:
+        required = tuple(dict.fromkeys(law_name(name) for name in names))
+    except ValueError as error:
+        raise ValueError(f"laws: {error}") from None
+    used = probe or fitting_probe(bloom, Probe(size=size))
+    return law_report(Subject(bloom=bloom, probe=used, gain=gain), required or LAWS, required)
 
 
 def law_report(
-    bloom: Bloom,
-    probe: Probe,
-    *,
-    gain: float | None = None,
-    additive: Callable[[], None] | None = None,
+    subject: Subject,
+    names: Iterable[str],
+    required: tuple[str, ...] = (),
+    progress: Callable[[str], None] = lambda _: None,
 ) -> LawReport:
-    """Test a bloom against every law.
-
-    - `gain`: The expected gain. None: what a flat image gets in its middle.
-    - `additive`: Replaces the test of that law, where image and bloom are known apart.
-    """
-    if gain is None:
-        flat = probe.apply(bloom, probe.flat(probe.value))[0]
-        x, y = probe.centre
-        gain = max(0.0, float(flat[y, x].mean()) / probe.value)
-    expected = gain
-    tests: dict[str, Callable[[], None]] = {
-        "superposition": lambda: laws.assert_superposition(bloom, probe),
-        "gain": lambda: laws.assert_gain(bloom, expected, probe),
-        "symmetric": lambda: laws.assert_symmetric(bloom, probe),
-        "transposed": lambda: laws.assert_symmetric(bloom, probe, axes=("xy",)),
-        "centroid_kept": lambda: point_spread.assert_centroid_kept(bloom, probe),
-        "separable": lambda: point_spread.assert_separable(bloom, probe),
-        "no_ringing": lambda: laws.assert_no_ringing(bloom, probe),
-        "bounded_fireflies": lambda: laws.assert_bounded_fireflies(bloom, probe=probe),
-        "additive": additive or (lambda: laws.assert_additive(bloom, probe=probe)),
-    }
-    rows = [law_row(name, test, LAWS[name]) for name, test in tests.items()]
-    for index, row in enumerate(rows):
-        if row.name == "centroid_kept" and row.held is False:
-            why = f"{row.why} {_mean_shift(bloom, probe)}"
-            rows[index] = dataclasses.replace(row, why=why)
-    return LawReport(rows=tuple(rows), probe=probe, gain=gain)
+    """Test a bloom against laws; those that do not apply to it only if they are required."""
+    gain = subject.measured_gain
+    rows = []
+    for law in (LAWS[name] for name in LAWS if name in names):
+        if law.name in required or law.applies(subject):
+            progress(law.name)
+            rows.append(_row(law, subject))
+    return LawReport(rows=tuple(rows), probe=subject.probe, gain=gain, required=required)
 
 
-def law_row(name: str, test: Callable[[], None], why: str) -> LawRow:
-    """Run the test of a law, and return its row."""
-    message, held = "", True
-    with measuring() as found:
+def _row(law: Law, subject: Subject) -> LawRow:
+    """Test a law."""
+    message, why = "", law.why
+    held: bool | None = True
+    # NaN and infinity among the test images are no fault of the caller's arithmetic.
+    with measuring() as found, np.errstate(all="ignore"):
         try:
-            test()
+            law.test(subject, law.limit)
         except AssertionError as error:
-            message, held = str(error).removeprefix(f"{_assertion(name)}: "), False
+            message, held = re.sub(r"\Aassert_\w+: ", "", str(error)), False
+            if law.explain is not None:
+                why = law.explain(subject, why)
         except (TypeError, ValueError) as error:
             # Not of the bloom itself: report has called it before.
-            return LawRow(
-                name=name,
-                held=None,
-                off=math.nan,
-                limit=math.nan,
-                law="",
-                message=str(error),
-                why=why,
-            )
-    worst = max(found, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
+            message, held = str(error), None
+    limited = [one for one in found if not math.isinf(one.allowed)] if held is not None else []
+    worst = max(limited, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
+    figures: dict[str, float] = {}
+    for one in found:
+        figures[one.name] = max(one.off, figures.get(one.name, -math.inf))
     return LawRow(
-        name=name,
+        name=law.name,
         held=held,
         off=worst.off if worst else math.nan,
         limit=worst.allowed if worst else math.nan,
-        law=worst.law if worst else "",
+        figures=MappingProxyType(figures),
+        law=worst.law if worst else law.formula,
         message=message,
         why=why,
-    )
-
-
-def _assertion(name: str) -> str:
-    return "assert_symmetric" if name == "transposed" else f"assert_{name}"
-
-
-def _mean_shift(bloom: Bloom, probe: Probe) -> str:
-    """Return a sentence on the shift of the light over a period of positions."""
-    x, y = (max(0, place - _PERIOD // 2) for place in probe.centre)
-    shifts = []
-    for step in range(min(_PERIOD, probe.size[0] - x, probe.size[1] - y)):
-        place = (x + step, y + step)
-        plane = point_spread.point_spread(bloom, probe, at=place).mean(axis=2)
-        if plane.sum() > 0:
-            centroid = [
-                float((plane.sum(axis=axis) * np.arange(plane.shape[1 - axis])).sum() / plane.sum())
-                for axis in (0, 1)
-            ]
-            shifts.append(np.subtract(centroid, place))
-    if not shifts:
-        return ""
-    mean, least, most = (
-        float(reduce(np.array(shifts)[:, 0])) for reduce in (np.mean, np.min, np.max)
-    )
-    return (
-        f"Measured along x over {len(shifts)} positions: {least:+.3g} to {most:+.3g} pixels, "
-        f"{mean:+.3g} on average"
-        + (
-            "; all positions move alike, as with a missing half texel."
-            if most - least < abs(mean) / 4
-            else "."
-        )
     )

@@ -23,6 +23,7 @@ __all__ = [
     "assert_spread",
     "border_share",
     "check_inside",
+    "measured_spread",
     "point_spread",
     "response",
 ]
@@ -79,7 +80,7 @@ def point_spread(
            [0.0625, 0.125 , 0.0625]])
     """
     __tracebackhide__ = True
-    return _measured(bloom, probe, at)[0]
+    return measured_spread(bloom, probe, at)[0]
 
 
 @checked
@@ -117,7 +118,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     >>> testing.assert_separable(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
-    spread, error = _measured(bloom, probe, None)
+    spread, error = measured_spread(bloom, probe, None)
     _check_lit("assert_separable", spread, error)
     product = np.empty_like(spread)
     shares = []
@@ -184,7 +185,7 @@ def assert_centroid_kept(
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
-    spread, error = _measured(bloom, probe, at)
+    spread, error = measured_spread(bloom, probe, at)
     _check_lit("assert_centroid_kept", spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     place = at or probe.centre
@@ -255,7 +256,7 @@ def assert_spread(
     for number in pair:
         check_number("sigma", number, 0.0, math.inf)
     check_number("rtol", rtol, 0.0, math.inf)
-    spread, error = _measured(bloom, probe, None)
+    spread, error = measured_spread(bloom, probe, None)
     _check_lit("assert_spread", spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     for channel in range(spread.shape[2]):
@@ -431,7 +432,9 @@ def response(
     )
 
 
-def _measured(bloom: Bloom, probe: Probe, at: tuple[int, int] | None) -> tuple[Image, float]:
+def measured_spread(
+    bloom: Bloom, probe: Probe, at: tuple[int, int] | None = None
+) -> tuple[Image, float]:
     """Return the point spread and the error of its values."""
     __tracebackhide__ = True
     place = at or probe.centre

@@ -90,6 +90,7 @@ class Program:
 
     def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
         """Run the program once."""
+        __tracebackhide__ = True
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
             write(source, np.ascontiguousarray(image, np.float32), premultiplied=True)
@@ -117,6 +118,7 @@ class Program:
         return f"command {Path(self._argv[0]).name!r}"
 
     def _run(self, source: str, target: str) -> None:
+        __tracebackhide__ = True
         words = [
             word.replace(_PLACES[0], source).replace(_PLACES[1], target) for word in self._argv
         ]
@@ -144,6 +146,7 @@ class Program:
             )
 
     def _read(self, target: Path) -> NDArray[Any]:
+        __tracebackhide__ = True
         try:
             pixels, about = read(target, premultiplied=True, metadata=True)
         except (OSError, ValueError) as error:

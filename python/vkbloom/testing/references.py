@@ -217,6 +217,7 @@ class ReferenceFolder:
 
 def check_name(name: str) -> None:
     """Raise TypeError or ValueError if the name is not allowed for a reference."""
+    __tracebackhide__ = True
     if not isinstance(name, str):
         raise TypeError(f"name: {name!r} is not a str")
     if not NAME.fullmatch(name):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom.checks import native_order
 from vkbloom.frames import Frames
 from vkbloom.testing import report_parts
 from vkbloom.testing.judging import Verdict, first_failure, judge
@@ -289,6 +290,7 @@ class FrameRegression:
         self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
 
     def _chosen_name(self, name: str | None) -> str:
+        __tracebackhide__ = True
         if name is not None:
             check_name(name)
             return name
@@ -300,6 +302,7 @@ class FrameRegression:
         return self._name
 
     def _check_adapter(self, origin: Origin) -> None:
+        __tracebackhide__ = True
         wanted = self._mode.expect_adapter
         if wanted is None or origin.adapter is None:
             return
@@ -313,6 +316,7 @@ class FrameRegression:
 
         Raises ValueError if the driver has no hash, or no reference has the same hash.
         """
+        __tracebackhide__ = True
         origin = given.origin
         if not origin.driver_sha256:
             raise ValueError(
@@ -344,6 +348,7 @@ class FrameRegression:
             raise AssertionError(message)
 
     def _write(self, given: _Given) -> None:
+        __tracebackhide__ = True
         for framebuffer, image in given.images.items():
             if not given.tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
@@ -417,6 +422,7 @@ def name_of_test(test: str) -> str:
 
 def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     """Return framebuffers by name, in native byte order."""
+    __tracebackhide__ = True
     if isinstance(frames, np.ndarray):
         frames = {"image": frames}
     if not isinstance(frames, Mapping) or not frames:
@@ -427,12 +433,13 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     for name, image in frames.items():
         if not isinstance(image, np.ndarray):
             raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
-        images[name] = image.astype(image.dtype.newbyteorder("="), copy=False)
+        images[name] = native_order(image)
     return images
 
 
 def _check_alone(**tolerances: float | None) -> None:
     """Raise ValueError if a tolerance is given."""
+    __tracebackhide__ = True
     given = [name for name, value in tolerances.items() if value is not None]
     if given:
         raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")

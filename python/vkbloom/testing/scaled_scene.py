@@ -13,11 +13,16 @@ from numpy.typing import NDArray
 
 from vkbloom.argument_types import checked
 from vkbloom.checks import check_number
-from vkbloom.testing.deviations import fail
+from vkbloom.testing.deviations import fail, is_within
 from vkbloom.testing.moving_light import area_sampled
 from vkbloom.testing.probe import Bloom, Image, Probe
 
-__all__ = ["ResolutionResponse", "assert_resolution_independent", "resolution_response"]
+__all__ = [
+    "ResolutionResponse",
+    "assert_resolution_independent",
+    "check_independent",
+    "resolution_response",
+]
 
 _DEFAULT = Probe(size=(128, 128))
 _SCALES: Final = (0.5, 1.0, 2.0, 4.0)
@@ -188,11 +193,16 @@ def assert_resolution_independent(
     __tracebackhide__ = True
     check_number("radius", radius, 0.0, math.inf)
     check_number("peak", peak, 0.0, math.inf)
-    found = resolution_response(bloom, scales, light=light, probe=probe)
-    for what, values, allowed in (
-        ("the radius of 50 % of the light", found.r50, radius),
-        ("the radius of 90 % of the light", found.r90, radius),
-        ("the peak of the bloom", found.peak, peak),
+    check_independent(resolution_response(bloom, scales, light=light, probe=probe), radius, peak)
+
+
+def check_independent(found: ResolutionResponse, radius: float, peak: float) -> None:
+    """Raise AssertionError if radii or peak change by more than a share of their mean."""
+    __tracebackhide__ = True
+    for name, what, values, allowed in (
+        ("r50", "the radius of 50 % of the light", found.r50, radius),
+        ("r90", "the radius of 90 % of the light", found.r90, radius),
+        ("peak", "the peak of the bloom", found.peak, peak),
     ):
         share = "the light's value" if values is found.peak else "the height"
         if not values.mean() > 0:
@@ -202,11 +212,12 @@ def assert_resolution_independent(
                 f"{what} is {values.min():.3g} of {share}: only values above 0 are allowed",
             )
         low, high = int(values.argmin()), int(values.argmax())
-        change = (values[high] - values[low]) / values.mean()
-        if change > allowed:
+        change = float((values[high] - values[low]) / values.mean())
+        law = f"{what} is the same share of {share} at all sizes"
+        if not is_within(law, change, allowed, name):
             fail(
                 "assert_resolution_independent",
-                f"{what} is the same share of {share} at all sizes",
+                law,
                 f"{what} is {values[low]:.4g} of {share} at {_shown(found.sizes[low])} and "
                 f"{values[high]:.4g} at {_shown(found.sizes[high])}: off by {change:.3g} of the "
                 f"mean, {allowed:.3g} allowed",

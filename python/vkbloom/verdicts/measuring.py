@@ -1,8 +1,7 @@
-"""Measures a bloom: laws, stability, resolution, energy, veiling glare, its twin, its likes."""
+"""What `vkbloom check` measures: a bloom of settings or of a program, its times and its likes."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -19,48 +18,16 @@ from vkbloom.own.method import OwnMethod
 from vkbloom.psf.sampled import samples
 from vkbloom.renderer import Renderer
 from vkbloom.settings import Settings
-from vkbloom.testing import laws
-from vkbloom.testing.deviations import compare_with_law, fail, is_within
-from vkbloom.testing.law_report import LawReport, LawRow, fitting_probe, law_report, law_row
-from vkbloom.testing.moving_light import Stability, stability
-from vkbloom.testing.point_spread import border_share, point_spread
+from vkbloom.testing.law_report import LawReport, law_report
+from vkbloom.testing.law_table import LAWS
+from vkbloom.testing.point_spread import border_share
 from vkbloom.testing.probe import Bloom, Probe
-from vkbloom.testing.scaled_scene import ResolutionResponse, resolution_response
+from vkbloom.testing.programs import COARSE_ERROR, Program
+from vkbloom.testing.subject import Subject, fitting_probe
 from vkbloom.testing.veiling_glare import veiling_glare_index
-from vkbloom.verdicts.subjects import Subject, exact, shown
 
 Array = NDArray[np.float64]
 
-#: Why a bloom that is no fault may break the laws that only a check tests.
-WHY: Final = {
-    "energy": "Light is lost where taps skip pixels, weights do not add up to 1, or the border "
-    "reads black; with a threshold, a small light is another share of what is above it.",
-    "colour": "A threshold or a clamp of each channel alone changes the hue. A tint or a coloured "
-    "kernel does so on purpose.",
-    "stability": "A chain of halved images whose filter skips pixels gives a small light another "
-    "brightness at each position: it shimmers. The peak of a narrow bloom changes with the share "
-    "of the light that its pixel gets.",
-    "resolution": "A width in pixels, or a fixed number of levels, is another share of the picture "
-    "at each size.",
-    "finite": "NaN and infinity spread through every average; a pass that reads them must replace "
-    "them first.",
-    "reference": "The twin computes something else, rounds differently, or reads other pixels at "
-    "the border.",
-}
-#: Limits of the figures of a moving light, as in `testing.assert_stable`.
-STEADY: Final = {"ripple": 0.02, "jitter": 0.1, "flicker": 0.1, "growth": 0.05}
-#: Allowed share of the light that is lost or gained.
-LOST: Final = 0.02
-#: Allowed changes over four sizes, as in `testing.assert_resolution_independent`.
-CHANGED: Final = {"r50": 0.1, "r90": 0.1, "peak": 0.2}
-#: Allowed difference from the twin, as a share of the framebuffer's largest value.
-OF_TWIN: Final = 1e-3
-#: Sum of a light that is above thresholds where it falls on four pixels.
-LAMP: Final = 1000.0
-#: Share of the light that may lie in the outermost pixels if its sum is to mean anything.
-AT_BORDER: Final = 1e-3
-TEXEL: Final = 8
-COLOUR: Final = (1.0, 0.5, 0.25)
 VIEW: Final = (256, 144)
 
 
@@ -79,81 +46,116 @@ class Spread:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """All that was measured of a bloom. `passes`: seconds; `twin`: differences, by framebuffer."""
+class Measured:
+    """All that was measured of a bloom. `passes`: seconds at `size`."""
 
     name: str
     device: str
     settings: Settings | None
     size: tuple[int, int]
     passes: Mapping[str, float]
+    subject: Subject
     report: LawReport
-    rows: tuple[LawRow, ...]
     spread: Spread
-    stability: Stability
-    resolution: ResolutionResponse
     veiling_glare_index: float
-    twin: Mapping[str, float]
     nearest: tuple[str, float]
 
-    def row(self, name: str) -> LawRow | None:
-        """Return the row of a law; None if there is none."""
-        return next((row for row in self.rows if row.name == name), None)
+
+def exact(settings: Settings) -> Settings:
+    """Return the settings with buffers of floats, and nothing after the composite."""
+    plain = settings.replace(tonemap="none", encoding="none", exposure=0.0, dither=False)
+    return plain if plain.format is not None else plain.replace(format="rgba32float")
+
+
+def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
+    """Return the colours of a framebuffer as a function of the image."""
+
+    def bloom(image: NDArray[Any]) -> NDArray[Any]:
+        return renderer.apply(image, settings, attachments=framebuffer)[framebuffer][..., :3]
+
+    return bloom
+
+
+def of_settings(
+    renderer: Renderer, settings: Settings, size: tuple[int, int], gain: float | None
+) -> Subject:
+    """Return the bloom of settings.
+
+    An own bloom is expected to keep the light of flat images, others to have the gain that a flat
+    image gets in its middle.
+    """
+    used = exact(settings)
+    bloom = shown(renderer, used, "bloom")
+    subject = Subject(
+        bloom=bloom,
+        probe=fitting_probe(bloom, Probe(size=size)),
+        picture=shown(renderer, used, "final"),
+        intensity=used.intensity if used.composite == "add" else None,
+        gain=gain,
+        differences=lambda: differences(renderer, used),
+    )
+    if gain is None:
+        own = isinstance(used, OwnMethod) and used.file.saves_bloom
+        subject.gain = 1.0 if own else subject.measured_gain
+    return subject
+
+
+def of_program(
+    program: Program, size: tuple[int, int], gain: float | None, *, less_input: bool
+) -> Subject:
+    """Return the bloom of a program, which is run once to see what it writes."""
+    probe = Probe(size=size)
+    program(probe.given(probe.flat(0.0)))
+    if program.bits is not None:
+        probe = Probe(size=size, atol=COARSE_ERROR)
+
+    def difference(image: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(program(image)[..., :3] - image)
+
+    bloom: Bloom = difference if less_input else program
+    subject = Subject(
+        bloom=bloom,
+        probe=fitting_probe(bloom, probe),
+        picture=program if less_input else None,
+        gain=1.0 if gain is None else gain,
+    )
+    if program.bits is not None:
+        subject.highest = 1.0
+    return subject
 
 
 def measured(
     subject: Subject,
     renderer: Renderer,
     *,
+    name: str,
     device: str,
+    settings: Settings | None,
     passes: Mapping[str, float],
     frame: tuple[int, int],
+    required: tuple[str, ...],
     progress: Callable[[str], None],
-) -> Verdict:
+) -> Measured:
     """Measure a bloom."""
-    progress("laws")
-    probe = fitting_probe(subject.bloom, subject.probe)
-
-    def additive() -> None:
-        if subject.settings is not None and subject.settings.composite == "add":
-            laws.assert_additive(subject.picture, subject.bloom, subject.intensity, probe)
-        else:
-            laws.assert_additive(subject.picture, probe=probe)
-
-    report = law_report(subject.bloom, probe, gain=subject.gain, additive=additive)
-    # A light that a threshold lets through wherever it falls.
-    lamp = probe if probe.value <= 1 else dataclasses.replace(probe, value=LAMP)
-    progress("stability")
-    steady = stability(subject.bloom, texel=TEXEL, steps=subject.steps, probe=lamp)
-    progress("resolution")
-    response = resolution_response(subject.bloom, probe=dataclasses.replace(probe, size=(128, 128)))
-    spread = spread_of(point_spread(subject.bloom, lamp), lamp)
-    twin, reference_row = twin_differences(subject, renderer)
-    rows = [
-        *report.rows,
-        law_row("energy", lambda: energy(spread, report.gain), WHY["energy"]),
-        law_row("colour", lambda: colour(subject.bloom, probe), WHY["colour"]),
-        law_row("stability", lambda: steadiness(steady), WHY["stability"]),
-        law_row("resolution", lambda: same_response(response), WHY["resolution"]),
-        law_row("finite", lambda: finite(subject.picture, probe), WHY["finite"]),
-    ]
+    report = law_report(subject, LAWS, required, progress)
+    probe = subject.probe
     progress("presets")
-    return Verdict(
-        name=subject.name,
+    return Measured(
+        name=name,
         device=device,
-        settings=subject.settings,
+        settings=settings,
         size=frame,
         passes=passes,
+        subject=subject,
         report=report,
-        rows=(*rows, reference_row) if reference_row else tuple(rows),
-        spread=spread,
-        stability=steady,
-        resolution=response,
+        spread=spread_of(subject.spread, subject.lamp),
         veiling_glare_index=veiling_glare_index(
-            subject.picture, size=probe.size, patch=max(1, min(probe.size) // 8), value=probe.value
+            subject.picture or subject.bloom,
+            size=probe.size,
+            patch=max(1, min(probe.size) // 8),
+            value=probe.value,
         ),
-        twin=twin,
-        nearest=nearest_preset(subject, renderer),
+        nearest=nearest_preset(name, subject.bloom, renderer),
     )
 
 
@@ -209,97 +211,10 @@ def spread_of(array: Array, probe: Probe) -> Spread:
     )
 
 
-def energy(spread: Spread, gain: float) -> None:
-    """Assert that a lit pixel keeps the share of its light that a flat image keeps."""
-    if spread.at_border > AT_BORDER:
-        raise ValueError(
-            f"of the light of a pixel, {100 * spread.at_border:.3g} % lies in the outermost "
-            "pixels; a larger size is needed"
-        )
-    law = "the bloom of a lit pixel has the light of the pixel, times the gain of flat images"
-    off, allowed = abs(spread.energy - gain), LOST * max(gain, spread.energy)
-    if not is_within(law, off, allowed):
-        fail(
-            "assert_energy",
-            law,
-            f"{spread.energy:.4g} instead of {gain:.4g}: off by {off:.3g}, {allowed:.3g} allowed",
-        )
-
-
-def colour(bloom: Bloom, probe: Probe) -> None:
-    """Assert that all channels of a flat coloured image get the same gain."""
-    image = probe.flat(probe.value) * np.array(COLOUR)
-    result, error = probe.apply(bloom, image)
-    compare_with_law(
-        "assert_colour",
-        "all channels of a coloured image get the same gain",
-        result,
-        image * (result.mean() / image.mean()),
-        error,
-    )
-
-
-def steadiness(found: Stability) -> None:
-    """Assert that a light that moves by parts of a pixel neither flickers nor jumps."""
-    if not found.energy.max() > 0:
-        raise ValueError("the bloom of a small light is black")
-    judged(
-        "assert_stability",
-        "while a light smaller than a pixel moves, its bloom keeps energy, place, peak and radius",
-        {name: (getattr(found, name), limit) for name, limit in STEADY.items()},
-    )
-
-
-def same_response(found: ResolutionResponse) -> None:
-    """Assert that the bloom is the same share of the picture at all sizes."""
-    figures = {"r50": found.r50, "r90": found.r90, "peak": found.peak}
-    if not all(values.mean() > 0 for values in figures.values()):
-        raise ValueError("the bloom of a light is black at some size")
-    judged(
-        "assert_resolution",
-        "radii and peak are the same share of the picture at all sizes",
-        {name: (float(np.ptp(v) / v.mean()), CHANGED[name]) for name, v in figures.items()},
-    )
-
-
-def judged(assertion: str, law: str, figures: Mapping[str, tuple[float, float]]) -> None:
-    """Assert that figures are within their limits; the message names those that are not."""
-    # Without a figure, such as the radius of a negative variance, there is nothing to judge.
-    known = {name: one for name, one in figures.items() if math.isfinite(one[0])}
-    over = [name for name, (off, limit) in known.items() if not is_within(law, off, limit)]
-    if over:
-        told = ", ".join(
-            f"{name} changes by {known[name][0]:.3g}, {known[name][1]:g} allowed" for name in over
-        )
-        fail(assertion, law, told.replace("jitter changes by", "jitter in pixels is"))
-
-
-def finite(picture: Bloom, probe: Probe) -> None:
-    """Assert that NaN and infinity stay at their own pixel."""
-    law = "NaN and infinity of a pixel do not reach others"
-    x, y = probe.centre
-    for value in (math.nan, math.inf):
-        image = probe.noise(0, probe.value)
-        image[y, x] = value
-        result = np.atleast_3d(np.asarray(picture(probe.given(image))))
-        reached = ~np.isfinite(result).all(axis=2)
-        reached[y, x] = False
-        count = int(reached.sum())
-        if not is_within(law, count, 0):
-            fail(
-                "assert_finite",
-                law,
-                f"{value} at x {x}, y {y} reaches {count} other pixels: 0 allowed",
-            )
-
-
-def twin_differences(
-    subject: Subject, renderer: Renderer
-) -> tuple[dict[str, float], LawRow | None]:
+def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     """Return the difference from the reference by framebuffer, as a share of its largest value."""
-    settings = subject.settings
-    if settings is None or (isinstance(settings, OwnMethod) and type(settings).twin is None):
-        return {}, None
+    if isinstance(settings, OwnMethod) and type(settings).twin is None:
+        return {}
     image = noise((96, 64), 2).astype(np.float32)
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
@@ -310,26 +225,18 @@ def twin_differences(
             raise ValueError(f"the twin's {name} has the shape {wanted.shape}, not {got.shape}")
         largest = float(np.abs(wanted).max()) or 1.0
         found[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
-
-    def test() -> None:
-        law = "each framebuffer is that of the twin"
-        over = [name for name, off in found.items() if not is_within(law, off, OF_TWIN)]
-        if over:
-            told = ", ".join(f"{name} is off by {found[name]:.3g}" for name in over)
-            fail("assert_reference", law, f"{told} of its largest value, {OF_TWIN:g} allowed")
-
-    return found, law_row("reference", test, WHY["reference"])
+    return found
 
 
-def nearest_preset(subject: Subject, renderer: Renderer) -> tuple[str, float]:
+def nearest_preset(own: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
     """Return the other preset whose bloom of four lights is nearest, at its best intensity."""
     image = lights(VIEW)
-    target = np.asarray(subject.bloom(image))[..., :3].astype(np.float64)
+    target = np.asarray(bloom(image))[..., :3].astype(np.float64)
     if not np.linalg.norm(target) > 0:
         return "", math.nan
     found = {}
     for name in presets:
-        if subject.name == name:
+        if own == name:
             continue
         light = preset_bloom(renderer, name).astype(np.float64)
         power = float((light * light).sum())
@@ -349,16 +256,3 @@ def preset_bloom(renderer: Renderer, name: str) -> NDArray[Any]:
     if key not in _BLOOMS:
         _BLOOMS[key] = shown(renderer, exact(presets[name]), "bloom")(lights(VIEW))
     return _BLOOMS[key]
-
-
-def plain(value: Any) -> Any:
-    """Return a value for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {name: plain(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value

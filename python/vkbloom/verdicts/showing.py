@@ -5,53 +5,50 @@ from __future__ import annotations
 import base64
 import html
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
+import click
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.fits.result import diagram
+from vkbloom.fits.translating import lights
 from vkbloom.psf.sampled import samples
-from vkbloom.testing.law_report import LawRow
-from vkbloom.verdicts.measuring import Verdict, plain
+from vkbloom.testing.law_report import LawReport, LawRow
+from vkbloom.verdicts.measuring import VIEW, Measured
 from vkbloom.views.pictures import picture, png
 
 _STYLE: Final = (
     "body{font:15px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;"
     "color-scheme:light dark}td,th{padding:2px 12px 2px 0;vertical-align:top;text-align:left}"
     "td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
-    "tr.no th{color:#c33}"
     "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
 )
+_OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
+#: Colours of rows in a terminal, as `law_report.COLOURS` in HTML.
+_COLOURS: Final = {"required": "red", "broken": "yellow", "untested": "bright_black"}
 
 
-def as_text(found: Verdict, *, required: tuple[str, ...] = ()) -> str:
-    """Return tables for a terminal; the laws of `required` are marked."""
+def as_text(found: Measured) -> str:
+    """Return tables for a terminal; broken laws are red if they are required, else yellow."""
     lines = [f"{found.name}, on {found.device}", ""]
     width, height = found.size
     lines.append(f"passes at {width} x {height}{'':<10} ms")
     for name, seconds in found.passes.items():
         lines.append(f"  {name:<24}{1000 * seconds:8.3f}")
     lines.append(f"  {'together':<24}{1000 * sum(found.passes.values()):8.3f}")
-    probe = found.report.probe
-    side = " x ".join(map(str, probe.size))
-    lines += ["", f"laws, on {side} with values up to {probe.value:g}"]
-    lines.append(f"  {'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}")
-    for row in found.rows:
-        mark = " required" if row.name in required else ""
-        lines.append(f"  {row.name:<18} {row.words:<11} {_figures(row)}{mark}".rstrip())
-    lines += ["", "figures", *(f"  {name:<24}{text}" for name, text in figures(found).items())]
-    broken = [row for row in found.rows if not row.held]
-    if broken:
-        lines += ["", "laws that are not held"]
-    for row in broken:
-        lines += [f"  {row.name}: {_one_line(row)}", f"    why: {row.why}"]
+    lines += ["", "figures", *(f"  {name:<24}{text}" for name, text in figures(found).items()), ""]
+    report = found.report
+    kinds = {row.name: report.kind(row) for row in report.rows}
+    for line in str(report).splitlines():
+        kind = kinds.get(line.partition(" ")[0].rstrip(":"), "held")
+        lines.append(click.style(line, fg=_COLOURS[kind]) if kind in _COLOURS else line)
     return "\n".join(lines)
 
 
-def figures(found: Verdict) -> dict[str, str]:
+def figures(found: Measured) -> dict[str, str]:
     """Return the figures as words, by their name."""
-    spread, steady, response = found.spread, found.stability, found.resolution
+    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
     sizes = ", ".join(f"{height}" for _, height in response.sizes)
     texts = {
         "gain of flat images": f"{found.report.gain:.4g}",
@@ -59,7 +56,8 @@ def figures(found: Verdict) -> dict[str, str]:
         "point spread": f"50 % within {spread.r50:g} and 90 % within {spread.r90:g} pixels, "
         f"peak {spread.peak:.3g}",
         "moving light": f"ripple {_percent(steady.ripple)}, jitter {steady.jitter:.2g} pixels, "
-        f"flicker {_percent(steady.flicker)}, growth {_percent(steady.growth)}",
+        f"flicker {_percent(steady.flicker)} ({_percent(steady.shimmer)} beside a convolution), "
+        f"growth {_percent(steady.growth)}",
         "radius of 90 %": f"{', '.join(_percent(value) for value in response.r90)} of the height "
         f"at heights of {sizes}",
         "veiling glare index": f"{found.veiling_glare_index:.3g} %",
@@ -67,24 +65,27 @@ def figures(found: Verdict) -> dict[str, str]:
         if found.nearest[0]
         else "none: the bloom is black",
     }
-    if found.twin:
+    if found.subject.reference:
         texts["from its reference"] = ", ".join(
-            f"{name} {off:.2g}" for name, off in found.twin.items()
+            f"{name} {off:.2g}" for name, off in found.subject.reference.items()
         )
     return texts
 
 
-def as_values(found: Verdict, required: tuple[str, ...]) -> dict[str, Any]:
+def as_values(found: Measured) -> dict[str, Any]:
     """Return everything as plain values; what is not a number is None."""
-    spread, steady, response = found.spread, found.stability, found.resolution
-    value: dict[str, Any] = plain(
+    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
+    value: dict[str, Any] = _plain(
         {
             "name": found.name,
             "adapter": found.device,
             "settings": None if found.settings is None else found.settings.to_dict(),
             "size": found.size,
             "passes": [{"name": name, "seconds": s} for name, s in found.passes.items()],
-            "laws": {row.name: _values(row) for row in found.rows},
+            "laws": {
+                row.name: {name: getattr(row, name) for name in _OF_A_LAW}
+                for row in found.report.rows
+            },
             "gain": found.report.gain,
             "energy": spread.energy,
             "psf": {
@@ -92,37 +93,32 @@ def as_values(found: Verdict, required: tuple[str, ...]) -> dict[str, Any]:
                 for name in ("r50", "r90", "peak", "at_border", "radii", "encircled")
             },
             "stability": {
-                name: getattr(steady, name) for name in ("ripple", "jitter", "flicker", "growth")
+                name: getattr(steady, name)
+                for name in ("ripple", "jitter", "flicker", "shimmer", "growth")
             },
             "resolution": {
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
             "veiling_glare_index": found.veiling_glare_index,
-            "reference": found.twin or None,
+            "reference": found.subject.reference or None,
             "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
-            "required": required,
-            "passed": not broken(found, required),
+            "required": found.report.required,
+            "passed": not broken(found.report),
         }
     )
     return value
 
 
-def broken(found: Verdict, required: tuple[str, ...]) -> list[LawRow]:
+def broken(report: LawReport) -> list[LawRow]:
     """Return the required laws that are not held."""
-    return [row for row in found.rows if row.name in required and not row.held]
+    return [row for row in report.rows if row.name in report.required and not row.held]
 
 
-def as_page(found: Verdict, pictures: dict[str, NDArray[Any]], required: tuple[str, ...]) -> str:
+def as_page(found: Measured) -> str:
     """Return a page with tables, the point spread with its curve, and pictures."""
-    spread = found.spread
-    rows = "".join(
-        f'<tr class="{"yes" if row.held else "no"}"><th scope="row">{row.name}'
-        f"{' (required)' if row.name in required else ''}</th><td>{row.words}</td>"
-        + "".join(f'<td class="n">{text}</td>' for text in _cells(row))
-        + f"<td>{'' if row.held else html.escape(_one_line(row)) + '<br><i>' + row.why + '</i>'}"
-        "</td></tr>"
-        for row in found.rows
-    )
+    spread, subject = found.spread, found.subject
+    scene = lights(VIEW)
+    pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = "".join(
         f'<tr><th scope="row">{html.escape(name)}</th>'
         f'<td class="n">{1000 * seconds:.3f} ms</td></tr>'
@@ -150,8 +146,8 @@ def as_page(found: Verdict, pictures: dict[str, NDArray[Any]], required: tuple[s
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom check: {name}</title>'
         f"<style>{_STYLE}</style><body><h1>{name}</h1><p>On {html.escape(found.device)}.</p>"
-        f"<h2>Pictures</h2>{images}{curve}<h2>Laws</h2><table><thead><tr><th>law</th><th>held</th>"
-        f"<th>off by</th><th>allowed</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
+        f"<h2>Pictures</h2>{images}{curve}<h2>Laws</h2>"
+        f"{found.report._repr_html_()}"
         f"<h2>Figures</h2><table>{words}</table>"
         f"<h2>Passes at {width} x {height}</h2><table>{times}</table></body></html>\n"
     )
@@ -161,41 +157,18 @@ def _width(name: str) -> int:
     return 256 if name.startswith("point") else 384
 
 
-def _cells(row: LawRow) -> list[str]:
-    return ["", ""] if math.isnan(row.off) else [f"{row.off:.3g}", f"{row.limit:.3g}"]
-
-
-def _figures(row: LawRow) -> str:
-    off, limit = _cells(row)
-    return f"{off:>9} {limit:>9}"
-
-
-def _one_line(row: LawRow) -> str:
-    return " ".join(row.message.replace("\n  law:", "; law:").split())
-
-
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
 
 
-def _values(row: LawRow) -> dict[str, Any]:
-    return {
-        "held": row.held,
-        "off": float(row.off),
-        "limit": float(row.limit),
-        "law": row.law,
-        "message": row.message,
-        "why": row.why,
-    }
-
-
-def lit_scene(size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the picture of the page: lights of several sizes and colours on dark grey."""
-    width, height = size
-    image = np.full((height, width, 3), 0.02, np.float32)
-    y, x = np.mgrid[:height, :width]
-    for number, value in enumerate(((9, 6, 3), (2, 5, 9), (8, 2, 2), (6, 6, 6))):
-        centre = ((0.2 + 0.2 * number) * width, (0.35 + 0.3 * (number % 2)) * height)
-        inside = np.hypot(x - centre[0], y - centre[1]) < height / (40 - 9 * number)
-        image[inside] = value
-    return image
+def _plain(value: Any) -> Any:
+    """Return a value for JSON, which has neither NaN nor infinity."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom.checks import as_float, check_number, import_extra
+from vkbloom.checks import as_float, check_number, import_extra, native_order
 from vkbloom.io.srgb import decode_srgb
 
 __all__ = [
@@ -243,7 +243,7 @@ def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
         raise ValueError(
             f"{name}: shape {image.shape} is not (H, W) or (H, W, C) with sides of at least 1"
         )
-    return np.atleast_3d(image)
+    return np.atleast_3d(native_order(image))
 
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:

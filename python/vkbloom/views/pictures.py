@@ -66,7 +66,8 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         data = base64.b64encode(png(picture)).decode("ascii")
         # Show the pixels of an enlarged pyramid level without smoothing.
         rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
-        label, size = html.escape(name), html.escape(_described(array) + _ranged(array))
+        label = html.escape(name)
+        size = html.escape(_described(array, _note(frames, name)) + _ranged(array))
         if stops != 0:
             size += f", shown at {stops:g} stops"
         page.append(
@@ -128,7 +129,8 @@ def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) 
     for name, array in frames.items():
         fit = min(width / array.shape[1], height / array.shape[0])
         picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
-        tiles.append((picture, name, _described(array)))
+        note = _note(frames, name)
+        tiles.append((picture, f"{name}: {note}" if note else name, _described(array)))
     version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
     title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
     return sheet_png(tiles, columns, (width, height), title)
@@ -273,8 +275,13 @@ def _aspect(arrays: Framebuffers) -> float:
     return float(min(max(width / height, 0.5), 3.0))
 
 
-def _described(array: NDArray[Any]) -> str:
-    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}"
+def _described(array: NDArray[Any], note: str = "") -> str:
+    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}" + (f", {note}" if note else "")
+
+
+def _note(frames: Framebuffers, name: str) -> str:
+    """Return what a framebuffer shows where its name does not tell it."""
+    return frames.settings.glow_note if name == "glow" else ""
 
 
 def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:

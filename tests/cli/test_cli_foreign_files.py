@@ -1,0 +1,126 @@
+"""``vkbloom apply`` of files of other programs, and files that a signal leaves unfinished."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import vkbloom
+from tests.io import foreign
+from tests.io.profiles import store_png
+from vkbloom import large_files
+from vkbloom.cli.program import program
+from vkbloom.io.image_reading import load
+from vkbloom.io.rows import opened_rows
+
+oiio = pytest.importorskip("OpenImageIO")
+
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
+# Ends the process while a file is written: in another thread, if there are several.
+SLOW = """
+import sys, time
+from vkbloom import cli
+from vkbloom.io import safe_writing
+
+def check(*_):
+    print("unfinished", flush=True)
+    time.sleep(120)
+
+safe_writing.check_complete = check
+sys.argv = ["vkbloom", "apply", *sys.argv[1:]]
+cli.main()
+"""
+
+
+def apply(*words: object) -> Result:
+    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+
+
+@pytest.mark.parametrize("under", [0, 255])
+@pytest.mark.parametrize("is_large", [False, True])
+def test_colours_under_alpha_0_are_told(
+    tmp_path: Path, under: int, is_large: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_large:
+        monkeypatch.setattr(large_files, "LARGE", 1)
+    pixels = np.full((48, 64, 4), under, np.uint8)
+    pixels[..., 3] = 0
+    pixels[20:28, 28:36] = (200, 40, 40, 255)
+    path = store_png(tmp_path / "a.png", pixels)
+    result = apply(path, tmp_path / "b.png")
+    assert result.exit_code == 0, result.output
+    assert ("where alpha is 0" in result.stderr) is (under == 255)
+    assert ("(--alpha blur) leave them out" in result.stderr) is (under == 255)
+    assert apply(path, tmp_path / "c.png", "--alpha", "blur").stderr == ""
+    shown = load(tmp_path / "c.png").pixels[24, 32]
+    assert np.abs(shown.astype(int) - (200, 40, 40, 255)).max() <= 2
+
+
+@pytest.mark.parametrize("size", [40, 124])
+def test_a_screenshot_stays_opaque(tmp_path: Path, size: int) -> None:
+    foreign.bmp(tmp_path / "a.bmp", np.full((24, 32), 0xDC5A28, np.uint32), size)
+    assert apply(tmp_path / "a.bmp", tmp_path / "b.png").exit_code == 0
+    assert load(tmp_path / "b.png").channels == ("R", "G", "B")
+
+
+def test_ultra_hdr_starts_from_photo(tmp_path: Path, renderer: vkbloom.Renderer) -> None:
+    spec = oiio.ImageSpec(64, 64, 3, "half")
+    spec.attribute("jpeg:ultrahdr", 1)
+    spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
+    writer = oiio.ImageOutput.create("a.jpg")
+    assert writer.open(str(tmp_path / "a.jpg"), spec)
+    assert writer.write_image(np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
+    assert writer.close()
+    assert apply(tmp_path / "a.jpg", tmp_path / "b.exr").exit_code == 0
+    image = vkbloom.read(tmp_path / "a.jpg")
+    expected = renderer.apply(image, vkbloom.presets["photo"])["final"]
+    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
+
+
+@pytest.mark.parametrize("suffix", ["rla", "tif", "webp"])
+def test_large_files(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pixels = np.random.default_rng(0).random((40, 48, 3), np.float32)
+    path = vkbloom.write(tmp_path / f"a.{suffix}", pixels, bits=8)
+    words = (path, tmp_path / "b.png", "--preset", "kino")
+    assert apply(*words).exit_code == 0
+    at_once = load(tmp_path / "b.png").pixels
+    monkeypatch.setattr(large_files, "LARGE", 1)
+    result = apply(*words)
+    assert result.exit_code == 0, result.output
+    assert np.array_equal(load(tmp_path / "b.png").pixels, at_once)
+    with opened_rows(path) as rows:
+        assert rows.size == (48, 40)
+
+
+@pytest.mark.parametrize("kept", [20, 60, 200])
+def test_a_damaged_png_is_one_line(tmp_path: Path, kept: int) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (16, 16, 3), np.uint8)
+    content = store_png(tmp_path / "a.png", pixels).read_bytes()
+    (tmp_path / "a.png").write_bytes(content[:18] + b"\7" + content[19:kept])
+    words = [sys.executable, "-m", "vkbloom.cli", "apply", "a.png", "b.png"]
+    ended = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("vkbloom: a.png: ")
+
+
+@pytest.mark.parametrize("suffix", ["png", "exr"])
+def test_a_signal_leaves_no_file(tmp_path: Path, suffix: str) -> None:
+    store_png(tmp_path / "a.png", np.zeros((16, 16, 3), np.uint8))
+    words = [sys.executable, "-c", SLOW, "a.png", f"b.{suffix}", "--adapter", "software"]
+    running = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert running.stdout is not None
+    assert "unfinished\n" in running.stdout
+    assert len(os.listdir(tmp_path)) == 2
+    running.send_signal(signal.SIGTERM)
+    assert running.wait(30) == -signal.SIGTERM
+    running.stdout.close()
+    assert os.listdir(tmp_path) == ["a.png"]

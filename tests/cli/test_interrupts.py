@@ -1,0 +1,80 @@
+"""Ctrl-C ends the program with the status 130 and one line, at any moment of its start."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.processes import python
+
+# Sends SIGINT to itself at an import, counted from the moment at which the program answers it.
+AT_AN_IMPORT = """
+import os, runpy, signal, sys
+
+left, way = int(sys.argv.pop(1)), sys.argv.pop(1)
+
+def at_import(event, _):
+    global left
+    answer = getattr(signal.getsignal(signal.SIGINT), "__name__", "")
+    if event == "import" and (left < FIRST or answer == "leave"):
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+
+FIRST = left
+sys.addaudithook(at_import)
+if way == "script":
+    from vkbloom.cli import main
+    main()
+else:
+    runpy.run_module("vkbloom", run_name="__main__")
+"""
+IMPORTS = sorted({1, 2, 3, *random.Random(5).sample(range(4, 300), 9)})
+
+
+@pytest.mark.parametrize("way", ["script", "module"])
+@pytest.mark.parametrize("number", IMPORTS)
+def test_at_an_import(number: int, way: str) -> None:
+    ended = python("-c", AT_AN_IMPORT, str(number), way, "glares", "--json")
+    assert (ended.returncode, ended.stderr) == (130, "vkbloom: interrupted\n")
+
+
+@pytest.mark.parametrize("words", [("adapters",), ("apply", "a.exr", "b.exr")])
+def test_at_any_time(tmp_path: Path, words: tuple[str, ...]) -> None:
+    vkbloom.write(tmp_path / "a.exr", np.ones((16, 16, 3), np.float32))
+    code = "print(flush=True); from vkbloom.cli import main; main()"
+    chosen = random.Random(7)
+    for _ in range(8):
+        with subprocess.Popen(
+            [sys.executable, "-c", code, *words],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            # Before it, Python itself would answer.
+            time.sleep(chosen.uniform(0.05, 1.0))
+            process.send_signal(signal.SIGINT)
+            _, stderr = process.communicate()
+        left = [line for line in stderr.splitlines() if "darkens" not in line]
+        # What was done before the signal came is a success.
+        assert (process.returncode, left) in [(130, ["vkbloom: interrupted"]), (0, [])], stderr
+        assert {file.name for file in tmp_path.iterdir()} <= {"a.exr", "b.exr"}
+
+
+def test_what_ignores_interrupts_goes_on_to_do_so() -> None:
+    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN);" + AT_AN_IMPORT.replace(
+        'answer == "leave"', "True"
+    )
+    ended = python("-c", code, "20", "script", "glares", "--json")
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -1,0 +1,174 @@
+"""What other code does while a renderer uses CUDA, over the stand-in for libcuda; prints JSON.
+
+Arguments: as for device_work.py. Code of producers, other threads and callbacks, and captures
+of graphs come in the middle of calls.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import gc
+import sys
+import threading
+import types
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.device.device_work import ADAPTER, VALIDATION, Interfaced, OnDevice, main, raises, same
+from tests.images import picture
+from vkbloom import Renderer, Separable
+
+SETTINGS = Separable()
+cuda: Any = ctypes.CDLL("libcuda.so.1")
+#: A stream of the host.
+STREAM = ctypes.c_void_p(7)
+
+
+class Running(OnDevice):
+    """Runs code when it is exported."""
+
+    def __init__(self, array: Any, code: Any):
+        super().__init__(array)
+        self.during = code
+
+    def __dlpack__(self, *, stream: int | None = None) -> Any:
+        self.during(stream)
+        return super().__dlpack__(stream=stream)
+
+
+def closing(_: Any) -> None:
+    """A producer closes the renderer, or another thread does so meanwhile."""
+
+    def here(other: Any) -> None:
+        other.close()
+
+    def beside(other: Any) -> None:
+        thread = threading.Thread(target=other.close)
+        thread.start()
+        thread.join()
+
+    image = picture(24, 16)
+    for close in (here, beside):
+        for first in (False, True):
+            other: Any = Renderer(ADAPTER, validation=VALIDATION)
+            kept = other.apply(OnDevice(image), SETTINGS) if first else None
+            given = Running(image, lambda _, other=other, close=close: close(other))
+            raises(ValueError, "the renderer is closed", lambda: other.apply(given, SETTINGS))  # noqa: B023
+            del kept
+            gc.collect()
+
+
+def addresses(renderer: Any) -> set[int]:
+    frames = renderer.apply(OnDevice(picture(24, 16)), SETTINGS)
+    return {frames[name].__cuda_array_interface__["data"][0] for name in frames}
+
+
+def failing(renderer: Any) -> None:
+    """Memory is not used again unless CUDA tells that its last use is over."""
+    used: set[int] = set()
+    # An event that could be recorded is asked.
+    for names in (b"cuCtxRecordEvent cuCtxSynchronize", b"cuEventQuery cuCtxSynchronize"):
+        cuda.stand_in_fail(names)
+        for _ in range(2):
+            new = addresses(renderer)
+            assert not used & new
+            used |= new
+    cuda.stand_in_fail(b"")
+    assert used & addresses(renderer)
+
+
+def join(stream: int | None) -> None:
+    """Make a stream wait for the captured one, as producers do."""
+    event = ctypes.c_void_p()
+    assert cuda.cuEventCreate(ctypes.byref(event), 2) == 0
+    assert cuda.cuEventRecord(event, STREAM) == 0
+    assert cuda.cuStreamWaitEvent(ctypes.c_void_p(stream), event, 0) == 0
+    assert cuda.cuEventDestroy_v2(event) == 0
+
+
+def captures(renderer: Any) -> None:
+    """A call in a capture of a graph is an error that leaves the capture as it is."""
+    image = picture(24, 16)
+    wanted = renderer.apply(image, SETTINGS)
+    part = "CUDA graph: the stream is being captured"
+    for case in range(6):
+        kept = renderer.apply(OnDevice(image), SETTINGS)
+        final = kept["final"]
+        cuda.stand_in_capture(STREAM)
+        match case:
+            case 0:  # arrays are collected, or read on the host
+                del kept
+                gc.collect()
+                np.testing.assert_array_equal(final.numpy(), wanted["final"])
+            case 1:
+                given = Running(image, join)
+                raises(vkbloom.Error, part, lambda: renderer.apply(given, SETTINGS))  # noqa: B023
+                raises(vkbloom.Error, part, lambda: renderer.apply(OnDevice(image), SETTINGS))
+                raises(vkbloom.Error, part, final.numpy)
+            case 2:
+                from_stream = Interfaced(image, stream=7)
+                raises(vkbloom.Error, part, lambda: renderer.apply(from_stream, SETTINGS))  # noqa: B023
+            case 3:
+                raises(vkbloom.Error, part, lambda: final._memory.copy_to(4096, 4, 7, 0))  # noqa: B023
+            case 4:
+                try:
+                    capsule = final.__dlpack__(stream=7)
+                    # Nothing is left to wait for.
+                    del capsule
+                except vkbloom.Error as error:
+                    assert part in str(error)  # noqa: PT017
+            case 5:
+                torch: Any = types.ModuleType("torch")
+                torch.cuda = types.SimpleNamespace(
+                    is_initialized=lambda: True, is_current_stream_capturing=lambda: True
+                )
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setitem(sys.modules, "torch", torch)
+                    plain = OnDevice(image)
+                    part = "PyTorch's stream is being captured"
+                    raises(vkbloom.Error, part, lambda: renderer.apply(plain, SETTINGS))  # noqa: B023
+        assert cuda.stand_in_capture(None), case
+        same(renderer.apply(OnDevice(image), SETTINGS), wanted)
+
+
+def callbacks(renderer: Any) -> None:
+    """A callback of a stream that needs the GIL does not stop what waits for the stream."""
+    image = np.zeros(1 << 16, np.uint8)
+    seen: list[int] = []
+    call = ctypes.CFUNCTYPE(None)(lambda: seen.append(0))
+    address = image.ctypes.data
+    core = renderer._core
+    # A thread with the GIL that waits stops everything.
+    faulthandler.dump_traceback_later(60, exit=True)
+
+    def snapshot(of: Any) -> Any:
+        cuda_call = ctypes.PyDLL("libcuda.so.1").stand_in_callback
+        cuda_call(call)
+        return of.snapshot("image", address, image.size, 0, False)
+
+    sys.setswitchinterval(10)
+    try:
+        memory = snapshot(core)
+        del memory
+        memory = snapshot(core)
+        memory.complete()
+        memory = memory.clone(image.size)
+        memory.read(np.empty(image.size, np.uint8), 0)
+        other: Any = Renderer(ADAPTER, validation=VALIDATION)
+        with other:
+            memory = snapshot(other._core)
+            del memory
+            memory = snapshot(other._core)
+        del memory
+    finally:
+        sys.setswitchinterval(0.005)
+    faulthandler.cancel_dump_traceback_later()
+    assert len(seen) >= 4
+
+
+if __name__ == "__main__":
+    main((closing, failing, captures, callbacks))

@@ -1,0 +1,37 @@
+"""The folder in which the code and the commands of pages run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.docs.pages import ROOT, blocks
+from vkbloom import presets, write
+from vkbloom.io.image_writing import save
+from vkbloom.io.images import Picture
+from vkbloom.verdicts import measuring
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with the files that pages name."""
+    monkeypatch.chdir(tmp_path)
+    # To find the nearest of all presets takes half a minute, to time large frames three seconds.
+    monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
+    timed = measuring.pass_times
+    monkeypatch.setattr(measuring, "pass_times", lambda one, of, _: timed(one, of, (64, 36), 1))
+    photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
+    save(Picture.of_values(photo, "half"), "photo.exr")
+    write("photo.jpg", photo.astype(np.float32))
+    np.save("picture.npy", photo)
+    (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
+    Path("grid.toml").write_text(grid)
+    (own,) = blocks(ROOT / "docs" / "own_methods.md", "glsl")
+    Path("soft.hook").write_text(own)
+    (twin,) = [
+        text for text in blocks(ROOT / "docs" / "own_methods.md", "python") if "def soft" in text
+    ]
+    Path("twin.py").write_text(twin)
+    return tmp_path

@@ -1,0 +1,147 @@
+"""The command lines of the pages, as printed: bash splits them, in a folder that has their files.
+
+What bash hands to `vkbloom` then runs in this process, where commands share their renderers.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import click
+import pytest
+from benchmarks.__main__ import command as benchmarks
+from click.testing import CliRunner
+
+from tests.docs.pages import ROOT, TEXTS, blocks
+from vkbloom.cli.program import program
+
+#: Why a command is not run here, by how it begins; its arguments are parsed.
+NOT_RUN: Final = {
+    "make demo": ".ci/run does, on a fresh system",
+    "make test": "it runs this test",
+    "make bench": "installs the peers; tests/bench/test_bench.py runs the benchmarks",
+    "pytest": "tests/plugin/test_guide.py does, on the files of that page",
+    "python -m benchmarks -o": "takes minutes; tests/bench/test_bench.py runs the benchmarks",
+    "python -m benchmarks --only": "the same",
+    "python -m benchmarks --adapter": "the same",
+    "python -m benchmarks --beside": "the same",
+    "python -m benchmarks --quick": "the same",
+    "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
+    "vkbloom view": "does not end, and needs a screen; tests/cli/test_view.py does",
+    "vkbloom grid --from grid.toml": "starts four workers; tests/cli/test_cli_grid.py does",
+    "vkbloom grid --axis time=0:1:24": "needs the scheduler of a cluster",
+}
+# What `vkbloom check` measures, for the same laws in less time.
+SMALL = ["--measure-size", "64x64", "--size", "64x48"]
+PROGRAMS = ("vkbloom", "pip", "python", "pytest", "make")
+# Each program prints its arguments. Others are not found.
+PRELUDE = "\n".join(f"{name}() {{ printf '%s\\0' {name} \"$@\"; }}" for name in PROGRAMS)
+
+
+def lines() -> Iterator[Any]:
+    """Yield the command lines of all pages, each once."""
+    found = set()
+    for page in TEXTS:
+        for block in (*blocks(page, "sh"), *blocks(page, "console"), *blocks(page, "bash")):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.strip() and line not in found:
+                    found.add(line)
+                    name = str(page.relative_to(ROOT))
+                    yield pytest.param(line, id=f"{name}: {line.split('#')[0].strip()}")
+
+
+def bash(text: str, folder: Path, **environment: str) -> str:
+    done = subprocess.run(
+        ["bash", "--norc", "-c", text],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    return done.stdout
+
+
+def words_of(line: str, folder: Path) -> list[str]:
+    """Return a program and its arguments, as bash hands them over."""
+    return bash(f"{PRELUDE}\n{line}", folder).split("\0")[:-1]
+
+
+def make_wheels(folder: Path) -> None:
+    """Write wheels without files, with the extras of the package."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = [f"Provides-Extra: {name}\n" for name in project["optional-dependencies"]]
+    extras.append("Requires-Dist: vkbloom-lavapipe; extra == 'software'\n")
+    folder.mkdir()
+    for name, version, more in (
+        ("vkbloom", project["version"], extras),
+        ("vkbloom_lavapipe", "25.0.7", []),
+    ):
+        about = f"{name}-{version}.dist-info"
+        with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as wheel:
+            head = f"Metadata-Version: 2.4\nName: {name}\nVersion: {version}\n"
+            wheel.writestr(f"{about}/METADATA", head + "".join(more))
+            wheel.writestr(
+                f"{about}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+            )
+            wheel.writestr(
+                f"{about}/RECORD", f"{about}/METADATA,,\n{about}/WHEEL,,\n{about}/RECORD,,\n"
+            )
+
+
+def parse(words: list[str]) -> None:
+    """Parse the arguments of a command that is not run."""
+    if words[0] == "make":
+        target = rf"^([\w-]+ )*{words[1]}( [\w-]+)*:"
+        assert re.search(target, (ROOT / "Makefile").read_text(), re.MULTILINE), words
+        return
+    given: tuple[click.Command | None, list[str]] = (benchmarks, words[3:])
+    if words[0] == "vkbloom":
+        given = program.get_command(None, words[1]), words[2:]  # type: ignore[arg-type]
+    elif words[0] != "python":
+        return
+    command, arguments = given
+    assert command is not None, words
+    command.make_context(words[0], arguments, resilient_parsing=True)
+
+
+@pytest.mark.parametrize("line", list(lines()))
+def test_a_command_of_a_page(line: str, folder: Path, kept_renderers: None) -> None:
+    words = words_of(line, folder)
+    if any(" ".join(words).startswith(begin) for begin in NOT_RUN):
+        parse(words)
+    elif words[0] == "pip":
+        # In place of the environment and the index.
+        make_wheels(folder / "dist")
+        pip = f'pip() {{ "{sys.executable}" -m pip "$@"; }}'
+        where = {"PIP_TARGET": str(folder / "site"), "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": ""}
+        bash(f"{pip}\n{line}", folder, **where)
+        names = {found.name.partition("-")[0] for found in (folder / "site").glob("*.dist-info")}
+        assert names == {"vkbloom", "vkbloom_lavapipe"}
+    else:
+        of = {"vkbloom": (program, words[1:]), "python": (benchmarks, words[3:])}
+        command, arguments = of[words[0]]
+        more = SMALL if words[:2] == ["vkbloom", "check"] else []
+        result = CliRunner().invoke(command, [*arguments, *more])
+        assert result.exit_code == 0, result.output
+
+
+def test_each_reason_is_of_a_command() -> None:
+    printed = [re.sub(r"^(\w+=\S+ )+", "", parameters.values[0]) for parameters in lines()]
+    assert [begin for begin in NOT_RUN if not any(one.startswith(begin) for one in printed)] == []
+
+
+def test_bash_reads_brackets_as_a_pattern(tmp_path: Path) -> None:
+    """Why a line is not split by shlex: this was the install line, which pip cannot find."""
+    (tmp_path / "vkbloom-1.whl").touch()
+    assert words_of("pip install vkbloom-*.whl[all]", tmp_path)[2] == "vkbloom-*.whl[all]"
+    assert words_of("pip install vkbloom-*.whl", tmp_path)[2] == "vkbloom-1.whl"

@@ -1,0 +1,153 @@
+"""Every script of tools/, benchmarks/ and examples/ runs, in its shortest form.
+
+Each runs as a program in this process. Of presets and glares it finds a few, if it asks for all.
+"""
+
+from __future__ import annotations
+
+import runpy
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+import vkbloom
+from tests.docs.pages import ROOT
+from tests.exhaustive import witness
+from vkbloom.verdicts import measuring
+
+#: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
+RUN: Final[dict[str, tuple[str, str]]] = {
+    "benchmarks/grid.py": ("points", "distributed"),
+    "examples/demo.py": ("--out out", "OpenImageIO"),
+    "examples/gradients/glare_removal.py": ("a.png", "scipy"),
+    "examples/gradients/learned.py": ("a.png", "torch"),
+    "examples/gradients/recovered_psf.py": ("a.png", "scipy"),
+    "tools/check_table.py": ("a.md", "click"),
+    "tools/derivatives_table.py": ("a.md", "numpy"),
+    "tools/docs_pictures.py": ("pictures", "matplotlib"),
+    "tools/first_apply.py": ("tutorial", "numpy"),
+    "tools/fit_recovery.py": ("a.md --count 1", "scipy"),
+    "tools/glare_pictures.py": (".", "OpenImageIO"),
+    "tools/laws.py": ("--out a.md", "cv2"),
+    "tools/line_counts.py": ("", "numpy"),
+    "tools/measured_table.py": ("a.md --rounds 1", "numpy"),
+    "tools/night_picture.py": ("night.jpg", "OpenImageIO"),
+    "tools/photo_sheet.py": (".", "skimage"),
+    "tools/preset_pictures.py": ("a.png", "OpenImageIO"),
+    "tools/psf_atlas.py": (".", "matplotlib"),
+    "tools/requirements.py": ("all", "numpy"),
+    "tools/run_notebooks.py": ("", "nbclient"),
+    "tools/soak.py": ("20", "numpy"),
+    "tools/steadiness_tables.py": (".", "numpy"),
+    "tools/translate_table.py": ("a.md", "scipy"),
+}
+
+
+#: Those that take more than five seconds of a processor; their functions have tests of their own.
+LONG: Final = (
+    "tools/check_table.py",
+    "tools/fit_recovery.py",
+    "tools/psf_atlas.py",
+    "tools/steadiness_tables.py",
+)
+
+#: What is run elsewhere, by its path or folder, and where: a test, a target of make.
+ELSEWHERE: Final = {
+    "benchmarks/": "tests/bench/test_bench.py",
+    "examples/cluster/": "tests/docs/test_cluster_scripts.py",
+    "examples/image_quality/": "tests/plugin/test_image_quality.py",
+    "examples/own_methods/": "tests/own/test_rendering.py",
+    "examples/training_pairs.py": "tests/device/test_training_pairs.py",
+    "tools/cluster/": "Makefile",
+    "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes
+    "tools/coverage_report.py": "tools/coverage.sh",
+    "tools/engines/": "Makefile",
+    "tools/free_threaded/": "Makefile",
+    "tools/fuzz/": "tests/io/test_fuzz.py",
+    "tools/libplacebo/": "Makefile",
+    "tools/make_scene.py": "tests/scene/test_assets.py",
+    "tools/renderer_memory.py": "tests/core/test_lifetime.py",
+    "tools/sanitize.sh": "Makefile",
+    "tools/sanitizer_report.py": "tools/sanitize.sh",
+    "tools/setup_system.sh": "Makefile",
+    "tools/threads/": "Makefile",
+}
+
+
+class Few(Mapping[str, Any]):
+    """All of a mapping by name, and a few as its items."""
+
+    def __init__(self, every: Mapping[str, Any], *names: str) -> None:
+        self.every, self.names = every, names
+
+    def __getitem__(self, name: str) -> Any:
+        return self.every[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(one, marks=witness("takes 8 s and more") if one in LONG else ()) for one in RUN],
+)
+def test_a_script_runs(
+    script: str, folder: Path, kept_renderers: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, needed = RUN[script]
+    pytest.importorskip(needed)
+    (folder / "pictures").mkdir()
+    shutil.copy(ROOT / "docs" / "plans.md", folder)  # a script writes its flowchart
+    monkeypatch.setattr(vkbloom, "presets", Few(vkbloom.presets, "kino", "unity_urp"))
+    monkeypatch.setattr(measuring, "presets", vkbloom.presets)
+    monkeypatch.setattr(vkbloom, "glares", Few(vkbloom.glares, next(iter(vkbloom.glares))))
+    for name, value in {"GRID_SIDE": "16", "GRID_COUNTS": "2,2,2", "GRID_SINGLES": "2"}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "argv", [script, *words.split()])
+    monkeypatch.syspath_prepend(str((ROOT / script).parent))
+    monkeypatch.syspath_prepend(str(ROOT))
+    status: Any = None
+    try:
+        runpy.run_path(str(ROOT / script), run_name="__main__")
+    except SystemExit as ended:
+        status = ended.code
+    assert not status
+
+
+def listed(*folders: str) -> list[str]:
+    """Return the scripts of folders of the checkout."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("this is no checkout")
+    command = ["git", "ls-files", "--", *folders]
+    text = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    every = [name for name in text.splitlines() if name.endswith((".py", ".sh", ".sbatch"))]
+    return [name for name in every if (ROOT / name).exists()]
+
+
+def test_no_script_is_left_out() -> None:
+    every = listed("tools", "benchmarks", "examples")
+    assert [
+        name for name in every if name not in RUN and not name.startswith(tuple(ELSEWHERE))
+    ] == []
+    assert [name for name in RUN if name not in every] == []
+    guarded = [name for name in every if 'if __name__ == "__main__"' in (ROOT / name).read_text()]
+    programs = [name for name in guarded if name.startswith("benchmarks/")]
+    assert {*programs} <= {*RUN, "benchmarks/__main__.py"}
+    for place, runner in ELSEWHERE.items():
+        assert any(name.startswith(place) for name in every), place
+        # The word by which the runner finds it.
+        assert Path(place).stem in (ROOT / runner).read_text(), (place, runner)
+
+
+def test_shell_scripts_parse() -> None:
+    for name in listed("tools", "examples", "packaging", ".ci"):
+        if not name.endswith(".py"):
+            subprocess.run(["bash", "-n", ROOT / name], check=True)

@@ -1,0 +1,372 @@
+"""Files of other programs: orientation, colours, damage, and what large files read by rows give."""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.io import foreign
+from tests.io.profiles import (
+    DISPLAY_P3,
+    REC_709,
+    png_chunk,
+    profile,
+    profile_chunk,
+    store_png,
+    to_xyz,
+)
+from vkbloom.io import rows
+from vkbloom.io.containers import orientation_of
+from vkbloom.io.image_reading import decode, is_photograph, opened
+from vkbloom.io.srgb import decode_srgb, encode_srgb
+
+oiio = pytest.importorskip("OpenImageIO")
+image = pytest.importorskip("PIL.Image")
+ops = pytest.importorskip("PIL.ImageOps")
+tifffile = pytest.importorskip("tifffile")
+
+RNG = np.random.default_rng(3)
+PIXELS = np.kron(RNG.integers(0, 256, (2, 3, 3), dtype=np.uint8), np.ones((16, 16, 1), np.uint8))
+REC_2020 = ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046))
+# To linear Rec. 709.
+MATRICES = {
+    9: np.linalg.inv(to_xyz(REC_709)) @ to_xyz(REC_2020),
+    12: np.linalg.inv(to_xyz(REC_709)) @ to_xyz(DISPLAY_P3),
+}
+
+
+def as_rows(path: Path) -> NDArray[Any]:
+    """Return a file as large files are read."""
+    with rows.opened_rows(path) as given:
+        return np.concatenate([decode(stored).pixels for stored in given.bands()])
+
+
+def turned(orientation: int) -> NDArray[Any]:
+    """Return the pixels that Pillow shows of PIXELS with an orientation."""
+    picture = image.fromarray(PIXELS)
+    picture.getexif()[274] = orientation
+    return np.asarray(ops.exif_transpose(picture))
+
+
+def store_exif(path: Path, orientation: int) -> None:
+    exif = image.Exif()
+    exif[274] = orientation
+    more = {"lossless": True} if path.suffix == ".webp" else {}
+    image.fromarray(PIXELS).save(path, exif=exif, **more)
+
+
+def store_late_exif(path: Path, orientation: int) -> None:
+    entry = struct.pack(">HHHIHHI", 1, 274, 3, 1, orientation, 0, 0)
+    chunk = png_chunk(b"eXIf", b"MM\0*\0\0\0\x08" + entry)
+    content = store_png(path, PIXELS).read_bytes()
+    path.write_bytes(content[:-12] + chunk + content[-12:])
+
+
+def store_dpx(path: Path, orientation: int) -> None:
+    vkbloom.write(path, PIXELS)
+    content = bytearray(path.read_bytes())
+    # SMPTE ST 268, field 20: the direction of pixels, then that of lines.
+    code = {1: 0, 2: 1, 3: 3, 4: 2, 5: 4, 6: 5, 7: 7, 8: 6}[orientation]
+    content[768:770] = struct.pack(">H" if content[:4] == b"SDPX" else "<H", code)
+    path.write_bytes(content)
+
+
+def store_xmp(path: Path, orientation: int) -> None:
+    packet = foreign.xmp(orientation, is_element=orientation % 2 == 0)
+    picture = image.fromarray(PIXELS)
+    match path.suffix:
+        case ".png":
+            content = b"XML:com.adobe.xmp\0\0\0\0\0" + packet.encode()
+            store_png(path, PIXELS, png_chunk(b"iTXt", content))
+        case ".tif":
+            picture.save(path, tiffinfo={700: packet.encode()})
+        case ".webp":
+            picture.save(path, xmp=packet.encode(), lossless=True)
+        case _:
+            picture.save(path, xmp=packet.encode(), quality=95, subsampling=0)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize(
+    ("name", "store"),
+    [
+        *((f"exif.{suffix}", store_exif) for suffix in ("jpg", "png", "tif", "webp")),
+        ("late.png", store_late_exif),
+        ("a.dpx", store_dpx),
+        *((f"xmp.{suffix}", store_xmp) for suffix in ("jpg", "png", "tif", "webp")),
+    ],
+)
+def test_orientation(tmp_path: Path, name: str, store: Any, orientation: int) -> None:
+    path = tmp_path / name
+    store(path, orientation)
+    if name == "a.dpx" and orientation > 4:
+        with pytest.raises(ValueError, match=r"a\.dpx: dpx with lines along the columns"):
+            vkbloom.read(path)
+        return
+    made = vkbloom.read(path)
+    off = np.abs(encode_srgb(made) * 255 - turned(orientation))
+    assert (np.median(off) if name.endswith("jpg") else off.max()) < (3 if "jpg" in name else 0.01)
+    assert np.array_equal(as_rows(path), made)
+
+
+def test_exif_after_the_pixels_is_kept(tmp_path: Path) -> None:
+    exif = image.Exif()
+    exif[271] = "Maker"
+    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
+    content = store_png(tmp_path / "a.png", PIXELS).read_bytes()
+    chunk = png_chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))
+    (tmp_path / "a.png").write_bytes(content[:-12] + chunk + content[-12:])
+    made, facts = vkbloom.read(tmp_path / "a.png", metadata=True)
+    assert made.shape == PIXELS.shape
+    assert (facts["Make"], facts["Exif:DateTimeOriginal"]) == ("Maker", "2020:01:02 03:04:05")
+
+
+@pytest.mark.parametrize(
+    "exif",
+    [
+        b"",
+        b"no Exif",
+        b"II+\0\x08\0\0\0" + b"\xff" * 8,
+        b"II*\0\xff\xff\xff\xff",
+        b"MM\0*\0\0\0\x08\0\1\1\x12\0\3\xff\xff\xff\xff\0\6\0\0",
+    ],
+)
+def test_damaged_exif_after_the_pixels(tmp_path: Path, exif: bytes) -> None:
+    content = store_png(tmp_path / "a.png", PIXELS).read_bytes()
+    plain = vkbloom.read(tmp_path / "a.png")
+    (tmp_path / "a.png").write_bytes(content[:-12] + png_chunk(b"eXIf", exif) + content[-12:])
+    assert np.array_equal(vkbloom.read(tmp_path / "a.png"), plain)
+
+
+def test_orientation_of_exif_goes_before_xmp(tmp_path: Path) -> None:
+    exif = image.Exif()
+    exif[274] = 3
+    path = tmp_path / "a.jpg"
+    image.fromarray(PIXELS).save(path, exif=exif, xmp=foreign.xmp(6).encode())
+    assert vkbloom.read(path).shape == PIXELS.shape
+
+
+@pytest.mark.parametrize("axes", ["-Y+X", "-Y-X", "+Y-X", "+Y+X", "+X-Y", "-X-Y", "-X+Y", "+X+Y"])
+def test_orientation_of_radiance(tmp_path: Path, axes: str) -> None:
+    # Mantissas of the exponent 128, for 1.
+    upright = np.concatenate([PIXELS | 128, np.full((*PIXELS.shape[:2], 1), 129, np.uint8)], -1)
+    foreign.radiance(tmp_path / "a.hdr", upright, axes)
+    made = vkbloom.read(tmp_path / "a.hdr")
+    assert np.allclose(made, upright[..., :3] / 128, atol=0.5 / 128)
+    assert np.array_equal(as_rows(tmp_path / "a.hdr"), made)
+
+
+@pytest.mark.parametrize("primaries", [1, 9, 12])
+@pytest.mark.parametrize("curve", [1, 6, 13, 14, 15])
+@pytest.mark.parametrize("is_narrow", [False, True])
+def test_code_points_of_sdr(tmp_path: Path, primaries: int, curve: int, is_narrow: bool) -> None:
+    chunk = png_chunk(b"cICP", bytes([primaries, curve, 0, not is_narrow]))
+    # They have precedence over a profile.
+    chunk += profile_chunk(profile("Linear", REC_709, 1.0))
+    made, facts = vkbloom.read(store_png(tmp_path / "a.png", PIXELS, chunk), metadata=True)
+    signal = np.clip((PIXELS - 16.0) / 219, 0, 1) if is_narrow else PIXELS / 255
+    light = decode_srgb(signal)
+    if curve != 13:
+        # Rec. ITU-R BT.709-6, item 1.2.
+        light = np.where(signal < 0.081, signal / 4.5, ((signal + 0.099) / 1.099) ** (1 / 0.45))
+    if primaries in MATRICES:
+        light = light @ MATRICES[primaries].T
+    assert np.allclose(made, light, rtol=1e-3, atol=3e-4)
+    assert bool(facts["notes"]) is not (primaries == 1 and curve == 13)
+
+
+@pytest.mark.parametrize("points", [(2, 2, 0, 1), (99, 13, 0, 1), (1, 99, 0, 1), (2, 13, 0, 1)])
+def test_unknown_code_points_hide_nothing(tmp_path: Path, points: tuple[int, ...]) -> None:
+    chunk = png_chunk(b"cICP", bytes(points))
+    p3 = profile_chunk(profile("Display P3", DISPLAY_P3))
+    gamma = png_chunk(b"gAMA", struct.pack(">I", 50000))
+    for more in (p3, gamma, b""):
+        plain = vkbloom.read(store_png(tmp_path / "a.png", PIXELS, more))
+        path = store_png(tmp_path / "b.png", PIXELS, chunk + more)
+        made, facts = vkbloom.read(path, metadata=True)
+        assert np.array_equal(made, plain)
+        is_told = any("code points" in note for note in facts["notes"])
+        assert is_told is (points[1] != 2)
+
+
+@pytest.mark.parametrize("encoding", ["pq", "hlg", "srgb"])
+def test_code_points_are_written_alone(tmp_path: Path, encoding: Any) -> None:
+    pixels = np.full((2, 2, 3), 0.5, np.float32)
+    path = vkbloom.write(tmp_path / "a.png", pixels, encoding=encoding, primaries="rec2020")
+    content = path.read_bytes()
+    assert b"cICP" in content
+    assert not any(name in content for name in (b"sRGB", b"gAMA", b"cHRM", b"iCCP"))
+
+
+def test_ultra_hdr(tmp_path: Path) -> None:
+    spec = oiio.ImageSpec(64, 64, 3, "half")
+    spec.attribute("jpeg:ultrahdr", 1)
+    spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
+    light = np.full((64, 64, 3), (0.6, 0.1, 0.05), np.float16)
+    light[:16] = 3
+    writer = oiio.ImageOutput.create("a.jpg")
+    path = tmp_path / "a.jpg"
+    assert writer.open(str(path), spec)
+    assert writer.write_image(light)
+    assert writer.close()
+    made, facts = vkbloom.read(path, metadata=True)
+    assert made.dtype == np.float16
+    assert facts["alpha"] is None
+    expected = light.astype(float) @ MATRICES[12].T
+    assert np.allclose(made[[4, 50], 5], expected[[4, 50], 5], rtol=0.03, atol=0.005)
+    assert facts["notes"][0].startswith("converted to linear Rec. 709 from the primaries of its")
+    # Highlights do not become part of the settings' choice.
+    with opened(path, "Reading images") as reader:
+        assert is_photograph(reader)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+@pytest.mark.parametrize("photometric", ["cielab", "icclab"])
+def test_lab(tmp_path: Path, photometric: str, dtype: str) -> None:
+    bits = 8 if dtype == "uint8" else 16
+    largest, step = (1 << bits) - 1, 1 << (bits - 8)
+    light = np.array([100, 75, 50, 25, 5, 50, 50]) / 100
+    ab = np.zeros((7, 2), int)
+    ab[5:] = ((40, 30), (-30, -60))
+    if photometric == "cielab":
+        values = np.column_stack([light * largest, ab * step % (1 << bits)])
+    else:
+        values = np.column_stack([light * 255 * step, (ab + 128) * step])
+    pixels = np.rint(values).astype(dtype)[None].repeat(3, 0)
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, pixels, photometric=photometric)
+    made, facts = vkbloom.read(path, metadata=True)
+    assert facts["colour"] == photometric.upper()
+    # CIE 15:2018: luminance of greys; a step of 8 bits of lightness.
+    grey = np.where(light > 0.08, ((light * 100 + 16) / 116) ** 3, light * 100 / 903.3)
+    assert np.allclose(made[0, :5], np.repeat(grey[:5, None], 3, 1), rtol=0.03, atol=2e-3)
+    # Orange and blue: signs of a* and b*.
+    assert made[0, 5, 0] > 1.5 * made[0, 5, 2]
+    assert made[0, 6, 2] > 1.5 * made[0, 6, 0]
+    assert np.array_equal(as_rows(path), made)
+
+
+@pytest.mark.parametrize("is_progressive", [False, True])
+def test_jpeg_with_more_bytes(tmp_path: Path, is_progressive: bool) -> None:
+    stream = io.BytesIO()
+    image.fromarray(PIXELS).save(stream, "JPEG", quality=90, progressive=is_progressive)
+    plain = stream.getvalue()
+    (tmp_path / "a.jpg").write_bytes(plain)
+    (tmp_path / "b.jpg").write_bytes(plain[:-2] + b"SEFT" * 4 + plain[-2:])
+    (tmp_path / "cut.jpg").write_bytes(plain[: len(plain) // 2])
+    made, facts = vkbloom.read(tmp_path / "b.jpg", metadata=True)
+    assert np.array_equal(made, vkbloom.read(tmp_path / "a.jpg"))
+    assert np.array_equal(as_rows(tmp_path / "b.jpg"), made)
+    if is_progressive:
+        assert "bytes of the file belong to no pixel" in facts["notes"][0]
+    for read in (vkbloom.read, as_rows):
+        with pytest.raises(
+            ValueError, match=r"cut\.jpg: (damaged|is not a readable image): JPEG error: Prem"
+        ):
+            read(tmp_path / "cut.jpg")
+
+
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        *("bmp", "dpx", "exr", "fits", "gif", "hdr", "ico", "iff", "jp2", "jpg", "jxl", "png"),
+        *("ppm", "rla", "sgi", "tga", "tif", "webp"),
+    ],
+)
+def test_large_files_are_read_as_others(
+    tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 48 * 7)
+    path = vkbloom.write(tmp_path / f"a.{suffix}", decode_srgb(PIXELS / 255))
+    assert np.array_equal(as_rows(path), vkbloom.read(path))
+
+
+def test_colours_under_alpha_0_are_told(tmp_path: Path) -> None:
+    pixels = np.zeros((4, 4, 4), np.uint8)
+    pixels[1] = (200, 40, 40, 255)
+    for under in (0, 255):
+        pixels[2:, :, :3] = under
+        path = store_png(tmp_path / "a.png", pixels)
+        _, facts = vkbloom.read(path, metadata=True)
+        assert len(facts["notes"]) == (under == 255)
+        assert all("% of its light lie where alpha is 0" in note for note in facts["notes"])
+        _, facts = vkbloom.read(path, metadata=True, premultiplied=True)
+        assert facts["notes"] == ()
+
+
+@pytest.mark.parametrize("brand", [b"avif", b"heic", b"mif1"])
+def test_heif_is_told(tmp_path: Path, brand: bytes) -> None:
+    (tmp_path / "a.avif").write_bytes(b"\0\0\0\x18ftyp" + brand + bytes(12))
+    with pytest.raises(
+        ValueError, match=r"a\.avif: .* without libheif, .*; convert the file to PNG"
+    ):
+        vkbloom.read(tmp_path / "a.avif")
+
+
+def test_a_file_without_pixels(tmp_path: Path) -> None:
+    cards = [
+        "SIMPLE  =                    T",
+        "BITPIX  =                    8",
+        f"NAXIS   = {0:20}",
+    ]
+    head = "".join(card.ljust(80) for card in (*cards, "END")).ljust(2880)
+    (tmp_path / "a.fits").write_bytes(head.encode() + bytes(2880))
+    with pytest.raises(ValueError, match=r"a\.fits: there are no pixels in this part"):
+        vkbloom.read(tmp_path / "a.fits")
+
+
+@pytest.mark.parametrize("name", ["a.ppm", "a.pgm", "a.pfm"])
+def test_pnm_has_no_notes(tmp_path: Path, name: str) -> None:
+    pixels = np.full((2, 3, 3), 0.5, np.float32)[..., : 1 if name == "a.pgm" else 3]
+    path = vkbloom.write(tmp_path / name, pixels)
+    made, facts = vkbloom.read(path, metadata=True)
+    assert facts["notes"] == ()
+    assert np.abs(made - 0.5).max() < 0.005
+
+
+@pytest.mark.parametrize(("name", "size"), [("a.jp2", 16), ("a.iff", 5)])
+def test_too_small_for_the_format(tmp_path: Path, name: str, size: int) -> None:
+    pixels = RNG.random((size, size, 3), np.float32)
+    with pytest.raises(OSError, match=f"(after writing|resolutions).*{name}") as caught:
+        vkbloom.write(tmp_path / name, pixels)
+    assert "disk" not in str(caught.value)
+    assert os.listdir(tmp_path) == []
+
+
+def test_grey_has_no_primaries(tmp_path: Path) -> None:
+    # As libjxl writes it.
+    chunk = png_chunk(b"cICP", bytes([0, 13, 0, 1]))
+    path = store_png(tmp_path / "a.png", PIXELS[..., :1], chunk)
+    made, facts = vkbloom.read(path, metadata=True)
+    assert np.allclose(made[..., :1], decode_srgb(PIXELS[..., :1] / 255), rtol=1e-6)
+    assert facts["notes"] == ()
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("size", [1, 2, 3, 9])
+def test_small_jpeg_xl(tmp_path: Path, size: int, channels: int) -> None:
+    pixels = np.full((size, size, channels), 0.5, np.float32)
+    path = vkbloom.write(tmp_path / "a.jxl", pixels, bits=16)
+    assert np.allclose(vkbloom.read(path), pixels, atol=1e-4)
+    assert np.array_equal(as_rows(path), vkbloom.read(path))
+
+
+@pytest.mark.parametrize("suffix", ["gif", "jpg"])
+def test_alpha_that_a_format_loses_is_refused(tmp_path: Path, suffix: str) -> None:
+    with pytest.raises(ValueError, match=r"no alpha; write array\[\.\.\., :3\]"):
+        vkbloom.write(tmp_path / f"a.{suffix}", np.ones((2, 2, 4), np.float32))
+
+
+@pytest.mark.parametrize("stated", [None, "6", (6, 6), 0, 9, -1, 6.0])
+def test_an_orientation_that_is_none(tmp_path: Path, stated: Any) -> None:
+    path = tmp_path / "a.webp"
+    image.fromarray(PIXELS).save(path)
+    assert orientation_of(path, "webp", stated) == 1
