@@ -1,10 +1,27 @@
 // Cotangents through tone maps and encodings (tonemap.glsl): of a curve's argument from those of its
-// result. At kinks: 1 at the ends of a clamp, 0 at a maximum with a constant, equal shares for equal
-// channels.
+// result. At kinks, the derivative is the mean of both sides. Each side is followed through all curves:
+// the mean of a clamp of a clamp is not the product of their means. Equal channels have equal shares.
+
+bool growing, at_kink;
+
+// Whether to follow this side, after the ones before it: the second one only if there was a kink.
+bool follow(int side)
+{
+    growing = side == 0;
+    at_kink = at_kink && side > 0;
+    return side < (at_kink ? 2 : 1);
+}
+
+// 1 above a kink, 0 below it.
+vec3 above(vec3 value, float kink)
+{
+    at_kink = at_kink || any(equal(value, vec3(kink)));
+    return growing ? vec3(greaterThanEqual(value, vec3(kink))) : vec3(greaterThan(value, vec3(kink)));
+}
 
 vec3 inside(vec3 value, float low, float high)
 {
-    return vec3(greaterThanEqual(value, vec3(low))) * vec3(lessThanEqual(value, vec3(high)));
+    return above(value, low) * (1.0 - above(value, high));
 }
 
 vec3 equal_shares(vec3 value, float extreme)
@@ -110,7 +127,6 @@ vec3 encoding_slope(vec3 c, int encoding, float reference_white)
     if (encoding == ENCODING_GAMMA22)
         return power_slope(c, 1.0 / 2.2);
     if (encoding == ENCODING_SRGB)
-        return mix(12.92 * vec3(greaterThan(c, vec3(0.0))), 1.055 * power_slope(c, 1.0 / 2.4),
-                   greaterThan(c, vec3(0.0031308)));
+        return mix(12.92 * above(c, 0.0), 1.055 * power_slope(c, 1.0 / 2.4), above(c, 0.0031308));
     return vec3(1.0);
 }
