@@ -48,10 +48,10 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.brought = where_finite(cotangent, given);
     p.brought.a *= stored(vec3(mixed_alpha(p.scene, bloom))).r;
     p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
-    // Curves are so steep near 0 that the forward pass' rounding of a difference would change slopes.
+    // As exactly_toned(): without a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
         p.mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
-    vec3 exposed = p.mixed * exp2(params.exposure), toned = apply_tonemap(exposed, TONEMAP);
+    vec3 exposed = p.mixed * exp2(params.exposure), toned = exactly_toned(exposed, TONEMAP);
     vec3 by_toned = back_through_encoding(toned, p.brought.rgb);
     vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
     p.by_mixed = by_exposed * exp2(params.exposure);

@@ -36,9 +36,19 @@ vec3 back_aces(vec3 c, vec3 brought)
     return brought * inside(value, 0.0, 1.0) * (5.02 * c + 0.03 - value * (4.86 * c + 0.59)) / divisor;
 }
 
+// The tone map without its differences near 0, since encodings are so steep there that the rounding of
+// a difference would change their slopes.
+vec3 exactly_toned(vec3 c, int tonemap)
+{
+    float low = min(c.r, min(c.g, c.b));
+    if (tonemap != TONEMAP_KHRONOS_NEUTRAL || abs(low) >= 2.0 * F90)
+        return apply_tonemap(c, tonemap);
+    return khronos_compressed(min(c, 1e30) - low + low * low / (4.0 * F90));
+}
+
 vec3 back_khronos_neutral(vec3 c, vec3 brought)
 {
-    const float F90 = 0.04, START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
+    const float START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
     float low = min(c.r, min(c.g, c.b));
     bool dark = low <= 2.0 * F90;
     float offset = dark ? low - low * low / (4.0 * F90) : F90;

@@ -182,6 +182,36 @@ def test_renderer_has_the_differences_to_both_sides(renderer: Renderer, number: 
     check_points(number, renderer, POINTS if EXHAUSTIVE else 1)
 
 
+CHAINS: tuple[Any, ...] = (
+    Separable(tonemap="aces", encoding="srgb"),
+    Separable(composite="screen", tonemap="aces", encoding="srgb"),
+    Pyramid(levels=2, composite="screen", tonemap="agx", encoding="srgb"),
+    GodotBloom(composite="screen", encoding="srgb"),
+    BlenderGlare(type="bloom", threshold=0.5, encoding="srgb"),
+    vkbloom.UrpBloom(encoding="srgb"),
+)
+
+
+@pytest.mark.parametrize("settings", CHAINS)
+@pytest.mark.parametrize("level", [0.0, 0.5, 1.0])
+def test_kinks_behind_one_another_are_halved_once(
+    renderer: Renderer, settings: Any, level: float
+) -> None:
+    """Opposite changes of two channels have equal differences to both sides."""
+    image = np.full((2, 3, 3), level)
+    direction, given = np.zeros(image.shape), {"final": np.zeros(image.shape, np.float32)}
+    direction[0, 1] = given["final"][:] = (1, -1, 0)
+    before, right, left = (
+        float((reference.apply(image + step * direction, settings)["final"] * given["final"]).sum())
+        for step in (0, STEP, -STEP)
+    )
+    expected = (right - before) / STEP
+    assert expected == pytest.approx((before - left) / STEP, rel=1e-3, abs=1e-3)
+    for vjp in (reference.vjp, renderer.vjp):
+        found = vjp(image.astype(np.float32), settings)[1](given)["image"]
+        assert (found * direction).sum() == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
 CURVES = [
     (tonemap, encoding, composite, alpha)
     for tonemap, encoding in itertools.product(TONE_MAPS, ENCODINGS)
