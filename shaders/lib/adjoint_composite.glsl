@@ -123,9 +123,11 @@ vec4 by_values(Pixel p)
     return vec4(by_intensity, p.by_curves, 0.0);
 }
 
+// GROUPS is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
+// sides is that of the clamp.
 vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 {
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(0.0), grown;
     int side = 0;
     for (; follow(side); ++side) {
         Pixel p = pixel_of(given, bloom, share, cotangent);
@@ -135,6 +137,9 @@ vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
             sum.r -= params.intensity * dot(p.by_mixed, p.scene.rgb);
         else
             sum += by == BY_BLOOM ? by_bloom(p) : by_scene(p);
+        if (side == 0)
+            grown = sum;
     }
-    return sum / float(side);
+    bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
+    return mix(sum / float(side), grown, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
 }

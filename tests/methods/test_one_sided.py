@@ -188,7 +188,8 @@ CHAINS: tuple[Any, ...] = (
     Pyramid(levels=2, composite="screen", tonemap="agx", encoding="srgb"),
     GodotBloom(composite="screen", encoding="srgb"),
     BlenderGlare(type="bloom", threshold=0.5, encoding="srgb"),
-    vkbloom.UrpBloom(encoding="srgb"),
+    vkbloom.UrpBloom(threshold=None, encoding="srgb"),
+    vkbloom.PygfxBloom(encoding="srgb"),
 )
 
 
