@@ -58,6 +58,16 @@ static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     return true;
 }
 
+// Whether a clamp keeps the bloom at 0 or above.
+static bool is_clamped(const struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].shader == &vkb_shader_pygfx_down_frag
+            || graph->passes[i].shader == &vkb_shader_urp_prefilter_frag)
+            return true;
+    return false;
+}
+
 static struct vkb_pass_row composite_row(const struct vkb_adjoint *adjoint,
                                          const struct vkb_pass_row *pass,
                                          const struct vkb_shader *shader)
@@ -78,6 +88,8 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
 
     row.block = VKB_BLOCK_composite;
     row.params.composite = pass->params.composite;
+    if (is_clamped(adjoint->graph))
+        row.constants.groups = GROUPS_PYGFX;
     if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
         return false;
     return bring_composite(adjoint, pass, &row, row.params.composite.limit, error);

@@ -7,9 +7,9 @@ vec4 back_above_threshold(vec4 value, vec4 brought)
     float most = max(above.r, max(above.g, above.b));
     float brightest = max(value.r, max(value.g, value.b)), held = max(brightest, 1e-30);
     float by_share = brought.a * value.a / held;
-    vec3 by_above = brought.rgb + by_share * shares_of_brightest(above);
+    vec3 by_above = brought.rgb + by_share * shares_of_brightest(value.rgb);
     float by_brightest = brightest > 1e-30 ? -by_share * most / held : 0.0;
-    return vec4(by_above * vec3(greaterThan(above, vec3(0.0)))
+    return vec4(by_above * larger(value, vec4(params.threshold)).rgb
                     + by_brightest * shares_of_brightest(value.rgb),
                 brought.a * most / held);
 }

@@ -11,12 +11,32 @@ struct Pixel {
     vec2 by_curves;
 };
 
-// Through the encoding and the range of the picture's format.
+// Within the range of the picture's format.
+vec3 stored(vec3 value)
+{
+    return inside(value, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
+}
+
 vec3 back_through_encoding(vec3 toned, vec3 brought)
 {
-    vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
-    vec3 kept = brought * inside(result, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
+    vec3 kept = brought * stored(apply_encoding(toned, ENCODING, params.reference_white));
     return kept * encoding_slope(toned, ENCODING, params.reference_white);
+}
+
+// The light that the alpha shows.
+float alpha_light(vec4 bloom)
+{
+    float light = ALPHA == ALPHA_MAX ? max(bloom.r, max(bloom.g, bloom.b)) : bloom.a;
+    return clamp(light_of(vec3(light)).r, 0.0, 1.0);
+}
+
+// The picture's alpha before it is stored.
+float mixed_alpha(vec4 scene, vec4 bloom)
+{
+    if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
+        return scene.a;
+    float light = alpha_light(bloom);
+    return ALPHA == ALPHA_MAX ? max(scene.a, light) : scene.a + (1.0 - scene.a) * light;
 }
 
 Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
@@ -26,8 +46,12 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.bloom = bloom;
     p.share = share;
     p.brought = where_finite(cotangent, given);
+    p.brought.a *= stored(vec3(mixed_alpha(p.scene, bloom))).r;
     p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
-    vec3 exposed = p.mixed * exp2(params.exposure), toned = apply_tonemap(exposed, TONEMAP);
+    // As exactly_toned(): without a difference near 0.
+    if (COMPOSITE == COMPOSITE_MIX)
+        p.mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
+    vec3 exposed = p.mixed * exp2(params.exposure), toned = exactly_toned(exposed, TONEMAP);
     vec3 by_toned = back_through_encoding(toned, p.brought.rgb);
     vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
     p.by_mixed = by_exposed * exp2(params.exposure);
@@ -46,7 +70,7 @@ vec3 by_light(Pixel p)
     return p.by_mixed * (1.0 - clamp(p.scene.rgb, 0.0, 1.0)) * inside(light_of(p.bloom.rgb), 0.0, 1.0);
 }
 
-// The light that the alpha shows, as the alpha's cotangent weighs it.
+// Of the light that the alpha shows, as the alpha's cotangent weighs it.
 vec4 by_alpha_light(Pixel p)
 {
     if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
@@ -67,8 +91,7 @@ float alpha_slope(Pixel p)
 {
     if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
         return 1.0;
-    float light = ALPHA == ALPHA_MAX ? max(p.bloom.r, max(p.bloom.g, p.bloom.b)) : p.bloom.a;
-    light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
+    float light = alpha_light(p.bloom);
     return ALPHA == ALPHA_BLUR ? 1.0 - light : p.scene.a == light ? 0.5 : float(p.scene.a > light);
 }
 
@@ -80,7 +103,7 @@ vec4 by_scene(Pixel p)
     if (COMPOSITE == COMPOSITE_SCREEN)
         colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
-        colour *= 0.5 + 0.5 * sign(p.scene.rgb);
+        colour *= above(p.scene.rgb, 0.0);
     return vec4(colour, p.brought.a * alpha_slope(p));
 }
 
@@ -88,4 +111,35 @@ vec4 by_bloom(Pixel p)
 {
     float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
     return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
+}
+
+// By intensity, exposure and reference white.
+vec4 by_values(Pixel p)
+{
+    vec3 unit = COMPOSITE == COMPOSITE_MIX ? p.bloom.rgb - p.share * p.scene.rgb : p.bloom.rgb;
+    float by_intensity = COMPOSITE == COMPOSITE_OFF
+                           ? 0.0
+                           : dot(by_light(p), unit) + dot(by_alpha_light(p), p.bloom);
+    return vec4(by_intensity, p.by_curves, 0.0);
+}
+
+// GROUPS is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
+// sides is that of the clamp.
+vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
+{
+    vec4 sum = vec4(0.0), grown;
+    int side = 0;
+    for (; follow(side); ++side) {
+        Pixel p = pixel_of(given, bloom, share, cotangent);
+        if (by >= BY_VALUES)
+            sum += by_values(p);
+        else if (by == BY_MASK)
+            sum.r -= params.intensity * dot(p.by_mixed, p.scene.rgb);
+        else
+            sum += by == BY_BLOOM ? by_bloom(p) : by_scene(p);
+        if (side == 0)
+            grown = sum;
+    }
+    bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
+    return mix(sum / float(side), grown, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
 }

@@ -55,7 +55,7 @@ vec4 usual(vec4 value)
 }
 
 // pygfx' weights of negative luminances are above 1, and beyond -1 negative. What is not finite is 0.
-vec4 pygfx_groups(Taps taps)
+vec4 pygfx_mean(Taps taps)
 {
     vec4 means[5] = group_means(taps);
     vec4 sum = vec4(0.0);
@@ -66,7 +66,12 @@ vec4 pygfx_groups(Taps taps)
         sum += share * means[group];
         shares += share;
     }
-    return max(usual(sum / shares), vec4(0.0));
+    return usual(sum / shares);
+}
+
+vec4 pygfx_groups(Taps taps)
+{
+    return max(pygfx_mean(taps), vec4(0.0));
 }
 
 // A tap multiplied by its weight, and the weight.

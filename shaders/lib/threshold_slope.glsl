@@ -1,5 +1,11 @@
 // Cotangents through the soft threshold (threshold.glsl).
 
+// The slope of a maximum with b by a: 1 where a is larger, a half where both are equal.
+vec4 larger(vec4 a, vec4 b)
+{
+    return vec4(greaterThan(a, b)) + 0.5 * vec4(equal(a, b));
+}
+
 // The factor of a colour and its derivative by the brightness.
 vec2 soft_slope(float brightness, float threshold, float width, float divisor, float least)
 {
@@ -8,7 +14,7 @@ vec2 soft_slope(float brightness, float threshold, float width, float divisor, f
     float by_square = moved < 0.0 || moved > 2.0 * width ? 0.0 : 2.0 * soft / divisor;
     float by_top = square > above ? by_square : square < above ? 1.0 : 0.5 * (by_square + 1.0);
     float factor = max(square, above) / held;
-    return vec2(factor, (by_top - (brightness > least ? factor : 0.0)) / held);
+    return vec2(factor, (by_top - larger(vec4(brightness), vec4(least)).x * factor) / held);
 }
 
 vec3 shares_of_brightest(vec3 colour)

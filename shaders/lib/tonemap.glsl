@@ -22,15 +22,12 @@ vec3 tonemap_exponential(vec3 c)
 }
 
 // Khronos PBR Neutral tone mapper, specification 1.0.
-vec3 tonemap_khronos_neutral(vec3 c)
+const float F90 = 0.04;
+
+vec3 khronos_compressed(vec3 c)
 {
-    const float F90 = 0.04;
     const float COMPRESSION_START = 0.8 - F90;
     const float DESATURATION = 0.15;
-    // Lower values give the same result, 1, and their square would overflow.
-    float low = max(min(c.r, min(c.g, c.b)), -1e15);
-    float offset = low < 2.0 * F90 ? low - low * low / (4.0 * F90) : F90;
-    c -= offset;
     float peak = max(c.r, max(c.g, c.b));
     if (peak < COMPRESSION_START)
         return c;
@@ -39,6 +36,14 @@ vec3 tonemap_khronos_neutral(vec3 c)
     c *= compressed / peak;
     float white = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0);
     return mix(c, vec3(compressed), white);
+}
+
+vec3 tonemap_khronos_neutral(vec3 c)
+{
+    // Lower values give the same result, 1, and their square would overflow.
+    float low = max(min(c.r, min(c.g, c.b)), -1e15);
+    float offset = low < 2.0 * F90 ? low - low * low / (4.0 * F90) : F90;
+    return khronos_compressed(c - offset);
 }
 
 // AgX (Sobotka) in the variant of three.js (r160, tonemapping_pars_fragment): Rec. 2020 inset, log2

@@ -1,10 +1,27 @@
 // Cotangents through tone maps and encodings (tonemap.glsl): of a curve's argument from those of its
-// result. At kinks: 1 at the ends of a clamp, 0 at a maximum with a constant, equal shares for equal
-// channels.
+// result. At kinks, the derivative is the mean of both sides. Each side is followed through all curves:
+// the mean of a clamp of a clamp is not the product of their means. Equal channels have equal shares.
+
+bool growing, at_kink;
+
+// Whether to follow this side, after the ones before it: the second one only if there was a kink.
+bool follow(int side)
+{
+    growing = side == 0;
+    at_kink = at_kink && side > 0;
+    return side < (at_kink ? 2 : 1);
+}
+
+// 1 above a kink, 0 below it.
+vec3 above(vec3 value, float kink)
+{
+    at_kink = at_kink || any(equal(value, vec3(kink)));
+    return growing ? vec3(greaterThanEqual(value, vec3(kink))) : vec3(greaterThan(value, vec3(kink)));
+}
 
 vec3 inside(vec3 value, float low, float high)
 {
-    return vec3(greaterThanEqual(value, vec3(low))) * vec3(lessThanEqual(value, vec3(high)));
+    return above(value, low) * (1.0 - above(value, high));
 }
 
 vec3 equal_shares(vec3 value, float extreme)
@@ -19,9 +36,19 @@ vec3 back_aces(vec3 c, vec3 brought)
     return brought * inside(value, 0.0, 1.0) * (5.02 * c + 0.03 - value * (4.86 * c + 0.59)) / divisor;
 }
 
+// The tone map without its differences near 0, since encodings are so steep there that the rounding of
+// a difference would change their slopes.
+vec3 exactly_toned(vec3 c, int tonemap)
+{
+    float low = min(c.r, min(c.g, c.b));
+    if (tonemap != TONEMAP_KHRONOS_NEUTRAL || abs(low) >= 2.0 * F90)
+        return apply_tonemap(c, tonemap);
+    return khronos_compressed(min(c, 1e30) - low + low * low / (4.0 * F90));
+}
+
 vec3 back_khronos_neutral(vec3 c, vec3 brought)
 {
-    const float F90 = 0.04, START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
+    const float START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
     float low = min(c.r, min(c.g, c.b));
     bool dark = low <= 2.0 * F90;
     float offset = dark ? low - low * low / (4.0 * F90) : F90;
@@ -110,7 +137,6 @@ vec3 encoding_slope(vec3 c, int encoding, float reference_white)
     if (encoding == ENCODING_GAMMA22)
         return power_slope(c, 1.0 / 2.2);
     if (encoding == ENCODING_SRGB)
-        return mix(12.92 * vec3(greaterThan(c, vec3(0.0))), 1.055 * power_slope(c, 1.0 / 2.4),
-                   greaterThan(c, vec3(0.0031308)));
+        return mix(12.92 * above(c, 0.0), 1.055 * power_slope(c, 1.0 / 2.4), above(c, 0.0031308));
     return vec3(1.0);
 }

@@ -36,13 +36,13 @@ vec3 back_saturated(vec3 value, vec3 brought)
     float most = max(value.r, max(value.g, value.b)), least = min(value.r, min(value.g, value.b));
     float spread = most - least, sum = dot(brought, vec3(1.0));
     vec3 at_most = shares_of_brightest(value), at_least = shares_of_brightest(-value);
-    if (most < 0.0 || (most == 0.0 && spread > 0.0))
+    if (most < 0.0)
         return at_most * sum;
     float scale = most > 0.0 ? params.saturation : min(params.saturation, 0.5);
     if (scale * spread < most || spread == 0.0)
         return scale * brought + at_most * ((1.0 - scale) * sum);
-    // Where both scales are equal, half of the derivative of one.
-    float share = scale * spread == most ? 0.5 : 1.0;
+    // Where both scales are equal, or the largest channel is 0, half of the derivative of one.
+    float share = (scale * spread == most ? 0.5 : 1.0) * (most == 0.0 ? 0.5 : 1.0);
     scale = most / spread;
     float by_scale = share * (dot(brought, value) - most * sum) / (spread * spread);
     return scale * brought + at_most * ((1.0 - scale) * sum)

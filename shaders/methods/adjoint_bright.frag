@@ -4,6 +4,7 @@
 // (prefiltered() of padded.glsl).
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
+#include "lib/threshold_slope.glsl"
 
 UNIFORM_BLOCK(ADJOINT_BRIGHT_BLOCK);
 
@@ -18,13 +19,15 @@ vec3 back_prefiltered(vec3 colour, vec3 brought)
 {
     const vec3 weights = vec3(0.2126, 0.7152, 0.0722);
     float luminance = dot(colour, weights);
-    if (luminance <= params.prefilter_min)
+    if (luminance < params.prefilter_min)
         return brought;
     float line =
         params.prefilter_factor * (luminance - params.prefilter_min) + params.prefilter_min;
-    float ratio = min(line, params.prefilter_max) / luminance;
-    float slope = line < params.prefilter_max ? params.prefilter_factor : 0.0;
-    return ratio * brought + weights * (dot(brought, colour) * (slope - ratio) / luminance);
+    float held = max(luminance, 1e-30);
+    float ratio = luminance > 0.0 ? min(line, params.prefilter_max) / held : params.prefilter_factor;
+    float slope = larger(vec4(params.prefilter_max), vec4(line)).x * params.prefilter_factor;
+    vec3 above = ratio * brought + weights * (dot(brought, colour) * (slope - ratio) / held);
+    return mix(brought, above, larger(vec4(luminance), vec4(params.prefilter_min)).x);
 }
 
 vec4 shade()

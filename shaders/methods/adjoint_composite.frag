@@ -20,31 +20,16 @@ layout(set = 0, binding = 4) uniform sampler2D cotangents;
 #include "lib/adjoint_composite.glsl"
 #include "lib/sums.glsl"
 
-Pixel pixel_at(ivec2 at)
+vec4 back(ivec2 at)
 {
-    return pixel_of(texelFetch(scene, at, 0),
-                    COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, at, 0),
-                    MASKED != 0 ? texelFetch(mask, at, 0).r : 1.0, texelFetch(cotangents, at, 0));
+    return back_composite(
+        texelFetch(scene, at, 0), COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, at, 0),
+        MASKED != 0 ? texelFetch(mask, at, 0).r : 1.0, texelFetch(cotangents, at, 0), BY);
 }
 
-vec4 by_values(ivec2 at)
-{
-    Pixel p = pixel_at(at);
-    vec3 unit = COMPOSITE == COMPOSITE_MIX ? p.bloom.rgb - p.share * p.scene.rgb : p.bloom.rgb;
-    float by_intensity = COMPOSITE == COMPOSITE_OFF
-                           ? 0.0
-                           : dot(by_light(p), unit) + dot(by_alpha_light(p), p.bloom);
-    return vec4(by_intensity, p.by_curves, 0.0);
-}
-
-SUM_OF_BLOCK(by_values)
+SUM_OF_BLOCK(back)
 
 vec4 shade()
 {
-    if (BY >= BY_VALUES)
-        return sum_of_block(textureSize(scene, 0));
-    Pixel p = pixel_at(PIXEL);
-    if (BY == BY_MASK)
-        return gathered(vec4(-params.intensity * dot(p.by_mixed, p.scene.rgb), 0.0, 0.0, 0.0));
-    return gathered(BY == BY_BLOOM ? by_bloom(p) : by_scene(p));
+    return BY >= BY_VALUES ? sum_of_block(textureSize(scene, 0)) : gathered(back(PIXEL));
 }

@@ -21,8 +21,9 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 // Through value / (1 + L) or, with a sign of -1, value / (1 - L).
 vec4 back_weighted(vec4 value, vec4 brought, float sign)
 {
-    float brightness = luminance(value), divisor = 1.0 + sign * brightness;
-    float slope = brightness > 0.0 ? sign / max(params.luminance_cap, 6.0) : 0.0;
+    float divisor = 1.0 + sign * luminance(value);
+    float slope = larger(vec4(dot(value.rgb, GODOT_LUMINANCE)), vec4(0.0)).x * sign
+                / max(params.luminance_cap, 6.0);
     float by_divisor = -dot(brought, value) / (divisor * divisor);
     return brought / divisor + vec4(slope * by_divisor * GODOT_LUMINANCE, 0.0);
 }
@@ -31,9 +32,10 @@ vec4 back_glowing(vec4 sum, vec4 brought)
 {
     vec4 value = exposed(sum);
     float kept = THRESHOLDED != 0 ? feedback(value) : 1.0, t = transition(value);
-    brought.rgb *= vec3(lessThan(kept * value.rgb, vec3(params.luminance_cap)));
-    float slope = THRESHOLDED != 0 && t * t * (3.0 - 2.0 * t) > params.glow_bloom
-                    ? 6.0 * t * (1.0 - t) / max(params.threshold_scale, 1e-6)
+    brought.rgb *= larger(vec4(params.luminance_cap), kept * value).rgb;
+    float slope = THRESHOLDED != 0
+                    ? larger(vec4(t * t * (3.0 - 2.0 * t)), vec4(params.glow_bloom)).x * 6.0 * t
+                          * (1.0 - t) / max(params.threshold_scale, 1e-6)
                     : 0.0;
     brought = kept * brought
             + vec4(shares_of_brightest(value.rgb), 0.0) * (slope * dot(brought, value));

@@ -110,9 +110,10 @@ float weight_of(vec4 mean, float share, out vec3 slope)
                                               : LUMINANCE;
     float brightness = brightest ? max(mean.r, max(mean.g, mean.b)) : dot(mean.rgb, coefficients);
     // pygfx' luminances may be negative.
-    bool counts = brightness > 0.0 || GROUPS == GROUPS_PYGFX_KARIS;
-    float divisor = 1.0 + (counts ? brightness : 0.0);
-    slope = counts ? -share / (divisor * divisor) * coefficients : vec3(0.0);
+    float counts =
+        GROUPS == GROUPS_PYGFX_KARIS ? 1.0 : larger(vec4(brightness), vec4(0.0)).x;
+    float divisor = 1.0 + (counts > 0.0 ? brightness : 0.0);
+    slope = -counts * share / (divisor * divisor) * coefficients;
     return share / divisor;
 }
 
@@ -127,9 +128,9 @@ vec4 back_filament(vec4 mean, vec4 brought)
     float by_brightness = -dot(brought.rgb, above) / params.highlight
                         + (value > 0.0 ? by_factor / value : 0.0);
     vec3 by_above = brought.rgb / divisor
-                  + shares_of_brightest(above) * (by_brightness / (divisor * divisor));
+                  + shares_of_brightest(mean.rgb) * (by_brightness / (divisor * divisor));
     vec3 by_value = shares_of_brightest(mean.rgb) * (value > 0.0 ? -by_factor * factor / value : 0.0);
-    return vec4(by_above * vec3(greaterThan(above, vec3(0.0))) + by_value, brought.a * factor);
+    return vec4(by_above * larger(mean, vec4(params.threshold)).rgb + by_value, brought.a * factor);
 }
 
 // The weighted mean, and what a method makes of it.
@@ -138,7 +139,7 @@ vec4 back_end(vec4 mean, vec4 brought)
     if (GROUPS == GROUPS_FILAMENT)
         return back_filament(mean, brought);
     if (GROUPS == GROUPS_PYGFX_KARIS)
-        return brought * vec4(greaterThan(usual(mean), vec4(0.0)));
+        return brought * larger(usual(mean), vec4(0.0));
     return brought;
 }
 
@@ -166,14 +167,12 @@ vec4 back_weighted(vec4 found[5], vec4 brought, Place place)
 vec4 back_bevy(vec4 found[5], vec4 brought)
 {
     vec4 sum = vec4(0.0), own = vec4(0.0);
-    float own_luminance = 0.0, own_share = 0.0;
+    float own_share = 0.0;
     for (int group = 0; group < 5; ++group) {
         vec4 part = GROUP_SHARES[group] * found[group];
-        float luminance = group_luminance(part);
-        sum += part / (1.0 + 0.25 * luminance);
+        sum += part / (1.0 + 0.25 * group_luminance(part));
         if (group == own_group) {
             own = part;
-            own_luminance = luminance;
             own_share = GROUP_SHARES[group];
         }
     }
@@ -182,22 +181,24 @@ vec4 back_bevy(vec4 found[5], vec4 brought)
         brought = back_through_soft(vec4(max(sum.rgb, vec3(1e-4)), sum.a), brought, params.threshold,
                                     width, 4.0 * (width + 1e-5), 1e-5);
     }
-    brought.rgb *= vec3(greaterThan(sum.rgb, vec3(1e-4)));
-    float divisor = 1.0 + 0.25 * own_luminance;
-    float slope = own_luminance > 0.0 ? 0.25 * dot(brought, own) / (divisor * divisor) : 0.0;
+    brought.rgb *= larger(sum, vec4(1e-4)).rgb;
+    float divisor = 1.0 + 0.25 * group_luminance(own);
+    float slope = larger(vec4(dot(own.rgb, LUMINANCE)), vec4(0.0)).x * 0.25 * dot(brought, own)
+                / (divisor * divisor);
     return own_share * (brought / divisor - vec4(slope * LUMINANCE, 0.0));
 }
 
 vec4 back_urp(vec4 value, vec4 brought)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
-    brought *= vec4(greaterThan(urp_prefiltered(value), vec4(0.0)));
+    // The threshold's factor is not negative.
+    brought *= larger(kept, vec4(0.0));
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee;
         brought =
             back_through_soft(kept, brought, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
     }
-    return vec4(brought.rgb * vec3(lessThan(value.rgb, vec3(params.clamp_max))), brought.a);
+    return vec4(brought.rgb * larger(vec4(params.clamp_max), value).rgb, brought.a);
 }
 
 vec4 back_unreal(vec4 value, vec4 brought)
@@ -210,12 +211,6 @@ vec4 back_unreal(vec4 value, vec4 brought)
     float t = clamp(place, 0.0, 1.0);
     float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
     return t * t * (3.0 - 2.0 * t) * brought + vec4(weights, 0.0) * (slope * dot(brought, value));
-}
-
-// 1 where a is larger, a half where both are equal.
-vec4 larger(vec4 a, vec4 b)
-{
-    return vec4(greaterThan(a, b)) + 0.5 * vec4(equal(a, b));
 }
 
 // The cotangents of the three values of a median.
@@ -245,7 +240,7 @@ vec4 back_kino(vec4 found[5], vec4 brought)
         vec4 rows[3] = back_middle(values[0], values[1], values[2], columns[0]);
         brought = own_group < 3 ? rows[own_group] : columns[own_group - 2];
     }
-    return vec4(brought.rgb * vec3(lessThan(found[own_group].rgb, vec3(65000.0))), brought.a);
+    return vec4(brought.rgb * larger(vec4(65000.0), found[own_group]).rgb, brought.a);
 }
 
 // The derivative of what a smooth transition subtracts or adds (highlights.glsl).
@@ -266,11 +261,8 @@ vec4 back_highlights(vec4 value, vec4 brought)
     if (brightest <= 0.0)
         return vec4(0.0);
     float kept = max(above, 0.0) + rounding(above, at_low);
-    // In the middle of a transition, both sides have the slope 1/2.
-    float slope = kept == range && at_high > 0.0
-                    ? 0.5
-                    : float(kept < range) - rounding_slope(kept - range, at_high);
-    slope *= above == 0.0 && at_low > 0.0 ? 0.5 : float(above > 0.0) + rounding_slope(above, at_low);
+    float slope = larger(vec4(range), vec4(kept)).x - rounding_slope(kept - range, at_high);
+    slope *= larger(vec4(above), vec4(0.0)).x + rounding_slope(above, at_low);
     float factor = highlight(brightest) / brightest;
     float by_brightest = dot(brought, value) * (slope - factor) / brightest;
     return factor * brought + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);
@@ -333,7 +325,7 @@ vec4 back(vec4 found[5], vec4 brought, Place place)
     if (GROUPS == GROUPS_UNREAL)
         return back_unreal(found[0], brought);
     if (GROUPS == GROUPS_PYGFX)
-        return brought * vec4(greaterThan(pygfx_groups(taps_of(place)), vec4(0.0)));
+        return brought * larger(pygfx_mean(taps_of(place)), vec4(0.0));
     if (GROUPS == GROUPS_HIGHLIGHTS)
         return back_highlights(found[0], brought);
     if (GROUPS == GROUPS_BLENDER)

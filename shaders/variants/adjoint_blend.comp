@@ -27,10 +27,10 @@ void write_row(int first, int y)
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         int x = min(first + i, read_shapes[0].x - 1);
-        Pixel p = pixel_of(load_floats(scene, read_shapes[0], x, y),
-                           LEVELS == 0 ? vec4(0.0) : load_floats(bloom, read_shapes[1], x, y), 1.0,
-                           load_floats(cotangents, read_shapes[2], x, y));
-        found[i] = BY == BY_BLOOM ? by_bloom(p) : by_scene(p);
+        found[i] = back_composite(
+            load_floats(scene, read_shapes[0], x, y),
+            LEVELS == 0 ? vec4(0.0) : load_floats(bloom, read_shapes[1], x, y), 1.0,
+            load_floats(cotangents, read_shapes[2], x, y), BY);
     }
     store_gathered(first, y, 1.0, found);
 }

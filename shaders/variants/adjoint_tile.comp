@@ -20,10 +20,10 @@ layout(set = 0, binding = 4) uniform writeonly image2D target;
 // In planes, so that neighbours are in neighbouring banks.
 shared float sums[3][TILE_ROWS][TILE_LOADED];
 
-Pixel pixel_at(ivec2 at)
+vec4 back_at(ivec2 at, int by)
 {
-    return pixel_of(texelFetch(image, at, 0), texelFetch(bloom, at, 0), 1.0,
-                    texelFetch(cotangents, at, 0));
+    return back_composite(texelFetch(image, at, 0), texelFetch(bloom, at, 0), 1.0,
+                          texelFetch(cotangents, at, 0), by);
 }
 
 // The weights of the taps beyond the edge of a pixel at this distance from it.
@@ -54,7 +54,7 @@ void sum_vertically(ivec2 place, ivec2 last, int top, int column)
         int y = place.y + at;
         if (!within || y < 0 || y > last.y)
             continue;
-        vec3 value = by_bloom(pixel_at(ivec2(place.x, y))).rgb;
+        vec3 value = back_at(ivec2(place.x, y), BY_BLOOM).rgb;
         for (int i = 0; i < RUN; ++i)
             if (abs(at - i) <= RADIUS)
                 run[i] += vertical_weight(at - i) * value;
@@ -104,10 +104,10 @@ void main()
         ivec2 pixel = first + ivec2(column, row);
         if (pixel.y > last.y)
             continue;
-        Pixel p = pixel_at(pixel);
+        vec4 scene = texelFetch(image, pixel, 0);
         vec3 brought = sum_horizontally(row, column, pixel.x == 0, pixel.x == last.x);
-        vec4 found = back_through_threshold(p.scene, vec4(brought, 0.0), THRESHOLD_MODE,
-                                            params.threshold, params.knee);
-        imageStore(target, pixel, where_finite(found + by_scene(p), texelFetch(image, pixel, 0)));
+        vec4 found = back_through_threshold(finite_or_zero(scene), vec4(brought, 0.0),
+                                            THRESHOLD_MODE, params.threshold, params.knee);
+        imageStore(target, pixel, where_finite(found + back_at(pixel, BY_SCENE), scene));
     }
 }

@@ -163,25 +163,25 @@ def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
     # The soft parts must not extend below 0 or beyond the other end.
     at_low = min(settings.smoothness, low, high - low)
     at_high = min(settings.smoothness, high, high - low)
-    kept = -_smooth_min(-value, -low, at_low)
+    kept = _smooth_extreme(1, value, low, at_low)
     if high < math.inf:
-        kept = _smooth_min(kept, high, at_high)
+        kept = _smooth_extreme(-1, kept, high, at_high)
     scale = (kept - low) / np.where(value > 0, value, 1)
     return np.where(value > 0, rgb * scale, 0)
 
 
-def _smooth_min(values: Array, end: float, width: float) -> Array:
-    """Return min(value, end) - h^2 width / 4 with h = max(1 - |value - end| / width, 0).
+def _smooth_extreme(sign: int, values: Array, end: float, width: float) -> Array:
+    """Return max(value, end) + h^2 width / 4 with h = max(1 - |value - end| / width, 0).
 
-    The quadratic smooth minimum of Inigo Quilez, "Smooth minimum". Where h is above 0, this is a
-    parabola, which has no kink at the end.
+    With a sign of -1, the minimum and a difference. The quadratic smooth minimum of Inigo Quilez,
+    "Smooth minimum". Where h is above 0, this is a parabola, which has no kink at the end.
     """
-    smaller: Array = np.minimum(values, end)
+    extreme: Array = (np.maximum if sign > 0 else np.minimum)(values, end)
     if width > 0:
         beyond = values - end
-        parabola = (values + end) / 2 - width / 4 - beyond * beyond / (4 * width)
-        smaller = np.where(np.abs(beyond) < width, parabola, smaller)
-    return smaller
+        parabola = (values + end) / 2 + sign * width / 4 + sign * beyond * beyond / (4 * width)
+        extreme = np.where(np.abs(beyond) < width, parabola, extreme)
+    return extreme
 
 
 def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:

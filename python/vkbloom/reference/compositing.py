@@ -12,6 +12,7 @@ from vkbloom.argument_types import checked
 
 from .image import as_float, format_of, storage
 from .sampling import Array
+from .tape import joined
 from .tone_map import ENCODINGS, TONE_MAPS
 
 __all__ = ["check_settings", "composite", "composite_checked"]
@@ -205,7 +206,8 @@ def _godots(
         light, toned = np.clip(curve(glow), 0, 1), curve(scene)
         dark = ((16 * toned - 12) * toned + 4) * toned
         full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
-        return np.where(toned > 1, toned, toned + light * (full - toned))
+        lit: Array = joined(toned, 1.0, toned + light * (full - toned), toned)
+        return lit
     if settings.composite == "screen":
         white = getattr(settings, "white")  # noqa: B009
         glow = np.clip(glow, 0, white)

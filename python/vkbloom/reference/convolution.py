@@ -8,7 +8,7 @@ import numpy as np
 
 from .image import BlurInput
 from .sampling import Array, sample
-from .tape import operation, value_of
+from .tape import joined, operation, value_of
 from .threshold import luminance
 
 __all__ = ["convolve", "gain", "passes", "prefiltered"]
@@ -56,8 +56,9 @@ def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
         return glow
     found = luminance(glow[..., :3])
     wanted = np.minimum(factor * (found - low) + low, high)
-    scale = np.where(found > low, wanted / np.maximum(found, 1e-30), 1.0)
-    return np.concatenate([glow[..., :3] * scale, glow[..., 3:]], axis=2)
+    scale = np.where(found > 0, wanted / np.maximum(found, 1e-30), factor)
+    rgb = joined(found, low, glow[..., :3], glow[..., :3] * scale)
+    return np.concatenate([rgb, glow[..., 3:]], axis=2)
 
 
 def convolve(glow: Array, kernel: Array, boundary: str) -> Array:

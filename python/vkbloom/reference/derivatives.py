@@ -43,10 +43,10 @@ def vjp(
     The bloom buffers are "rgba32float", so that stores do not clamp. Rounding to 8 bits and dither
     count as the identity.
 
-    Where the function has a kink, the subgradient is: 0 at and below a threshold; 1 at both ends of
-    a clamp; equal shares for equal channels under a maximum; the mean of both sides for the offset
-    of a tap that lies on a texel centre. A hard threshold has the derivative of what it keeps: its
-    own derivative is 0.
+    Where the function has a kink, such as an end of a clamp, a threshold that is subtracted, or the
+    offset of a tap that lies on a texel centre, the subgradient is the mean of both sides. Equal
+    channels have equal shares of a maximum. A hard threshold has the derivative of what it keeps:
+    its own derivative is 0.
 
     Parameters
     ----------

@@ -87,10 +87,13 @@ def _reduce(
     if threshold is None:
         return mean
     kept = np.maximum(mean[..., :3] - threshold, 0)
-    compressed = kept / (1 + brightest(kept) / highlight)
-    # This threshold subtracts. Alpha is multiplied by the factor of the brightest channel.
     value = brightest(mean)
-    factor = np.where(value > 0, brightest(compressed) / np.where(value > 0, value, 1), 0)
+    # Not brightest(kept): channels below the threshold are equal there.
+    most = np.maximum(value - threshold, 0)
+    divisor = 1 + most / highlight
+    compressed = kept / divisor
+    # This threshold subtracts. Alpha is multiplied by the factor of the brightest channel.
+    factor = np.where(value > 0, most / divisor / np.where(value > 0, value, 1), 0)
     return np.concatenate([compressed, factor * mean[..., 3:]], axis=-1)
 
 

@@ -88,8 +88,9 @@ def _above(image: Array, threshold: float) -> Array:
         return image
     above = np.maximum(image - threshold, 0.0)
     if image.shape[2] == 4:
-        brightest = np.maximum(image[..., :3].max(axis=2), 1e-30)
-        above[..., 3] = image[..., 3] * above[..., :3].max(axis=2) / brightest
+        brightest = image[..., :3].max(axis=2)
+        kept = np.maximum(brightest - threshold, 0.0)
+        above[..., 3] = image[..., 3] * kept / np.maximum(brightest, 1e-30)
     return above
 
 

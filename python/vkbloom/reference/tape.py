@@ -4,10 +4,11 @@ NumPy's functions call `Traced.__array_ufunc__` and `Traced.__array_function__` 
 the formulas of the reference compute with them unchanged. Each operation has a rule: from the
 derivative with respect to its result to those with respect to its arguments.
 
-At a kink, the rules take these subgradients: a clamp passes the derivative inside and at its ends;
-a maximum or minimum passes it to the strictly larger or smaller argument, between equal arrays or
-channels in equal shares, and nothing where it equals a constant. An operation passes nothing where
-its derivative is infinite or undefined, such as that of a root at 0.
+At a kink, such as an end of a clamp or a maximum with a constant, the derivative is the mean of
+those to both sides. Where the differences to both sides agree, this is what they agree on. The
+mean is that of whole chains, each followed to one side: a second clamp at the same place does not
+halve it again. Equal arrays or channels have equal shares of a maximum. An operation passes nothing
+where its derivative is infinite or undefined, such as that of a root at 0.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Traced", "contiguous", "gradients", "operation", "value_of"]
+__all__ = ["Traced", "contiguous", "gradients", "joined", "operation", "value_of"]
 
 Array = NDArray[np.float64]
 # From the derivative by the result to the derivative by one argument.
 Rule = Callable[[Array], Array]
+# At kinks the rules of growing and of falling arguments.
+Sides = tuple[Rule, Rule]
 
 _order = itertools.count()
 
@@ -34,7 +37,7 @@ class _Node:
 
     __slots__ = ("arguments", "order")
 
-    def __init__(self, arguments: Sequence[tuple[_Node, Rule]] = ()) -> None:
+    def __init__(self, arguments: Sequence[tuple[_Node, Rule | Sides]] = ()) -> None:
         self.arguments = arguments
         self.order = next(_order)
 
@@ -143,12 +146,16 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             if ufunc is np.matmul:
                 return _traced(result, (inputs[0], lambda d: d @ values[1].T))
             factors = _UFUNCS[ufunc](result, *values)
-            if ufunc in (np.maximum, np.minimum) and all(isinstance(x, Traced) for x in inputs):
-                factors = tuple(factor + 0.5 * np.equal(*values) for factor in factors)
+        apart = None
+        if ufunc in _KINKS and not (
+            len(inputs) == 2 and all(isinstance(x, Traced) for x in inputs)
+        ):
+            ties = np.equal(*values) if len(values) == 2 else np.equal(values[0], 0)
+            apart = _KINKS[ufunc] * ties if ties.any() else None
         return _traced(
             result,
             *(
-                (one, lambda d, factor=factor, one=one: _summed(_times(d, factor), np.shape(one)))
+                (one, _scaled(one, factor, apart))
                 for one, factor in zip(inputs, factors, strict=True)
             ),
         )
@@ -168,7 +175,7 @@ def value_of(array: Any) -> Any:
     return array.value if isinstance(array, Traced) else array
 
 
-def operation(value: Any, *arguments: tuple[Any, Rule]) -> Any:
+def operation(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Any:
     """Return the result of an operation on arrays, some of which may be traced.
 
     Each argument has its rule. The result is traced only if an argument is.
@@ -184,7 +191,18 @@ def contiguous(array: Array) -> Array:
     return same
 
 
-def _traced(value: Any, *arguments: tuple[Any, Rule]) -> Traced:
+def joined(place: Any, at: float, below: Any, above: Any) -> Any:
+    """Return one curve up to a place and another above it, which have equal values there."""
+    value = value_of(place)
+    falling, growing = np.less_equal(value, at), np.less(value, at)
+    return operation(
+        np.where(falling, value_of(below), value_of(above)),
+        (below, (_chosen(below, growing), _chosen(below, falling))),
+        (above, (_chosen(above, ~growing), _chosen(above, ~falling))),
+    )
+
+
+def _traced(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Traced:
     return Traced(
         value, _Node([(one.node, rule) for one, rule in arguments if isinstance(one, Traced)])
     )
@@ -192,6 +210,17 @@ def _traced(value: Any, *arguments: tuple[Any, Rule]) -> Traced:
 
 def gradients(results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced]) -> list[Array]:
     """Return the derivative of sum over the results of (result . cotangent) by each input."""
+    growing, kinked = _gradients(results, inputs, 0)
+    if not kinked:
+        return growing
+    falling, _ = _gradients(results, inputs, 1)
+    return [(one + other) / 2 for one, other in zip(growing, falling, strict=True)]
+
+
+def _gradients(
+    results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced], side: int
+) -> tuple[list[Array], bool]:
+    """Return the derivatives to one side of all kinks, and whether there are any."""
     derivatives: dict[_Node, Array] = {}
     waiting: dict[int, _Node] = {}
 
@@ -204,20 +233,36 @@ def gradients(results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced])
     for result, cotangent in results:
         add(result.node, cotangent)
     found: dict[_Node, Array] = {}
+    kinked = False
     while waiting:
         node = waiting.pop(max(waiting))
         derivative = derivatives.pop(node)
         if node in wanted:
             found[node] = derivative
         for argument, rule in node.arguments:
-            add(argument, rule(derivative))
-    return [found.get(one.node, np.zeros(one.shape)) for one in inputs]
+            sides = rule if isinstance(rule, tuple) else (rule, rule)
+            kinked = kinked or isinstance(rule, tuple)
+            add(argument, sides[side](derivative))
+    return [found.get(one.node, np.zeros(one.shape)) for one in inputs], kinked
 
 
 def _times(derivative: Array, factor: Any) -> Array:
     """Return the product; 0 where the factor is not finite."""
     product: Array = derivative * np.where(np.isfinite(factor), factor, 0.0)
     return product
+
+
+def _scaled(part: Any, factor: Any, apart: Any) -> Rule | Sides:
+    """Return the rules of an argument by its factor, which differs so much on both sides."""
+
+    def rule(scale: Any) -> Rule:
+        return lambda d: _summed(_times(d, scale), np.shape(part))
+
+    return rule(factor) if apart is None else (rule(factor + apart), rule(factor - apart))
+
+
+def _chosen(part: Any, mask: Any) -> Rule:
+    return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
 
 
 def _summed(derivative: Array, shape: tuple[int, ...]) -> Array:
@@ -236,6 +281,10 @@ def _power(result: Array, base: Any, exponent: Any) -> tuple[Any, Any]:
     return by_base, np.where(base > 0, result * np.log(np.where(base > 0, base, 1.0)), 0.0)
 
 
+def _larger(one: Any, other: Any) -> Any:
+    return np.greater(one, other) + 0.5 * np.equal(one, other)
+
+
 # Their results are counts or conditions, without a derivative.
 _FLAT = {
     *(np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal),
@@ -252,8 +301,8 @@ _UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
     np.negative: lambda r, a: (-1.0,),
     np.positive: lambda r, a: (1.0,),
     np.absolute: lambda r, a: (np.sign(a),),
-    np.maximum: lambda r, a, b: (np.greater(a, b), np.greater(b, a)),
-    np.minimum: lambda r, a, b: (np.less(a, b), np.less(b, a)),
+    np.maximum: lambda r, a, b: (_larger(a, b), _larger(b, a)),
+    np.minimum: lambda r, a, b: (_larger(b, a), _larger(a, b)),
     np.power: _power,
     np.square: lambda r, a: (2 * a,),
     np.sqrt: lambda r, a: (np.divide(0.5, r),),
@@ -270,27 +319,28 @@ _UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
 }
 
 
+# By how much the factors of a growing argument are above their means at a kink.
+_KINKS: Mapping[np.ufunc, float] = {np.maximum: 0.5, np.minimum: -0.5, np.absolute: 1.0}
+
+
 def _where(condition: Any, one: Any, other: Any) -> Any:
-    chosen = value_of(condition)
-
-    def rule(part: Any, mask: Any) -> Rule:
-        return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
-
-    value = np.where(chosen, value_of(one), value_of(other))
-    return operation(value, (one, rule(one, chosen)), (other, rule(other, np.logical_not(chosen))))
+    mask = value_of(condition)
+    value = np.where(mask, value_of(one), value_of(other))
+    return operation(
+        value, (one, _chosen(one, mask)), (other, _chosen(other, np.logical_not(mask)))
+    )
 
 
 def _clip(array: Any, low: Any, high: Any) -> Any:
     value, least, most = map(value_of, (array, low, high))
-
-    def rule(part: Any, mask: Any) -> Rule:
-        return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
-
+    above, from_low, below, to_high = value > least, value >= least, value < most, value <= most
+    growing, falling = _chosen(array, from_low & below), _chosen(array, above & to_high)
+    at_ends = np.any((above != from_low) | (below != to_high))
     return operation(
         np.clip(value, least, most),
-        (array, rule(array, (value >= least) & (value <= most))),
-        (low, rule(low, value < least)),
-        (high, rule(high, value > most)),
+        (array, (growing, falling) if at_ends else growing),
+        (low, (_chosen(low, ~above), _chosen(low, ~from_low))),
+        (high, (_chosen(high, ~to_high), _chosen(high, ~below))),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .sampling import Array, sample
+from .tape import joined
 
 __all__ = ["apply_threshold", "brightest", "firefly_weight", "luminance", "masked", "soften"]
 
@@ -78,6 +79,7 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
     - `threshold`, `half_width`: Middle and half-width of the soft part, in the units of the image.
     """
     brightness = brightest(rgb)
-    soft = np.clip(brightness - threshold + half_width, 0, 2 * half_width) ** 2 / divisor
-    scale: Array = np.maximum(soft, brightness - threshold) / np.maximum(brightness, least)
+    above = brightness - threshold
+    soft = np.clip(above + half_width, 0, 2 * half_width) ** 2 / divisor
+    scale: Array = joined(above - soft, 0.0, soft, above) / np.maximum(brightness, least)
     return rgb * scale

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .sampling import Array
+from .tape import joined
 
 __all__ = ["ENCODINGS", "TONE_MAPS"]
 
@@ -107,7 +108,9 @@ def _gamma22(rgb: Array) -> Array:
 def _srgb(rgb: Array) -> Array:
     """Apply the piecewise curve of IEC 61966-2-1, negative values as 0."""
     positive = np.maximum(rgb, 0.0)
-    return np.where(positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
+    bright = 1.055 * positive ** (1 / 2.4) - 0.055
+    encoded: Array = joined(positive, 0.0031308, 12.92 * positive, bright)
+    return encoded
 
 
 def _pq(rgb: Array, reference_white: float) -> Array:
