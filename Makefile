@@ -26,7 +26,7 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 CORE := $(wildcard csrc/*/*.[ch]) $(wildcard shaders/* shaders/*/*.*) \
-        $(wildcard python/vkbloom/own/glsl/*/*) python/vkbloom/own/spirv.py setup.py pyproject.toml
+        $(wildcard python/vkbloom/_custom/glsl/*/*) python/vkbloom/_custom/spirv.py setup.py pyproject.toml
 
 # Test processes. All tests of a file run in one process, which makes its fixtures once. One process
 # more than there are cores, since some tests wait for a browser or another process.
@@ -122,7 +122,7 @@ build/engines/%/done:
 	$(@D)/bin/pip install --quiet $(PACKAGES)
 	touch $@
 
-# Compares own methods with libplacebo (docs/libplacebo.md).
+# Compares custom methods with libplacebo (docs/libplacebo.md).
 libplacebo: build/stamp/core build/libplacebo/apply_hook
 	test -n "$(HOOKS)" || { echo "give a folder of user shaders: make libplacebo HOOKS=..."; exit 2; }
 	$(PYTHON) tools/libplacebo/compare.py build/libplacebo/apply_hook "$(HOOKS)" $(LIBPLACEBO)
@@ -142,6 +142,7 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
 	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 

@@ -28,7 +28,7 @@ from setuptools.command.sdist import sdist
 
 SHADERS = Path("shaders")
 # GLSL that users can include, too.
-LIBRARY = Path("python/vkbloom/own/glsl")
+LIBRARY = Path("python/vkbloom/_custom/glsl")
 SPIRV = Path("build/spirv")
 # Where a source distribution has its modules.
 SHIPPED = Path("spirv")
@@ -39,7 +39,7 @@ STAGES = (".vert", ".frag", ".comp")
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
 LIMITED_API = [("Py_LIMITED_API", "0x030b0000")] if LIMITED else []
 # Of the package itself, which cannot be imported before its core is built.
-without_contraction = runpy.run_path("python/vkbloom/own/spirv.py")["without_contraction"]
+without_contraction = runpy.run_path("python/vkbloom/_custom/spirv.py")["without_contraction"]
 
 # The passes of spirv-opt. Without them a CPU's driver spends most of the time of a first frame on
 # the work that they do once, for all who use the package. Functions become one, variables values,
@@ -62,7 +62,7 @@ SIMPLER = f"""
     --eliminate-dead-branches --merge-blocks --simplify-instructions --compact-ids
 """.split()
 # Larger modules keep their loops: those of many filters, of which their constants leave little.
-MOST_UNROLLED = 260_000
+MAX_UNROLLED = 260_000
 
 
 # GLSL's names of the formats that a shader can be compiled for, by the package's names.
@@ -185,7 +185,7 @@ def build_module(module: Module, target: Path) -> None:
     optimize(module, target, ONE_FUNCTION)
     rolled = target.read_bytes()
     optimize(module, target, ["--loop-unroll"])
-    if target.stat().st_size > MOST_UNROLLED:
+    if target.stat().st_size > MAX_UNROLLED:
         target.write_bytes(rolled)
     decorate(target)
     optimize(module, target, SIMPLER)
@@ -194,7 +194,7 @@ def build_module(module: Module, target: Path) -> None:
 def sources() -> list[Path]:
     """Return what the modules are made of, and by."""
     files = [*SHADERS.rglob("*.*"), *LIBRARY.rglob("*.glsl")]
-    return [Path("setup.py"), Path("python/vkbloom/own/spirv.py"), *sorted(files)]
+    return [Path("setup.py"), Path("python/vkbloom/_custom/spirv.py"), *sorted(files)]
 
 
 def made_with(folder: Path) -> dict[str, str]:

@@ -24,8 +24,8 @@ from benchmarks.inputs import pictures
 from benchmarks.plan import Plan
 from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
 from benchmarks.timing import alternate_seconds
-from vkbloom import _core, requests
-from vkbloom.core_access import core_of
+from vkbloom import _core
+from vkbloom._renderer import requests
 
 __all__ = ["run"]
 
@@ -76,7 +76,7 @@ def run(plan: Plan, section: Section) -> None:
             if on_cpu:
                 ours = {name: _processor_time(call) for name, call in ours.items()}
             times[name] = alternate_seconds(ours, plan.times(ROUNDS), warm_up=3)
-            memory = core_of(renderer).cached[2]
+            memory = renderer._core.cached[2]
         backward = times[name]["backward"].over(times[name]["forward"]).value
         section.goals.append(Goal(f"{name}: backward / forward", backward, MOST, at_most=True))
         section.times[name] = times[name]
@@ -95,13 +95,13 @@ def _calls(
 
     def forward(turn: int) -> float:
         image = images[turn % len(images)]
-        return sum(renderer.apply(image, settings, attachments="final").timings.values())
+        return sum(renderer.apply(image, settings, framebuffers="final").timings.values())
 
     def backward(turn: int) -> float:
         return _pulled(renderer, settings, images[turn % 3], cotangents[turn % 3])[1]
 
     source = _core.image_source(images[0], None, None, (cotangents[0],))
-    if core_of(renderer).adjoint(source, settings, ("final",), False) is None:
+    if renderer._core.adjoint(source, settings, ("final",), False) is None:
         return None
     return {"forward": forward, "backward": backward}
 
@@ -122,7 +122,7 @@ def _pulled(
     cotangent: NDArray[Any],
 ) -> tuple[NDArray[Any], float]:
     """Return the derivatives by the image, and the seconds of the passes."""
-    core = core_of(renderer)
+    core = renderer._core
     source = _core.image_source(image, None, None, (cotangent,))
     plan = core.adjoint(source, settings, ("final",), False)
     assert plan is not None

@@ -27,7 +27,7 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "requests": "many requests with one image, against single calls",
         "cost": "cost against pixels, kernel length and levels",
         "overhead": "the constant cost of a call",
-        "own": "an own method against the same rows built in, and loading it",
+        "own": "a custom method against the same rows built in, and loading it",
         "startup": "import, renderer and first frame, in fresh processes",
         "separable": "two passes of N taps against one of N x N",
         "convolution": "convolution with large kernels against SciPy's transforms",

@@ -111,7 +111,7 @@ def _time_one(
     with plan.renderer() as renderer:
 
         def bloom(image: NDArray[Any]) -> NDArray[Any]:
-            return renderer.apply(image, settings, attachments=("final",))["final"]
+            return renderer.apply(image, settings, framebuffers=("final",))["final"]
 
         blooms: dict[str, peers.ImageBloom] = {OURS: bloom}
         for name, other in theirs.items():

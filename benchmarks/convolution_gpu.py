@@ -85,7 +85,7 @@ def _time_one(
         renderer: vkbloom.Renderer, name: str, first: int = 0
     ) -> Callable[[int], vkbloom.Frames]:
         return lambda turn: renderer.apply(
-            images[(2 * turn + first) % COUNT], settings, attachments=(name,)
+            images[(2 * turn + first) % COUNT], settings, framebuffers=(name,)
         )
 
     ours, stages = renderers
@@ -116,7 +116,7 @@ def _time_one(
     )
     section.times[group] = times
     section.tables.append(side_by_side(group, times, OURS))
-    ours.apply(images[1], settings, attachments=("final",))
+    ours.apply(images[1], settings, framebuffers=("final",))
     passes = apply(ours, "final")(0).timings
     section.tables.append(
         Table(

@@ -42,7 +42,7 @@ def run(plan: Plan, section: Section) -> None:
                 vkbloom.Separable(bloom=bloom),
                 size,
                 time=0.013 * turn,
-                attachments=("final",),
+                framebuffers=("final",),
             )
 
         for turn in (0, 20, 50):

@@ -98,7 +98,7 @@ def points() -> None:
     total = int(np.prod([len(value) for value in values.values()]))
     with folder() as path, memory() as samples:
         start = time.perf_counter()
-        made = vkbloom.grid_to_zarr(image, SETTINGS, values, path / "a.zarr", adapter=ADAPTER)
+        made = vkbloom.grid(image, SETTINGS, values, store=path / "a.zarr", adapter=ADAPTER)
         seconds = time.perf_counter() - start
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         print(f"{total} points of {SIDE} x {SIDE} into Zarr: {seconds:.1f} s, "
@@ -112,12 +112,18 @@ def points() -> None:
                 chosen: dict[str, Any] = {
                     n: float(v[i]) for (n, v), i in zip(values.items(), spot, strict=True)
                 }
-                alone = renderer.apply(image, vkbloom.Separable(**chosen), attachments="final")
+                alone = renderer.apply(image, vkbloom.Separable(**chosen), framebuffers="final")
                 assert np.array_equal(made["final"][spot].values, alone["final"]), spot
             print(f"  {len(spots)} points equal to single renders")
             start = time.perf_counter()
-            dataset = renderer.grid(image, SETTINGS, values, attachments=(),
-                                    reduce={"mean": vkbloom.reductions.Mean()})  # fmt: skip
+            dataset = vkbloom.grid(
+                image,
+                SETTINGS,
+                values,
+                framebuffers=(),
+                reduce={"mean": vkbloom.reductions.Mean()},
+                renderer=renderer,
+            )
             seconds_reduced = time.perf_counter() - start
             del dataset
             print(f"  only the means, in memory: {total / seconds_reduced:.0f} points/s")
@@ -132,15 +138,15 @@ def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) ->
     with vkbloom.Renderer(ADAPTER) as renderer:
         start = time.perf_counter()
         for changes in every:
-            renderer.apply(image, vkbloom.Separable(**changes), attachments="final")
+            renderer.apply(image, vkbloom.Separable(**changes), framebuffers="final")
         kept = len(every) / (time.perf_counter() - start)
         other = image[::-1].copy()
         chosen = random.Random(2).sample(every, min(SINGLES, len(every)))
         start = time.perf_counter()
         for changes in chosen:
             # Another image in between makes every pass of every point run.
-            renderer.apply(image, vkbloom.Separable(**changes), attachments="final")
-            renderer.apply(other, vkbloom.Separable(**changes), attachments="final")
+            renderer.apply(image, vkbloom.Separable(**changes), framebuffers="final")
+            renderer.apply(other, vkbloom.Separable(**changes), framebuffers="final")
         alone = 2 * len(chosen) / (time.perf_counter() - start)
     print(f"  {len(every)} single calls in nested loops: {kept:.0f} points/s, grid is "
           f"{rate / kept:.2f} times that")  # fmt: skip
@@ -181,8 +187,8 @@ def tiny() -> None:
         memories = [psutil.Process(pid).memory_info().rss / 2**20 for pid in workers]
         with memory() as samples:
             start = time.perf_counter()
-            made = vkbloom.grid_to_zarr(
-                picture(16), SETTINGS, values, path / "a.zarr", client=client, adapter=ADAPTER
+            made = vkbloom.grid(
+                picture(16), SETTINGS, values, store=path / "a.zarr", client=client, adapter=ADAPTER
             )
             seconds = time.perf_counter() - start
         used = psutil.Process().cpu_times()
@@ -217,10 +223,10 @@ def workers() -> None:
                 distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
             ):
                 warm = {name: value[:2] for name, value in values.items()}
-                vkbloom.grid_to_zarr(image, SETTINGS, warm, path / "w.zarr", client=client,
+                vkbloom.grid(image, SETTINGS, warm, store=path / "w.zarr", client=client,
                                      adapter=ADAPTER)  # fmt: skip
                 start = time.perf_counter()
-                made = vkbloom.grid_to_zarr(image, SETTINGS, values, path / "a.zarr", client=client,
+                made = vkbloom.grid(image, SETTINGS, values, store=path / "a.zarr", client=client,
                                             adapter=ADAPTER)  # fmt: skip
                 rates[count] = total / (time.perf_counter() - start)
                 print(f"{count} workers, lavapipe threads for each worker: {threads}: "

@@ -120,7 +120,7 @@ def _time_one(
 
 
 def _bloom(renderer: vkbloom.Renderer) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    return lambda image: renderer.apply(image, SETTINGS, attachments=("final",))["final"]
+    return lambda image: renderer.apply(image, SETTINGS, framebuffers=("final",))["final"]
 
 
 def _other_strength(
@@ -128,7 +128,7 @@ def _other_strength(
 ) -> Callable[[int], vkbloom.Frames]:
     def call(turn: int) -> vkbloom.Frames:
         settings = SETTINGS.replace(blur_strength=1.0 + 0.01 * (turn % 50))
-        return renderer.apply(image, settings, attachments=("final",))
+        return renderer.apply(image, settings, framebuffers=("final",))
 
     return call
 
@@ -138,7 +138,7 @@ def _into(
 ) -> Callable[[int], vkbloom.Frames]:
     out = {"final": np.zeros_like(images[0])}
     return lambda turn: renderer.apply(
-        images[turn % COUNT], SETTINGS, attachments=("final",), out=out
+        images[turn % COUNT], SETTINGS, framebuffers=("final",), out=out
     )
 
 

@@ -124,7 +124,7 @@ def _on_device(
 
 
 def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> vkbloom.Frames:
-    return renderer.apply(image, SETTINGS, attachments=("final",))
+    return renderer.apply(image, SETTINGS, framebuffers=("final",))
 
 
 def _in_hands(
@@ -153,11 +153,11 @@ def _in_hands(
     ]
 
     def strength(source: Any, turn: int) -> vkbloom.Frames:
-        return ours.apply(source, strengths[turn], attachments=("final",))
+        return ours.apply(source, strengths[turn], framebuffers=("final",))
 
     def frame(_: int) -> vkbloom.Frames:
         return ours.render(
-            scene, SETTINGS, (width, height), shading="deferred", attachments=("scene",)
+            scene, SETTINGS, (width, height), shading="deferred", framebuffers=("scene",)
         )
 
     calls = {

@@ -29,6 +29,6 @@ def contender(
     """
     return Contender(
         name,
-        lambda _: renderer.apply(next(images), settings, attachments=("final",)),
+        lambda _: renderer.apply(next(images), settings, framebuffers=("final",)),
         device_clock(renderer.info),
     )

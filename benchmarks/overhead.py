@@ -78,7 +78,7 @@ def run(plan: Plan, section: Section) -> None:
                 Contender(
                     name,
                     lambda turn, renderer=renderer: renderer.apply(  # type: ignore[misc]
-                        images[turn % COUNT], SETTINGS, attachments=("final",)
+                        images[turn % COUNT], SETTINGS, framebuffers=("final",)
                     ),
                 )
                 for name, renderer in made.items()
@@ -102,25 +102,25 @@ def _cases(images: list[NDArray[Any]]) -> dict[str, Case]:
     final = ("final",)
 
     def again(renderer: vkbloom.Renderer, _: int) -> vkbloom.Frames:
-        return renderer.apply(image, SETTINGS, attachments=final)
+        return renderer.apply(image, SETTINGS, framebuffers=final)
 
     def composite(renderer: vkbloom.Renderer, turn: int) -> vkbloom.Frames:
         settings = SETTINGS.replace(intensity=0.5 + 0.001 * turn)
-        return renderer.apply(image, settings, attachments=final)
+        return renderer.apply(image, settings, framebuffers=final)
 
     def blur(renderer: vkbloom.Renderer, turn: int) -> vkbloom.Frames:
         settings = SETTINGS.replace(blur_strength=0.5 + 0.001 * turn)
-        return renderer.apply(image, settings, attachments=final)
+        return renderer.apply(image, settings, framebuffers=final)
 
     def everything(renderer: vkbloom.Renderer, turn: int) -> vkbloom.Frames:
-        return renderer.apply(images[turn % COUNT], SETTINGS, attachments=final)
+        return renderer.apply(images[turn % COUNT], SETTINGS, framebuffers=final)
 
     def all_read(renderer: vkbloom.Renderer, turn: int) -> vkbloom.Frames:
         return renderer.apply(images[turn % COUNT], SETTINGS)
 
     def loops(renderer: vkbloom.Renderer, turn: int) -> vkbloom.Frames:
         settings = SETTINGS.replace(loops=LOOPS)
-        return renderer.apply(images[turn % COUNT], settings, attachments=final)
+        return renderer.apply(images[turn % COUNT], settings, framebuffers=final)
 
     return {
         "nothing runs: same image, same settings": again,

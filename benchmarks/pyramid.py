@@ -80,11 +80,11 @@ def run(plan: Plan, section: Section) -> None:
 
 
 def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
-    return renderer.apply(image, SETTINGS, attachments=("final",))["final"]
+    return renderer.apply(image, SETTINGS, framebuffers=("final",))["final"]
 
 
 def _bloom_alone(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
-    return renderer.apply(image, SETTINGS, attachments=("bloom",))["bloom"]
+    return renderer.apply(image, SETTINGS, framebuffers=("bloom",))["bloom"]
 
 
 def _pygfx(

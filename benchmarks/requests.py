@@ -26,7 +26,7 @@ __all__ = ["best_order", "run", "worst_order"]
 
 SIZE: Final = (256, 256)
 BLOCKS: Final = 20
-MANY: Final = "apply_many, best order"
+MANY: Final = "sweep, best order"
 CALLS: Final = "apply, best order"
 WORST: Final = "apply, worst order"
 
@@ -73,8 +73,8 @@ def run(plan: Plan, section: Section) -> None:
         first = renderers[MANY].apply(image, settings[0])
         everything = count * len(first.timings)
         for name, renderer in renderers.items():
-            alone = renderer.apply(image, work[name][0], attachments=("final",))["final"]
-            many = next(renderers[MANY].apply_many(image, work[name][:1], attachments=("final",)))[
+            alone = renderer.apply(image, work[name][0], framebuffers=("final",))["final"]
+            many = next(renderers[MANY].sweep(image, work[name][:1], framebuffers=("final",)))[
                 "final"
             ]
             section.agreements.append(agreement(name, many, alone, 0.0, "the same computation"))
@@ -113,9 +113,9 @@ def _time_block(
     ran = 0
     start = time.perf_counter()
     if many:
-        for frames in renderer.apply_many(image, settings, attachments=("final",)):
+        for frames in renderer.sweep(image, settings, framebuffers=("final",)):
             ran += len(frames.timings)
     else:
         for each in settings:
-            ran += len(renderer.apply(image, each, attachments=("final",)).timings)
+            ran += len(renderer.apply(image, each, framebuffers=("final",)).timings)
     return time.perf_counter() - start, ran

@@ -43,7 +43,7 @@ renderer = step("Renderer()", lambda: vkbloom.Renderer(sys.argv[1]))
 scene = step("Scene.ufo()", vkbloom.Scene.ufo)
 size = json.loads(sys.argv[2])
 for turn, name in enumerate(("first frame", "second frame")):
-    step(name, lambda: renderer.render(scene, size=size, time=0.1 * turn, attachments=("final",)))
+    step(name, lambda: renderer.render(scene, size=size, time=0.1 * turn, framebuffers=("final",)))
 print(json.dumps(steps))
 """
 

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 import vkbloom
-from vkbloom.views.pictures import contact_sheet_png
+from vkbloom._views.pictures import contact_sheet_png
 
 SIZE = (1280, 720)
 

@@ -91,7 +91,7 @@ def weights_like(dtype: Any, device: Any) -> Any:
 
 def make_pair(renderer: vkbloom.Renderer, image: Any, settings: vkbloom.Settings) -> dict[str, Any]:
     """Return the pair of an image: arrays of NumPy, or tensors of its GPU."""
-    made = renderer.apply(image, settings, attachments="final")["final"]
+    made = renderer.apply(image, settings, framebuffers="final")["final"]
     if isinstance(made, vkbloom.DeviceArray):
         import torch  # noqa: PLC0415  only for tensors
 

@@ -174,7 +174,7 @@
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
     INPUT(B, int, count) \
-    VEC4S(B, weights, MOST_TAPS)
+    VEC4S(B, weights, MAX_TAPS)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
 // ghosts. SUMMED_ROWS are of adjoints.
@@ -189,7 +189,7 @@
     INPUT(B, float, width) \
     INPUT(B, int, count) \
     SUMMED_ROWS(B, INPUT) \
-    VEC4S(B, ghosts, MOST_GHOSTS)
+    VEC4S(B, ghosts, MAX_GHOSTS)
 
 // Of an adjoint pass that reads many pixels for the texels of a block, which is `summed_width` x
 // `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each texel
@@ -402,9 +402,9 @@
     SETTING(strength, 1.0, 0.0, 16.0)
 
 #define GLARE_COUNT_ROWS(COUNT) \
-    COUNT(halvings, 2, 0, MOST_HALVINGS) \
+    COUNT(halvings, 2, 0, MAX_HALVINGS) \
     COUNT(directions, 6, 1, 16) \
-    COUNT(base, 4, 2, MOST_TAPS) \
+    COUNT(base, 4, 2, MAX_TAPS) \
     COUNT(iterations, 4, 1, 6) \
     COUNT(lerp, 0, 0, 1) \
     COUNT(seed, 0, 0, 65535)
@@ -428,10 +428,10 @@
 // the size of their scales, the taps of an iteration of a streak, and how often the size of the
 // bloom buffers is halved.
 #define MAX_STAGES    (GATHERED_LEVELS - 2)
-#define MOST_GHOSTS   16
+#define MAX_GHOSTS   16
 #define GHOST_LIMIT   16.0
-#define MOST_TAPS     8
-#define MOST_HALVINGS 4
+#define MAX_TAPS     8
+#define MAX_HALVINGS 4
 
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.

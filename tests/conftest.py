@@ -19,8 +19,9 @@ import pytest
 import vkbloom
 from tests.device.exceptions import reason_against
 from tests.time_budget import TimeBudget
-from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters, interruptible
-from vkbloom.registry import METHODS
+from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
+from vkbloom._renderer import interruptible
+from vkbloom._settings.registry import METHODS
 
 #: The adapter of the tests. For a GPU, set VKBLOOM_TEST_ADAPTER=hardware.
 ADAPTER = os.environ.get("VKBLOOM_TEST_ADAPTER", "software")

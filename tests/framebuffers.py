@@ -12,7 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from vkbloom import Separable, Settings
-from vkbloom.frames import Frames
+from vkbloom._renderer.frames import Frames
 
 INFO = {
     "adapter": "Some <GPU> & co",

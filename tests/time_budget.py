@@ -21,7 +21,6 @@ BUDGET: Final[dict[str, int]] = {
     "bench/test_bench.py": 20,
     "cli/test_cli.py": 20,
     "cli/test_cli_apply.py": 20,
-    "cli/test_cli_grid.py": 25,
     "cli/test_doctor.py": 25,
     "core/test_batches.py": 35,
     "core/test_eviction.py": 20,

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 # Wide blooms need large images.
 SIZE = "512x512"

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 import vkbloom
-from vkbloom.fields import fields_of
-from vkbloom.gradients import on_device
-from vkbloom.reference.derivatives import differentiable
-from vkbloom.registry import METHODS
+from vkbloom._gradients import on_device
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS
+from vkbloom.reference._derivatives import differentiable
 
 IMAGE = np.random.default_rng(0).random((32, 40, 4)) * 2
 KERNEL = np.random.default_rng(1).random((5, 5))

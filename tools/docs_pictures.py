@@ -23,7 +23,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 import vkbloom
-from vkbloom.views import pictures
+from vkbloom._views import pictures
 
 mpl.use("agg")
 from matplotlib import pyplot as plt
@@ -136,12 +136,12 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
         # Such a bloom stands for the whole picture, not for its lights alone. Without bloom a scene
         # has no lamps, but its picture before the bloom has.
         if not settings.bloom or (settings.composite == "mix" and settings.intensity == 1):
-            lit = renderer.render(scene, None, size, shading="deferred", attachments=["scene"])
-            final = renderer.apply(lit["scene"], changed, attachments=["final"])["final"]
+            lit = renderer.render(scene, None, size, shading="deferred", framebuffers=["scene"])
+            final = renderer.apply(lit["scene"], changed, framebuffers=["final"])["final"]
             final = np.rint(255 * np.clip(final.astype(np.float32), 0, 1)).astype(np.uint8)
         else:
             final = renderer.render(
-                scene, changed, size, shading="deferred", attachments=["final"]
+                scene, changed, size, shading="deferred", framebuffers=["final"]
             )["final"]
         top, left = row * (size[1] + label), column * size[0]
         sheet[top : top + size[1], left : left + size[0]] = final[:, :, :3]
@@ -163,7 +163,7 @@ def draw_profiles(renderer: vkbloom.Renderer, path: Path) -> None:
     figure, axes = plt.subplots(figsize=(8, 4.6), layout="constrained")
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
         exact = settings.replace(format="rgba32float", bloom=True)
-        bloom = renderer.apply(image, exact, attachments=["bloom"])["bloom"]
+        bloom = renderer.apply(image, exact, framebuffers=["bloom"])["bloom"]
         profile = bloom[y, x:, 0]
         seen = profile > 1e-6 * bloom.max()
         axes.loglog(

@@ -20,7 +20,7 @@ from PIL import Image
 from skimage import data, transform
 
 import vkbloom
-from vkbloom.io.srgb import decode_srgb, encode_srgb
+from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 WIDTH: Final = 192
 Pixels = NDArray[np.uint8]

@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.views import pictures
+from vkbloom._views import pictures
 
 COLUMNS, LABEL = 3, 22
 LOOK = vkbloom.Pyramid(threshold=1.0, intensity=0.15, exposure=0.6, tonemap="agx", encoding="srgb")
@@ -44,7 +44,7 @@ def main() -> None:
         }
         settings = LOOK.replace(glare=(vkbloom.Streaks(threshold=4),))
         axes = {"glare.0.fade": [0.8, 0.94, 0.98], "glare.0.directions": [1, 4, 6]}
-        grid = renderer.grid(image, settings, axes=axes, attachments="final")
+        grid = vkbloom.grid(image, settings, axes=axes, framebuffers="final", renderer=renderer)
     save(shown, folder / "glare.jpg")
     points = {
         f"fade {fade}, directions {count}": level(grid["final"].values[i, j])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom import testing
 from vkbloom.testing import Probe
-from vkbloom.testing.probe import Bloom
+from vkbloom.testing._probe import Bloom
 
 TARGET = Path(__file__).parents[1] / "docs" / "laws.md"
 SIGMA = 2.0
@@ -152,7 +152,7 @@ def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
     """Yield this package's methods."""
 
     def bloom(settings: vkbloom.Settings, name: str = "bloom") -> Bloom:
-        return lambda image: renderer.apply(image, settings, attachments=(name,))[name]
+        return lambda image: renderer.apply(image, settings, framebuffers=(name,))[name]
 
     name = f"vkbloom {vkbloom.__version__}"
     gaussian = vkbloom.Separable(weights=vkbloom.gaussian_weights(SIGMA, 8), blur_strength=1.0)

@@ -45,7 +45,7 @@ def cost(renderer: vkbloom.Renderer, settings: vkbloom.Settings, rounds: int) ->
     seconds = []
     for index in range(rounds + 3):
         began = time.perf_counter()
-        renderer.apply(images[index % 2], settings, attachments=["final"])
+        renderer.apply(images[index % 2], settings, framebuffers=["final"])
         seconds.append(time.perf_counter() - began)
     return median(seconds[3:])
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.views import pictures
+from vkbloom._views import pictures
 
 Image = NDArray[np.float32]
 
@@ -122,7 +122,7 @@ def draw_convolutions(renderer: vkbloom.Renderer, image: Image, target: Path) ->
     sheet = np.ones((2 * height, 3 * width, 3), np.uint8)
     labels = []
     for index, (name, settings) in enumerate(every.items()):
-        final = renderer.apply(image, settings.replace(**look), attachments=["final"])["final"]
+        final = renderer.apply(image, settings.replace(**look), framebuffers=["final"])["final"]
         y, x = index // 3 * height, index % 3 * width
         part = np.clip(final[top : top + height, left : left + width], 0, 1)
         sheet[y : y + height, x : x + width] = np.rint(255 * part)
@@ -137,7 +137,7 @@ def main() -> None:
     image = city()
     with vkbloom.Renderer("software") as renderer:
         plain, bloom = (
-            renderer.apply(image, settings, attachments=["final"])["final"]
+            renderer.apply(image, settings, framebuffers=["final"])["final"]
             for settings in (SETTINGS.replace(bloom=False), SETTINGS)
         )
         draw_convolutions(renderer, image, target.with_name("night_psf.jpg"))

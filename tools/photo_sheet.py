@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from skimage import data
 
 import vkbloom
-from vkbloom.cli.program import program
-from vkbloom.views import pictures
+from vkbloom._cli.program import program
+from vkbloom._views import pictures
 
 sys.path.insert(0, str(Path(__file__).parent))
 from night_picture import city
@@ -47,7 +47,7 @@ def developed(image: NDArray[Any], stops: float) -> Image:
     """Return an HDR picture as 8 bits."""
     with vkbloom.Renderer("software") as renderer:
         plain = vkbloom.Separable(exposure=stops, **LOOK)
-        final = renderer.apply(image, plain, attachments=["final"])["final"][..., :3]
+        final = renderer.apply(image, plain, framebuffers=["final"])["final"][..., :3]
     return np.rint(255 * np.clip(final.astype(np.float32), 0, 1)).astype(np.uint8)
 
 

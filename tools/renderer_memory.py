@@ -142,7 +142,7 @@ def frame_growth(scene: vkbloom.Scene, count: int) -> dict[str, float]:
             chosen, size = next(requests)
             renderer.render(scene, chosen, size, time=next(times))
             # Abandon some more, which the device has started with.
-            many = renderer.render_many(scene, settings, size, time=next(times))
+            many = renderer.sweep(scene, settings, size=size, time=next(times))
             for _ in range(3):
                 next(many)
 

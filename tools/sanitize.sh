@@ -16,7 +16,7 @@ if [ $# = 0 ]; then
     for name in apply_input dither level_weights rg11b10 variants; do
         set -- "$@" "tests/methods/test_$name.py"
     done
-    set -- "$@" tests/methods/test_own_passes.py tests/own/test_rendering.py
+    set -- "$@" tests/methods/test_custom_passes.py tests/custom/test_rendering.py
     for name in deferred deferred_passes render textures; do
         set -- "$@" "tests/scene/test_$name.py"
     done

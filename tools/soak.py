@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import vkbloom
+from vkbloom._renderer.surface import Surface
 
 STEPS = 10
 
@@ -53,7 +54,7 @@ def counts() -> dict[str, int]:
 
 def frame(
     renderer: vkbloom.Renderer,
-    surface: vkbloom.Surface | None,
+    surface: Surface | None,
     scene: vkbloom.Scene,
     dice: random.Random,
 ) -> None:
@@ -75,7 +76,7 @@ def frame(
     if surface and dice.random() < 0.2:
         surface.present(scene, settings, time=dice.random())
         if dice.random() < 0.05:
-            with vkbloom.Surface(renderer, size=size) as other:
+            with Surface(renderer, size=size) as other:
                 other.present(scene, settings, time=dice.random())
         return
     if dice.random() < 0.3:
@@ -86,9 +87,9 @@ def frame(
     pixels = np.full((size[1], size[0], dice.choice((3, 4))), dice.randrange(1, 200), dtype)
     if dice.random() < 0.1:
         # Abandon the sequence half way.
-        next(iter(renderer.apply_many(pixels, [settings] * 4)))
+        next(iter(renderer.sweep(pixels, [settings] * 4)))
     else:
-        renderer.apply(pixels, settings, attachments=dice.choice(("all", "final")))
+        renderer.apply(pixels, settings, framebuffers=dice.choice(("all", "final")))
 
 
 def main(total: int) -> int:
@@ -99,7 +100,7 @@ def main(total: int) -> int:
     begin = time.perf_counter()
     with vkbloom.Renderer("software") as renderer:
         try:
-            surface = vkbloom.Surface(renderer, size=(40, 30))
+            surface = Surface(renderer, size=(40, 30))
         except vkbloom.Error as error:
             print(f"Nothing is presented: {error}")
             surface = None

@@ -42,7 +42,7 @@ def bloom_of(
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
         grey = np.repeat(image, 3, axis=2)
-        return renderer.apply(grey, settings, attachments="bloom")["bloom"][:, :, :1]
+        return renderer.apply(grey, settings, framebuffers="bloom")["bloom"][:, :, :1]
 
     return bloom
 

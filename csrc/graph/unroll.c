@@ -25,11 +25,11 @@ static bool begin_block(struct vkb_unrolled *module, uint32_t label)
 static const uint32_t *start_iteration(struct vkb_unrolled *module, const uint32_t *header,
                                        bool first)
 {
-    struct value values[MOST_PHIS];
+    struct value values[MAX_PHIS];
     uint32_t count = 0;
     const uint32_t *at = vkb_next(header);
 
-    for (; vkb_opcode(at) == SPV_PHI && count < MOST_PHIS; at = vkb_next(at)) {
+    for (; vkb_opcode(at) == SPV_PHI && count < MAX_PHIS; at = vkb_next(at)) {
         const uint32_t other = (module->read.at[at[4]] < header) == first ? 3 : 5;
         module->fits &= vkb_word_count(at) == 7;
         if (module->fits)
@@ -71,7 +71,7 @@ static const uint32_t *write_loop(struct vkb_unrolled *module, const uint32_t *h
         for (const uint32_t *at = start_iteration(module, header, i == 0); at < merge;
              at = vkb_next(at))
             vkb_copy_instruction(module, at);
-        module->fits &= ids[branch[1]].value.known && i < MOST_ITERATIONS;
+        module->fits &= ids[branch[1]].value.known && i < MAX_ITERATIONS;
         if (!module->fits || !ids[branch[1]].value.number)
             break;
         for (const uint32_t *at = body; at < end; at = vkb_next(at))
@@ -116,7 +116,7 @@ static void read_declarations(struct vkb_unrolled *module)
         value->known = vkb_constant(read, at, &value->number);
         if (!value->known)
             continue;
-        module->fits &= module->constant_count < MOST_CONSTANTS;
+        module->fits &= module->constant_count < MAX_CONSTANTS;
         if (module->fits)
             module->constants[module->constant_count++] =
                 (struct constant){at[1], value->number, at[2]};
@@ -211,11 +211,11 @@ static struct vkb_unrolled *create(const struct vkb_shader *shader, struct vkb_e
     // (vkb_alloc would write to all of what is grown here.)
     if (vkb_read_module(shader, &module->read, error)
         && (module->ids = vkb_alloc(error, module->read.bound, sizeof *module->ids)) != NULL
-        && vkb_grow(error, &module->blocks, &blocks, MOST_IDS, sizeof *module->blocks)
-        && vkb_grow(error, &module->copies, &copies, MOST_IDS, sizeof *module->copies)) {
+        && vkb_grow(error, &module->blocks, &blocks, MAX_IDS, sizeof *module->blocks)
+        && vkb_grow(error, &module->copies, &copies, MAX_IDS, sizeof *module->copies)) {
         module->blocks[0] = (struct block){0};
         module->function.error = error;
-        module->fits = module->read.bound < MOST_IDS;
+        module->fits = module->read.bound < MAX_IDS;
         return module;
     }
     destroy(module);

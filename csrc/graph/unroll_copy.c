@@ -126,7 +126,7 @@ static void write_variable(struct vkb_unrolled *module, const uint32_t *at)
     id->place = module->place_count + 1;
     module->place_count += is_array ? id->elements : 1;
     module->fits &=
-        vkb_word_count(at) == 4 && id->elements < MOST_PLACES && module->place_count < MOST_PLACES;
+        vkb_word_count(at) == 4 && id->elements < MAX_PLACES && module->place_count < MAX_PLACES;
 }
 
 // A pointer to an element of a local array. Returns false if it is one to something else.

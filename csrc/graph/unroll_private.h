@@ -7,12 +7,12 @@
 
 // What is larger stays as it is.
 enum {
-    MOST_WORDS = 1 << 18,
-    MOST_IDS = 1 << 16,
-    MOST_PLACES = 1 << 10,
-    MOST_CONSTANTS = 1 << 10,
-    MOST_PHIS = 64,
-    MOST_ITERATIONS = 1 << 10,
+    MAX_WORDS = 1 << 18,
+    MAX_IDS = 1 << 16,
+    MAX_PLACES = 1 << 10,
+    MAX_CONSTANTS = 1 << 10,
+    MAX_PHIS = 64,
+    MAX_ITERATIONS = 1 << 10,
 };
 
 // What an operand stands for in the copy of its instruction that was written last.
@@ -62,8 +62,8 @@ struct vkb_unrolled {
     struct id *ids;
     struct block *blocks;  // by their names
     struct copy *copies;
-    struct place places[MOST_PLACES];
-    struct constant constants[MOST_CONSTANTS];
+    struct place places[MAX_PLACES];
+    struct constant constants[MAX_CONSTANTS];
     uint32_t last_name, place_count, copy_count, constant_count, declared_count;
     struct vkb_code function;  // that is written
     uint32_t label, block;     // of the block that is written: its label, its name

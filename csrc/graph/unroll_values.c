@@ -2,7 +2,7 @@
 
 bool vkb_fits(const struct vkb_unrolled *module)
 {
-    return module->fits && !module->function.failed && module->function.count < MOST_WORDS;
+    return module->fits && !module->function.failed && module->function.count < MAX_WORDS;
 }
 
 bool vkb_is_local(const struct vkb_unrolled *module, uint32_t id)
@@ -17,7 +17,7 @@ static uint32_t new_name(struct vkb_unrolled *module)
     do
         ++module->last_name;
     while (module->last_name < module->read.bound && !vkb_is_local(module, module->last_name));
-    module->fits &= module->last_name < MOST_IDS;
+    module->fits &= module->last_name < MAX_IDS;
     return module->fits ? module->last_name : 0;
 }
 
@@ -28,7 +28,7 @@ static uint32_t constant_name(struct vkb_unrolled *module, uint32_t type, uint32
         if (one->type == type && one->number == number)
             return one->name;
     }
-    module->fits &= module->constant_count < MOST_CONSTANTS;
+    module->fits &= module->constant_count < MAX_CONSTANTS;
     if (!module->fits)
         return 0;
     struct constant *one = &module->constants[module->constant_count++];

@@ -250,7 +250,7 @@ bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_
 {
     struct vkb_bloom_source floats = *source;
     struct stage stage = {.levels = {.settings = settings, .source = &floats, .graph = graph}};
-    uint32_t images[MOST_HALVINGS + 1];
+    uint32_t images[MAX_HALVINGS + 1];
     int count = 1;
 
     if (!vkb_has_glare(settings))

@@ -6,7 +6,7 @@
 #include <stdio.h>
 
 // Levels with a weight up to this one are left out.
-static const float LEAST_WEIGHT = 1e-4f;
+static const float MIN_WEIGHT = 1e-4f;
 
 static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                      uint32_t from, uint32_t to, struct vkb_error *error)
@@ -45,7 +45,7 @@ bool vkb_add_godot(const struct vkb_settings *settings, const struct vkb_bloom_s
 
     levels.count = 1;
     for (uint32_t level = 0; level < settings->level_weight_count; ++level)
-        if (settings->level_weights[level] > LEAST_WEIGHT) {
+        if (settings->level_weights[level] > MIN_WEIGHT) {
             shares[level] = settings->level_weights[level];
             levels.count = level + 1;
         }

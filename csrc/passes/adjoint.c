@@ -4,7 +4,7 @@
 #include <string.h>
 
 // A filter whose texels are read by no more pixels than this is one pass, not one for each axis.
-static const double MOST_IN_ONE_PASS = 20.0;
+static const double MAX_IN_ONE_PASS = 20.0;
 
 uint32_t vkb_brought(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass)
 {
@@ -181,7 +181,7 @@ bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
             return bring_along(adjoint, filter, true, cotangents, image, error);
         if (vkb_axis_is_identity(&filter->x))
             return bring_along(adjoint, filter, false, cotangents, image, error);
-        if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MOST_IN_ONE_PASS)
+        if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
             return bring_twice(adjoint, filter, cotangents, image, error);
     }
     if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)

@@ -7,7 +7,7 @@
 // llvmpipe of Mesa 22.3 ends all loops of an invocation after 65535 iterations. The invocations
 // that it runs together take as many as the slowest of them in each loop; neighbours take about
 // as many.
-enum { MOST_ITERATIONS = 1 << 15 };
+enum { MAX_ITERATIONS = 1 << 15 };
 
 // Twice the distance from a texel to a sample that it is part of, at most (adjoint_moved.frag).
 static const double SAMPLED_WIDTH = 2.0 * 1.503;
@@ -50,9 +50,9 @@ static bool find_sums(const struct gathering *gathering, uint32_t max_side, stru
     double radius = 2.0;
 
     *sums = (struct sums){.rows = 1, .columns = 1};
-    if (gathering->of_row * size.height <= MOST_ITERATIONS)
+    if (gathering->of_row * size.height <= MAX_ITERATIONS)
         return true;
-    while (radius < 2.0 * max_side && gathering->iterations(gathering, radius) > MOST_ITERATIONS)
+    while (radius < 2.0 * max_side && gathering->iterations(gathering, radius) > MAX_ITERATIONS)
         radius *= 1.25;
     set_range(gathering->centre_x, radius, size.width, &sums->x, &sums->width);
     set_range(gathering->centre_y, radius, size.height, &sums->y, &sums->height);
@@ -60,7 +60,7 @@ static bool find_sums(const struct gathering *gathering, uint32_t max_side, stru
         sums->width = sums->height = 0;
         return true;
     }
-    sums->rows = (int)fmax(MOST_ITERATIONS / gathering->of_row, 1.0);
+    sums->rows = (int)fmax(MAX_ITERATIONS / gathering->of_row, 1.0);
     const int groups = ((int)size.height + sums->rows - 1) / sums->rows;
     sums->columns = (int)fmin(ceil(sqrt(groups)), (double)max_side / sums->width);
     if (sums->columns == 0)

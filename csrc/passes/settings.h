@@ -61,7 +61,7 @@ enum vkb_stage_kind {
 struct vkb_stage {
     enum vkb_stage_kind kind;
     struct vkb_glare_values values;  // at the offsets of vkb_glare_rows
-    float ghosts[MOST_GHOSTS][4];    // tint and scale of each
+    float ghosts[MAX_GHOSTS][4];     // tint and scale of each
     uint32_t ghost_count;
 };
 

@@ -7,7 +7,7 @@
 enum { RECENT = 8 };
 
 // Floats count up to this number.
-enum { MOST_TEXELS = 1 << 24 };
+enum { MAX_TEXELS = 1 << 24 };
 
 static void begin_axis(uint32_t from, uint32_t to, struct vkb_axis *axis)
 {
@@ -189,7 +189,7 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
 }
 
 static void add_weights(const struct vkb_axis *axis, const struct readers *readers,
-                        double (*weights)[VKB_MOST_KERNELS])
+                        double (*weights)[VKB_MAX_KERNELS])
 {
     for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
@@ -200,7 +200,7 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
                 if (read == axis->from)
                     continue;
                 double *sums = weights[texel->start + pixel - texel->first];
-                for (int kernel = 0; kernel < VKB_MOST_KERNELS; ++kernel)
+                for (int kernel = 0; kernel < VKB_MAX_KERNELS; ++kernel)
                     sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];
             }
         }
@@ -227,7 +227,7 @@ static size_t place_list(struct vkb_table *table, size_t count, struct list list
 }
 
 static bool write_table(const struct vkb_axis *axis, bool kernels, const struct readers *readers,
-                        double (*weights)[VKB_MOST_KERNELS], struct vkb_table *table,
+                        double (*weights)[VKB_MAX_KERNELS], struct vkb_table *table,
                         struct vkb_error *error)
 {
     const size_t start = table->count;
@@ -255,16 +255,16 @@ static bool write_table(const struct vkb_axis *axis, bool kernels, const struct 
         table->texels[start + texel][2] = (float)place;
         table->texels[start + texel][3] = 0.0f;
     }
-    return table->count <= MOST_TEXELS
+    return table->count <= MAX_TEXELS
         || vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
-                    table->count, MOST_TEXELS);
+                    table->count, MAX_TEXELS);
 }
 
 bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_table *table,
                         uint32_t *start, struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
-    double (*weights)[VKB_MOST_KERNELS] =
+    double (*weights)[VKB_MAX_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 

@@ -10,13 +10,13 @@
 #include "graph/graph.h"
 
 enum {
-    VKB_MOST_TAPS = 2 * MAX_WEIGHTS,
-    VKB_MOST_KERNELS = 4,
+    VKB_MAX_TAPS = 2 * MAX_WEIGHTS,
+    VKB_MAX_KERNELS = 4,
 };
 
 // A sample at a distance from the position of a pixel, in texels, with a weight for each kernel.
 struct vkb_tap {
-    double offset, weights[VKB_MOST_KERNELS];
+    double offset, weights[VKB_MAX_KERNELS];
 };
 
 // What a tap samples at its position.
@@ -53,7 +53,7 @@ struct vkb_axis {
     enum vkb_border border;
     uint32_t first;  // where pixel 0 is in the image that the transpose reads
     uint32_t count;
-    struct vkb_tap taps[VKB_MOST_TAPS];
+    struct vkb_tap taps[VKB_MAX_TAPS];
 };
 
 // The sum over the kernels of (rows x columns), times the gain.

@@ -46,12 +46,12 @@ struct versioned {
 #define NAME           "dltensor"
 #define VERSIONED_NAME "dltensor_versioned"
 
-enum { MOST_DIMENSIONS = 4 };
+enum { MAX_DIMENSIONS = 4 };
 
 // What an exported capsule owns.
 struct shared {
     PyObject *owner;
-    int64_t shape[MOST_DIMENSIONS], strides[MOST_DIMENSIONS];
+    int64_t shape[MAX_DIMENSIONS], strides[MAX_DIMENSIONS];
     struct managed managed;
     struct versioned versioned;
 };
@@ -428,7 +428,7 @@ static bool read_shape(PyObject *shape, struct shared *shared)
     const Py_ssize_t count = PyTuple_Size(shape);
     int64_t stride = 1;
 
-    if (count < 0 || count > MOST_DIMENSIONS) {
+    if (count < 0 || count > MAX_DIMENSIONS) {
         if (!PyErr_Occurred())
             PyErr_SetString(PyExc_ValueError, "shape: too many dimensions");
         return false;

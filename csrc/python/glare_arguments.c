@@ -62,7 +62,7 @@ static Py_ssize_t tuple_length(PyObject *tuple, const char *name, const char *it
 
 static bool read_ghost_tuple(PyObject *tuple, struct vkb_stage *stage)
 {
-    const Py_ssize_t count = tuple_length(tuple, "ghosts", "ghosts", MOST_GHOSTS);
+    const Py_ssize_t count = tuple_length(tuple, "ghosts", "ghosts", MAX_GHOSTS);
 
     if (count < 0)
         return false;

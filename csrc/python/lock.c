@@ -29,7 +29,7 @@ void vkb_pending_release(struct vkb_pending *pending)
     vkb_free(pending->outputs);
     vkb_free(pending->views);
     vkb_free(pending->timings);
-    vkb_free(pending->layer_specials);
+    vkb_free(pending->layer_non_finite);
     Py_XDECREF(pending->plans);
     release_source(pending);
     vkb_free(pending);

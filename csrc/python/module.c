@@ -210,7 +210,7 @@ static int execute(PyObject *module)
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
                 && PyModule_AddIntMacro(module, MAX_STAGES) == 0
-                && PyModule_AddIntMacro(module, MOST_GHOSTS) == 0
+                && PyModule_AddIntMacro(module, MAX_GHOSTS) == 0
              ? 0
              : -1;
 }

@@ -48,7 +48,7 @@ static int is_wanted(PyObject *names, const char *name)
 // Raises ValueError with the framebuffers that there are, and the one that may be meant.
 static void raise_unknown(const struct vkb_graph *graph, PyObject *name)
 {
-    PyObject *module = PyImport_ImportModule("vkbloom.suggestions");
+    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
     PyObject *known = module ? PyList_New(0) : NULL;
     for (uint32_t i = 0; known && i < graph->image_count; ++i) {
         if (!graph->images[i].framebuffer)
@@ -59,7 +59,7 @@ static void raise_unknown(const struct vkb_graph *graph, PyObject *name)
         Py_XDECREF(one);
     }
     PyObject *text = known ? PyObject_CallMethod(module, "unknown", "sOO",
-                                                 "attachments: unknown framebuffer", name, known)
+                                                 "framebuffers: unknown framebuffer", name, known)
                            : NULL;
     if (text)
         PyErr_SetObject(PyExc_ValueError, text);
@@ -91,7 +91,7 @@ static bool choose_outputs(struct vkb_plan *plan, PyObject *names)
     const struct vkb_graph *graph = &plan->graph;
     struct vkb_error error;
 
-    if (names != Py_None && !vkb_require_tuple(names, "attachments"))
+    if (names != Py_None && !vkb_require_tuple(names, "framebuffers"))
         return false;
     plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
     if (!plan->outputs) {

@@ -22,8 +22,8 @@ struct vkb_pending {
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
     struct vkb_timing *timings;
-    struct vkb_specials *layer_specials;  // of a batch
-    uint32_t count;                       // of the requests
+    struct vkb_non_finite *layer_non_finite;  // of a batch
+    uint32_t count;                           // of the requests
     size_t view_count;
     struct vkb_pending *next;
 };

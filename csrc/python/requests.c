@@ -89,9 +89,9 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
     pending->timings = vkb_alloc(error, pass_count, sizeof *pending->timings);
-    pending->layer_specials = vkb_alloc(error, layers, sizeof *pending->layer_specials);
+    pending->layer_non_finite = vkb_alloc(error, layers, sizeof *pending->layer_non_finite);
     if (pending->requests && pending->outputs && pending->views && pending->timings
-        && pending->layer_specials)
+        && pending->layer_non_finite)
         return pending;
     vkb_pending_release(pending);
     return NULL;
@@ -188,7 +188,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             .plan = plan,
             .outputs = pending->outputs + pending->view_count,
             .timings = pending->timings + passes,
-            .layer_specials = pending->layer_specials,
+            .layer_non_finite = pending->layer_non_finite,
         };
         passes += plan->graph.pass_count;
         if (!vkb_require_tuple(tuple, "arrays"))
@@ -330,13 +330,14 @@ static PyObject *timing_dict(const struct vkb_request *request)
 }
 
 // The numbers of NaN and infinity in the input, of a batch image by image.
-static PyObject *describe_specials(const struct vkb_request *request)
+static PyObject *describe_non_finite(const struct vkb_request *request)
 {
     const uint32_t layers = request->plan->graph.layers, count = layers ? layers : 1;
     PyObject *tuple = PyTuple_New(2 * (Py_ssize_t)count);
 
     for (uint32_t i = 0; tuple && i < count; ++i) {
-        const struct vkb_specials *own = layers ? &request->layer_specials[i] : &request->specials;
+        const struct vkb_non_finite *own =
+            layers ? &request->layer_non_finite[i] : &request->non_finite;
         if (!vkb_set_item(tuple, 2 * (Py_ssize_t)i, PyLong_FromUnsignedLongLong(own->nan))
             || !vkb_set_item(tuple, 2 * (Py_ssize_t)i + 1, PyLong_FromUnsignedLongLong(own->inf)))
             Py_CLEAR(tuple);
@@ -354,7 +355,7 @@ static PyObject *results(const struct vkb_pending *pending)
         if (!timings || PyList_SetItem(list, (Py_ssize_t)i, timings) < 0)
             Py_CLEAR(list);
     }
-    return list ? Py_BuildValue("(NN)", list, describe_specials(&pending->requests[0])) : NULL;
+    return list ? Py_BuildValue("(NN)", list, describe_non_finite(&pending->requests[0])) : NULL;
 }
 
 // CUDA need not wait any more for what the host has waited for.

@@ -8,7 +8,7 @@
 
 // Objects that one of the last 64 submissions used are kept, however many there are. So a grid that
 // returns to a size or method finds its objects in the cache.
-enum { VKB_LEAST_AGE = 64 };
+enum { VKB_MIN_AGE = 64 };
 
 struct vkb_age {
     uint64_t now;      // the number of the submission that is being recorded; the first is 1
@@ -19,7 +19,7 @@ struct vkb_age {
 // it.
 static inline bool vkb_is_old(uint64_t used, const struct vkb_age *age)
 {
-    return used < age->pending && used + VKB_LEAST_AGE <= age->now;
+    return used < age->pending && used + VKB_MIN_AGE <= age->now;
 }
 
 #endif

@@ -402,7 +402,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         run.submission->requests = requests;
         run.submission->request_count = request_count;
         for (uint32_t i = 0; i < request_count; ++i)
-            requests[i].specials = frame->specials;
+            requests[i].non_finite = frame->non_finite;
         *submission = run.submission;
         vkb_sources_end(&run, source, true);
         return !show || vkb_screen_present(device, show->screen, error);
@@ -439,10 +439,10 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
         struct vkb_request *request = &submission->requests[i];
         if (submission->readback.counted) {
             const uint32_t *counts = submission->readback.counts.mapped;
-            vkb_add_specials(&request->specials, (struct vkb_specials){counts[0], counts[1]});
+            vkb_add_non_finite(&request->non_finite, (struct vkb_non_finite){counts[0], counts[1]});
             for (uint32_t layer = 0; layer < request->plan->graph.layers; ++layer) {
                 const uint32_t *own = counts + layer * (VKB_COUNTS_SIZE / sizeof *counts);
-                request->layer_specials[layer] = (struct vkb_specials){own[0], own[1]};
+                request->layer_non_finite[layer] = (struct vkb_non_finite){own[0], own[1]};
             }
         }
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)

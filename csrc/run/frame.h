@@ -24,8 +24,8 @@ struct vkb_frame {
     struct vkb_in_place in_place[VKB_INPUT_COUNT];
     uint64_t exported[VKB_INPUT_COUNT];  // the serial of what the cached image has; 0: else
     struct vkb_gather gather;
-    struct vkb_specials specials;  // of the inputs of the last submission
-    struct vkb_buffer constants;   // staging memory of images that are filled once
+    struct vkb_non_finite non_finite;  // of the inputs of the last submission
+    struct vkb_buffer constants;       // staging memory of images that are filled once
     struct vkb_image_cache cache;
     struct vkb_resources resources;
     struct vkb_planner planner;
@@ -62,9 +62,9 @@ struct vkb_request {
     struct vkb_output *outputs;
     struct vkb_timing *timings;
     uint32_t timing_count;
-    uint32_t first_span;                  // of its timings, in the submission's timer
-    struct vkb_specials specials;         // of the inputs; complete after the submission
-    struct vkb_specials *layer_specials;  // of each image of a batch; NULL: it is none
+    uint32_t first_span;                      // of its timings, in the submission's timer
+    struct vkb_non_finite non_finite;         // of the inputs; complete after the submission
+    struct vkb_non_finite *layer_non_finite;  // of each image of a batch; NULL: it is none
 };
 
 // Records the passes that the requests' outputs need and that are out of date, request after

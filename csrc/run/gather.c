@@ -7,7 +7,7 @@ enum {
     GROUP_SIZE = 128,  // of gather.glsl
     TILE_WIDTH = 16,   // of the pixels of a group, if it writes to an image
     TILE_HEIGHT = GROUP_SIZE / TILE_WIDTH,
-    MOST_GROUPS = 0xffff,  // along x, which every device can do
+    MAX_GROUPS = 0xffff,  // along x, which every device can do
 };
 
 #define BUFFER VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
@@ -155,7 +155,7 @@ static VkExtent2D count_groups(const struct vkb_gather_work *work)
     const uint64_t count = (uint64_t)layout->width * layout->height * layout->channels;
     const uint32_t per_group = GROUP_SIZE * (16 / layout->size);
     const uint32_t groups = (uint32_t)((count + per_group - 1) / per_group);
-    const uint32_t rows = (groups + MOST_GROUPS - 1) / MOST_GROUPS;
+    const uint32_t rows = (groups + MAX_GROUPS - 1) / MAX_GROUPS;
     return (VkExtent2D){(groups + rows - 1) / rows, rows};
 }
 

@@ -19,7 +19,7 @@ static bool has_words(const struct vkb_device *device, const struct vkb_input *i
 
 struct counting {
     const struct vkb_input *input;
-    struct vkb_specials sums[VKB_MAX_PARTS];
+    struct vkb_non_finite sums[VKB_MAX_PARTS];
 };
 
 static void count_part(void *context, uint32_t part, uint32_t first, uint32_t end)
@@ -28,9 +28,9 @@ static void count_part(void *context, uint32_t part, uint32_t first, uint32_t en
     const struct vkb_input *input = counting->input;
 
     for (uint32_t y = first; y < end; ++y)
-        vkb_add_specials(&counting->sums[part],
-                         vkb_count_specials(input->format, vkb_input_row(input, y),
-                                            (size_t)input->width * input->channels));
+        vkb_add_non_finite(&counting->sums[part],
+                           vkb_count_non_finite(input->format, vkb_input_row(input, y),
+                                                (size_t)input->width * input->channels));
 }
 
 bool vkb_in_place_stage(const struct vkb_device *device, struct vkb_in_place *place,
@@ -52,9 +52,9 @@ bool vkb_in_place_stage(const struct vkb_device *device, struct vkb_in_place *pl
         || !has_words(device, input) || !vkb_image_borrow(device, &borrowed, &place->cached.image))
         return false;
     vkb_in_parts(device->workers, count_part, NULL, &counting, 0, input->height, size);
-    place->specials = (struct vkb_specials){0};
+    place->non_finite = (struct vkb_non_finite){0};
     for (int part = 0; part < VKB_MAX_PARTS; ++part)
-        vkb_add_specials(&place->specials, counting.sums[part]);
+        vkb_add_non_finite(&place->non_finite, counting.sums[part]);
     place->memory = input->memory;
     place->cached.content.version = ++*clock;
     place->cached.content.valid = true;

@@ -9,7 +9,7 @@
 struct vkb_in_place {
     struct vkb_cached_image cached;  // its image belongs to a submission
     const void *memory;              // of the last such image; only its address is used
-    struct vkb_specials specials;
+    struct vkb_non_finite non_finite;
 };
 
 // Makes place->cached an image over the input's memory, with a new version. The caller destroys the

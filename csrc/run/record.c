@@ -351,10 +351,10 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
 // Whether the pass gains from a source without NaN and infinity, and this one has none.
 static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *pass)
 {
-    const struct vkb_specials *specials = &run->frame->specials;
+    const struct vkb_non_finite *non_finite = &run->frame->non_finite;
 
-    return pass->gains_if_finite && !run->unknown_specials && specials->nan == 0
-        && specials->inf == 0;
+    return pass->gains_if_finite && !run->unknown_non_finite && non_finite->nan == 0
+        && non_finite->inf == 0;
 }
 
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,

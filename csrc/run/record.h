@@ -30,7 +30,7 @@ struct vkb_run {
     struct vkb_cached_image *constants[4];
     size_t constant_starts[4];
     uint32_t constant_count;
-    bool unknown_specials;  // whether the source has NaN or infinity is counted on the device
+    bool unknown_non_finite;  // whether the source has NaN or infinity is counted on the device
 };
 
 // The most descriptor sets that the graph's passes need, without those of surfaces.

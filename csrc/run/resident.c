@@ -114,8 +114,8 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
 {
     if (!vkb_upload_rows(device, &resident->inputs[kind].upload, input, first, error))
         return false;
-    resident->specials = (struct vkb_specials){0};
+    resident->non_finite = (struct vkb_non_finite){0};
     for (int i = 0; i < VKB_INPUT_COUNT; ++i)
-        vkb_add_specials(&resident->specials, resident->inputs[i].upload.specials);
+        vkb_add_non_finite(&resident->non_finite, resident->inputs[i].upload.non_finite);
     return true;
 }

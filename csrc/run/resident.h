@@ -13,7 +13,7 @@ struct vkb_resident {
         struct vkb_cached_image cached;  // not part of the image cache
         struct vkb_upload upload;
     } inputs[VKB_INPUT_COUNT];  // by kind
-    struct vkb_specials specials;
+    struct vkb_non_finite non_finite;
     uint32_t uses;  // submissions that use it and may still run
     bool staged;    // its pixels are in staging memory, and the next submission copies them
     bool recycled;  // will get other pixels, so it keeps its staging memory

@@ -83,7 +83,7 @@ static bool stage_resident(struct vkb_run *run, const struct pixels *pixels, boo
     staged->send = resident->staged;
     staged->access = staged->image->image.access;
     // Those of all its images.
-    run->frame->specials = resident->specials;
+    run->frame->non_finite = resident->non_finite;
     return true;
 }
 
@@ -114,7 +114,7 @@ static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, boo
         return true;
     run->inputs[pixels->kind].image = &place->cached;
     run->submission->inputs[pixels->kind] = place->cached.image;
-    vkb_add_specials(&run->frame->specials, place->specials);
+    vkb_add_non_finite(&run->frame->non_finite, place->non_finite);
     return true;
 }
 
@@ -134,7 +134,7 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     staged->image = run->images[pixels->image];
     staged->input = input;
     staged->send = *held != input->serial || !staged->image->content.valid;
-    run->unknown_specials = true;
+    run->unknown_non_finite = true;
     if (!staged->send)
         return true;
     // The image no longer has the pixels of the host with which the next ones would be compared.
@@ -166,7 +166,7 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
     staged->image = image;
     staged->upload = upload;
     staged->send = changed || !image->content.valid;
-    vkb_add_specials(&run->frame->specials, upload->specials);
+    vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
     return !staged->send
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }
@@ -205,7 +205,7 @@ bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *sourc
 {
     struct pixels pixels = {source, requests, request_count, 0, VKB_INPUT_NONE};
 
-    run->frame->specials = (struct vkb_specials){0};
+    run->frame->non_finite = (struct vkb_non_finite){0};
     for (; pixels.image < run->graph->image_count; ++pixels.image) {
         bool taken = false;
         pixels.kind = run->graph->images[pixels.image].input;

@@ -198,7 +198,7 @@ bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload
                                size * input->height, &upload->staging, error))
         return false;
     memset(upload->rows, 0, input->height * sizeof *upload->rows);
-    upload->specials = (struct vkb_specials){0};
+    upload->non_finite = (struct vkb_non_finite){0};
     upload->pixels = image->mapped ? image->mapped : upload->staging.mapped;
     upload->row_pitch = image->mapped ? image->row_pitch : size;
     upload->format = input->format;
@@ -222,7 +222,7 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
         const unsigned char *row = streams ? packed_row(rows, part, y) : to;
         if (!streams)
             pack_row(to, rows->input, y);
-        upload->rows[rows->offset + y] = vkb_count_specials(
+        upload->rows[rows->offset + y] = vkb_count_non_finite(
             upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
         if (streams)
             vkb_stream(to, row, row_size(rows->input));
@@ -230,11 +230,11 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
     vkb_end_streaming();
 }
 
-static void sum_specials(struct vkb_upload *upload)
+static void sum_non_finite(struct vkb_upload *upload)
 {
-    upload->specials = (struct vkb_specials){0};
+    upload->non_finite = (struct vkb_non_finite){0};
     for (uint32_t y = 0; y < upload->height; ++y)
-        vkb_add_specials(&upload->specials, upload->rows[y]);
+        vkb_add_non_finite(&upload->non_finite, upload->rows[y]);
 }
 
 static void record_rows(const struct vkb_device *device, VkCommandBuffer commands,
@@ -308,7 +308,7 @@ bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
 
     vkb_in_parts(device->workers, pack_part, NULL, &rows, 0, input->height,
                  input->height * row_size(input));
-    sum_specials(upload);
+    sum_non_finite(upload);
     return upload->pixels != upload->staging.mapped
         || vkb_buffer_flush(device, &upload->staging, error);
 }
@@ -341,7 +341,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
         return false;
     vkb_in_parts(device->workers, pack_part, image->mapped ? NULL : send_done, &sending, first,
                  input->height, (input->height - first) * size);
-    sum_specials(upload);
+    sum_non_finite(upload);
     return !sending.failed && (image->mapped || vkb_buffer_flush(device, &upload->staging, error));
 }
 

@@ -5,7 +5,7 @@
 #define VKB_UPLOAD_H
 
 #include "run/exports.h"
-#include "run/specials.h"
+#include "run/non_finite.h"
 #include "run/submission.h"
 
 #include <stddef.h>
@@ -40,9 +40,9 @@ struct vkb_upload {
     size_t row_pitch;
     enum vkb_format format;  // of the image that it holds; NONE: no image
     uint32_t width, height, channels;
-    struct vkb_specials *rows;     // in each row of the image
-    struct vkb_specials specials;  // in the complete image
-    unsigned char *packed;         // a row of each part, before it is compared or kept
+    struct vkb_non_finite *rows;       // in each row of the image
+    struct vkb_non_finite non_finite;  // in the complete image
+    unsigned char *packed;             // a row of each part, before it is compared or kept
     size_t row_capacity, packed_capacity;
     uint32_t sent;  // rows whose copy was submitted since the last vkb_upload_record
 };

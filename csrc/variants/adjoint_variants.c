@@ -172,7 +172,7 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
 
 // The most weights that an invocation keeps along an axis, in vec4s. More than GPUs have registers
 // for, or LLVM, would be slower than the plain pass.
-enum { MOST_WORDS = 24, MOST_REGISTERS = 16 };
+enum { MAX_WORDS = 24, MAX_REGISTERS = 16 };
 
 static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        uint32_t most)
@@ -255,7 +255,7 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
     struct vkb_pass_row row;
 
     *fits = (filter || blend || threshold) && vkb_are_floats(choice, pass)
-         && (filter ? fits_lists(choice->graph, pass, MOST_WORDS)
+         && (filter ? fits_lists(choice->graph, pass, MAX_WORDS)
                     : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
          && (!threshold
              || (pass->constants.alpha != ALPHA_BLUR
@@ -345,7 +345,7 @@ bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
     read_composite(&choice->plain, &row);
-    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MOST_REGISTERS))
+    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MAX_REGISTERS))
         return vkb_add_fullscreen(choice, &row, error);
     vkb_make_dispatch(&row, &vkb_shader_adjoint_taps_comp_rgba32float,
                       ADJOINT_SIDE * PIXEL_INVOCATIONS, ADJOINT_SIDE * PIXEL_INVOCATIONS);

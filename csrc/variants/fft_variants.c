@@ -15,9 +15,9 @@ struct group {
 enum {
     // A workgroup of short lines has several: of fewer invocations too few would run at a time.
     USUAL_INVOCATIONS = 128,
-    MOST_LINES = 16,
+    MAX_LINES = 16,
     // Of more, each has too few registers: a GPU has 65536 for all.
-    MOST_INVOCATIONS = 640,
+    MAX_INVOCATIONS = 640,
 };
 
 static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_lines_comp);
@@ -47,7 +47,7 @@ static bool make_group(const struct vkb_device *device, uint32_t length, struct 
     group->size = length / least;
     if (!group_fits(device, group, length))
         return false;
-    while (group->lines < MOST_LINES && group->size * group->lines < USUAL_INVOCATIONS) {
+    while (group->lines < MAX_LINES && group->size * group->lines < USUAL_INVOCATIONS) {
         group->lines *= 2;
         if (!group_fits(device, group, length)) {
             group->lines /= 2;
@@ -64,7 +64,7 @@ static uint32_t longer_length(const struct vkb_device *device, uint32_t length)
     struct group group;
 
     for (uint32_t each = length; each <= length + length / 8; ++each)
-        if (make_group(device, each, &group) && group.size <= MOST_INVOCATIONS)
+        if (make_group(device, each, &group) && group.size <= MAX_INVOCATIONS)
             return each;
     return length;
 }

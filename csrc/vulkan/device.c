@@ -124,10 +124,10 @@ static bool exports_timelines(const struct vkb_device *device)
         && (properties.externalSemaphoreFeatures & VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT);
 }
 
-enum { MOST_EXTENSIONS = 6 };
+enum { MAX_EXTENSIONS = 6 };
 
 struct extensions {
-    const char *names[MOST_EXTENSIONS];
+    const char *names[MAX_EXTENSIONS];
     uint32_t count;
 };
 

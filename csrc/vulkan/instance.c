@@ -20,7 +20,7 @@ enum { MAX_INSTANCES = 8 };
 
 // Of address space. The loader loads the libraries of all drivers; lavapipe's, with LLVM, takes
 // 400 MiB.
-enum { LEAST_MIB = 448 };
+enum { MIN_MIB = 448 };
 
 // Each thread of lavapipe takes up to 144 MiB for its stacks and allocations.
 static size_t lavapipe_mib(void)
@@ -29,7 +29,7 @@ static size_t lavapipe_mib(void)
     const char *text = getenv("LP_NUM_THREADS");
     const unsigned long threads = text ? strtoul(text, NULL, 10) : vkb_core_count();
 
-    return LEAST_MIB + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
+    return MIN_MIB + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
 }
 
 static struct vkb_lock lock;  // protects the instances and volk's globals
@@ -275,7 +275,7 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
                         sizeof instance->driver - 1);
     memcpy(instance->driver, driver, strlen(driver));
     instance->has_room = vkb_has_room(lavapipe_mib());
-    if ((instance->has_room || vkb_has_room(LEAST_MIB)
+    if ((instance->has_room || vkb_has_room(MIN_MIB)
          || vkb_fail_room("a Vulkan driver", lavapipe_mib(), error))
         && open_source(instance, &entry, error)
         && create_handle(instance, entry, validation ? &messenger : NULL, error)) {

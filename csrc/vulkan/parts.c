@@ -45,7 +45,7 @@ void vkb_in_parts(struct vkb_workers *workers, vkb_rows *rows, vkb_rows_done *do
 
 enum {
     // A thread takes some 10 us to wake up, in which a core copies a hundred kilobytes.
-    LEAST_SIZE = 1 << 20,
+    MIN_SIZE = 1 << 20,
     // Of the rows that a thread takes at once.
     CHUNK_SIZE = 128 << 10,
     MAX_CHUNKS = 1024,
@@ -168,7 +168,7 @@ static void do_own_part(struct work *work, vkb_rows_done *done)
 
 static uint32_t part_count(const struct work *work, size_t size)
 {
-    size_t count = size / LEAST_SIZE;
+    size_t count = size / MIN_SIZE;
 
     count = count < VKB_MAX_PARTS ? count : VKB_MAX_PARTS;
     count = count < work->chunk_count ? count : work->chunk_count;

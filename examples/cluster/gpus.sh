@@ -5,6 +5,6 @@ gpus=$(nvidia-smi --list-gpus | wc -l)
 for part in $(seq "$gpus"); do
     CUDA_VISIBLE_DEVICES=$((part - 1)) vkbloom grid picture.exr -o gpus.zarr --adapter hardware \
         --method pyramid --threshold 1 --axis radius=0.5:4:40 --axis intensity=0.02:1:50 \
-        --chunk intensity=10 --part "$part/$gpus" &
+        --part "$part/$gpus" &
 done
 wait

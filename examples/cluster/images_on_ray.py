@@ -29,7 +29,7 @@ class Bloom:
     def __call__(self, batch: dict[str, Any]) -> dict[str, Any]:
         """Return the pictures of a batch."""
         images = map(vkbloom.read, batch["path"])
-        frames = self.renderer.apply_each(images, attachments="final")
+        frames = self.renderer.map(images, framebuffers="final")
         return {"path": batch["path"], "final": [frame["final"] for frame in frames]}
 
 

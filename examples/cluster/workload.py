@@ -17,8 +17,8 @@ def render(client: Any, store: str, part: tuple[int, int] | None = None) -> None
     image = np.zeros((90, 160, 3), np.float32)
     image[40:44, 60:100] = (20, 12, 4)
     axes = {"radius": np.linspace(0.5, 4, 8), "intensity": [0.1, 0.25, 0.5, 1.0]}
-    dataset = vkbloom.grid_to_zarr(
-        image, vkbloom.Pyramid(threshold=1), axes, store, client=client, part=part
+    dataset = vkbloom.grid(
+        image, vkbloom.Pyramid(threshold=1), axes, store=store, client=client, part=part
     )
     if part is None:
         print(dataset["final"].mean(["y", "x", "channel"]).round(4).values)

@@ -35,10 +35,10 @@ def cleaned(
     renderer: vkbloom.Renderer, picture: NDArray[Any], lens: vkbloom.Settings
 ) -> NDArray[np.float32]:
     """Return the non-negative image whose bloom is the picture."""
-    _, pullback = renderer.vjp(picture, lens)
+    _, pullback = vkbloom.vjp(picture, lens, renderer=renderer)
 
     def apply(image: NDArray[Any]) -> NDArray[Any]:
-        return renderer.apply(image, lens, attachments="final")["final"]
+        return renderer.apply(image, lens, framebuffers="final")["final"]
 
     found = picture.copy()
     direction: Any = None
@@ -68,7 +68,7 @@ def main(path: str) -> None:
     """Write the picture, the cleaned image and the truth side by side."""
     truth = night()
     with vkbloom.Renderer() as renderer:
-        picture = renderer.apply(truth, LENS, attachments="final")["final"]
+        picture = renderer.apply(truth, LENS, framebuffers="final")["final"]
         # Of the sensor.
         noise = np.random.default_rng(5).normal(scale=0.005, size=picture.shape)
         picture = (picture + noise).astype(np.float32)

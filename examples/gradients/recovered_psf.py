@@ -37,7 +37,7 @@ def recovered(
     def loss(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         kernel = values.reshape(SIDE, SIDE).astype(np.float32)
         settings = vkbloom.Convolution(kernel, normalize=False)
-        frames, pullback = renderer.vjp(image, settings)
+        frames, pullback = vkbloom.vjp(image, settings, renderer=renderer)
         residual = frames["final"] - picture
         slope = pullback({"final": residual})["kernel"].sum(axis=2)
         return 0.5 * float(np.vdot(residual, residual)), slope.ravel().astype(np.float64)
@@ -61,7 +61,7 @@ def main(path: str) -> None:
     image = (np.random.default_rng(2).random((48, 64, 3), np.float32) ** 10 * 10).astype(np.float32)
     with vkbloom.Renderer() as renderer:
         settings = vkbloom.Convolution(truth.astype(np.float32), normalize=False)
-        picture = renderer.apply(image, settings, attachments="final")["final"]
+        picture = renderer.apply(image, settings, framebuffers="final")["final"]
         found = recovered(renderer, image, picture)
     print(f"largest error: {np.abs(found - truth).max() / truth.max():.4f} of the kernel's maximum")
     both = np.concatenate([found, truth], axis=1)[..., None].repeat(3, axis=2)

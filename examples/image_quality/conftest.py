@@ -35,5 +35,5 @@ def picture(bloom_renderer: vkbloom.Renderer) -> NDArray[np.float32]:
     Replace it by a picture of your own: ``vkbloom.read("before_bloom.exr")``.
     """
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
-    frames = bloom_renderer.render(scene, size=(96, 54), shading="deferred", attachments=["scene"])
+    frames = bloom_renderer.render(scene, size=(96, 54), shading="deferred", framebuffers=["scene"])
     return frames["scene"][..., :3].astype(np.float32)

@@ -32,6 +32,6 @@ def test_preset(
 ) -> None:
     """Compare the picture with bloom, as half floats."""
     frames = bloom_renderer.apply(
-        picture.astype(np.float16), vkbloom.presets[name], attachments=["final"]
+        picture.astype(np.float16), vkbloom.presets[name], framebuffers=["final"]
     )
     frame_regression.check(frames)

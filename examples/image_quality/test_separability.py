@@ -14,7 +14,7 @@ import vkbloom
 from vkbloom import testing
 
 # Below 1 by the rounding of float32; a kernel that is 2 % wider already falls below it.
-LEAST_SIMILARITY = 0.99999
+MIN_SIMILARITY = 0.99999
 SIGMAS = (1.0, 2.5, 4.0)
 
 
@@ -37,7 +37,7 @@ def test_two_passes_equal_one(
     """N + N taps in two passes give what N x N taps give in one."""
     two = bloom_renderer.apply(picture, gaussian_blur(sigma))["bloom"]
     one = bloom_renderer.apply(picture, gaussian_blur(sigma, direct=True))["bloom"]
-    assert similarity(two, one) >= LEAST_SIMILARITY
+    assert similarity(two, one) >= MIN_SIMILARITY
 
 
 @pytest.mark.parametrize("sigma", SIGMAS)
@@ -48,7 +48,7 @@ def test_against_scikit_image(
     ours = bloom_renderer.apply(picture, gaussian_blur(sigma))["bloom"][..., :3]
     reach = math.ceil(3 * sigma)  # of the kernel of gaussian_weights
     theirs = gaussian(picture, sigma, mode="nearest", truncate=reach / sigma, channel_axis=2)
-    assert similarity(ours, theirs) >= LEAST_SIMILARITY
+    assert similarity(ours, theirs) >= MIN_SIMILARITY
 
 
 def test_the_limit_is_not_too_low(
@@ -57,7 +57,7 @@ def test_the_limit_is_not_too_low(
     """A limit that a slightly wider kernel passes would test nothing."""
     right = bloom_renderer.apply(picture, gaussian_blur(2.5))["bloom"]
     wider = bloom_renderer.apply(picture, gaussian_blur(2.5 * 1.02))["bloom"]
-    assert similarity(right, wider) < LEAST_SIMILARITY
+    assert similarity(right, wider) < MIN_SIMILARITY
 
 
 def test_the_point_spread_is_a_row_times_a_column(bloom_renderer: vkbloom.Renderer) -> None:

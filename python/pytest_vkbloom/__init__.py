@@ -16,8 +16,8 @@ import pytest
 
 if TYPE_CHECKING:
     from vkbloom import Renderer
-    from vkbloom.testing.records import Record
-    from vkbloom.testing.regression import FrameRegression
+    from vkbloom.testing._records import Record
+    from vkbloom.testing._regression import FrameRegression
 
 __all__ = ["bloom_renderer", "frame_regression"]
 
@@ -155,7 +155,7 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
     ...     image = np.full((16, 16, 4), 0.5, np.float32)
     ...     frame_regression.check(bloom_renderer.apply(image, vkbloom.Pyramid(levels=2)))
     """
-    from vkbloom.testing.regression import (  # noqa: PLC0415  costs start-up time
+    from vkbloom.testing._regression import (  # noqa: PLC0415  costs start-up time
         FrameRegression,
         Mode,
         name_of_test,
@@ -242,7 +242,7 @@ class _Run:
         """Write the report; if that fails, the summary says so and the run goes on."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
-        from vkbloom.testing.report_page import write_report  # noqa: PLC0415  costs start-up time
+        from vkbloom.testing._report_page import write_report  # noqa: PLC0415  costs start-up time
 
         try:
             self._page = write_report(self._report, self.parts, self._records)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vkbloom.cli import main
+from vkbloom._cli import main
 
 if __name__ == "__main__":
     main()

@@ -10,7 +10,7 @@ CHOICES: dict[str, tuple[str, ...]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 MAX_STAGES: int
-MOST_GHOSTS: int
+MAX_GHOSTS: int
 
 AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
 _Array = NDArray[Any]

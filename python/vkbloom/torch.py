@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from vkbloom.checks import import_extra
-from vkbloom.gradients.operators import number_of, refuse_capture, replaced, text_of
-from vkbloom.reference.derivatives import differentiable
-from vkbloom.renderer import Renderer
-from vkbloom.settings import Settings, check_settings, field_info
+from vkbloom._checks import import_extra
+from vkbloom._gradients.operators import number_of, refuse_capture, replaced, text_of
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.settings import Settings, check_settings, field_info
+from vkbloom.reference._derivatives import differentiable
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
@@ -46,7 +46,7 @@ def bloom(
         Linear light with 3 or 4 channels, of float16, float32 or float64. Those of float64 are
         computed in NumPy by `vkbloom.reference`, all others by the renderer. Tensors of CUDA, and
         the derivatives by them, stay on their GPU; only a mask, whose values are checked on the
-        host, and what `Renderer.vjp` takes from the reference go through the host.
+        host, and what `vjp` takes from the reference go through the host.
     settings : Settings
         `Settings.format` is not read: the bloom buffers are "rgba32float".
     mask : Tensor, shape (..., H, W), optional
@@ -66,14 +66,14 @@ def bloom(
     Raises
     ------
     ValueError, TypeError
-        As for `Renderer.apply` and `Renderer.vjp`.
+        As for `Renderer.apply` and `vjp`.
     RuntimeError
         From a backward pass: a second derivative was asked for.
 
     See Also
     --------
     Bloom : The same as a module, which can learn fields of the settings.
-    vkbloom.Renderer.vjp : The derivatives as arrays.
+    vkbloom.vjp : The derivatives as arrays.
 
     Notes
     -----

@@ -53,8 +53,8 @@ float share_of(vec2 place, ivec2 texel)
 
 // Steps are at least half a texel long on one axis, but near the sun, where there are no more than two of
 // them. So no more than five samples of a pixel are NEAR a texel.
-const int MOST_SAMPLES = 5;
-const float LEAST_STEP = 0.5;
+const int MAX_SAMPLES = 5;
+const float MIN_STEP = 0.5;
 
 vec4 brought_by(ivec2 pixel, Part part, ivec2 texel)
 {
@@ -68,13 +68,13 @@ vec4 brought_by(ivec2 pixel, Part part, ivec2 texel)
     float step = along_x ? way.x : way.y, whole = along_x ? distance.x : distance.y;
     // The first sample that is near.
     int start = 0;
-    if (abs(step) >= LEAST_STEP) {
+    if (abs(step) >= MIN_STEP) {
         float first = whole / step - NEAR / abs(step);
         first = IS_JITTERED ? first * params.left - beam.offset : first;
         start = int(ceil(clamp(first, 0.0, float(beam.last))));
     }
     float sum = 0.0;
-    [[unroll]] for (int i = 0; i < MOST_SAMPLES; ++i) {
+    [[unroll]] for (int i = 0; i < MAX_SAMPLES; ++i) {
         float at = steps_to(beam, start + i);
         vec2 place = beam.share + at * beam.towards;
         if (start + i <= beam.last && is_place(place))

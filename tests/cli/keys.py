@@ -7,7 +7,7 @@ from typing import Any
 
 import glfw as glfw_module
 
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 callbacks: list[Any] = []
 glfw: Any = glfw_module

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.processes import python
-from vkbloom.cli import fields
-from vkbloom.cli.program import COMMANDS, as_wrong_use, program
-from vkbloom.cli.settings_options import settings_options
-from vkbloom.fields import fields_of
-from vkbloom.registry import METHODS
-from vkbloom.scene import Camera, Scene
+from vkbloom._cli import fields
+from vkbloom._cli.program import COMMANDS, as_wrong_use, program
+from vkbloom._cli.settings_options import settings_options
+from vkbloom._scene import Camera, Scene
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -284,12 +284,15 @@ def test_options_change_a_preset() -> None:
         ("--treshold 1", "No such option '--treshold'; did you mean '--threshold'?"),
         ("--glare Streks", "godot_dirt; did you mean 'streaks'?"),
         ("--psf spenser", "; did you mean 'spencer'?"),
-        ("--attachments finl", "'finl'; did you mean 'final'? available: glow"),
+        ("--framebuffers finl", "'finl'; did you mean 'final'? available: glow"),
         ("--size 48", "'--size': '48' is not WxH"),
         ("--size 0x8", "size: (0, 8) is out of range"),
         ("--time nan", "time: nan is out of range"),
         ("--frames 0", "'--frames': 0 is not in the range x>=1"),
-        ("--attachments final,glare", "attachments: unknown framebuffer 'glare'; available: glow"),
+        (
+            "--framebuffers final,glare",
+            "framebuffers: unknown framebuffer 'glare'; available: glow",
+        ),
         ("--camera-fov 180", "fov is 180.0; over 0 and under 180"),
         ("--glow-intensity -1", "glow_intensity is -1.0; 0 or more"),
         ("--shading flat", "'--shading': 'flat' is not one of 'forward', 'deferred'"),
@@ -439,7 +442,7 @@ def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
 
 def test_render_in_deferred_shading(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
-    options = ("--shading", "deferred", "--glow-intensity", "8", "--attachments", "final")
+    options = ("--shading", "deferred", "--glow-intensity", "8", "--framebuffers", "final")
     result = vkb("render", "-o", out, *SMALL, *options)
     assert result.exit_code == 0
     expected = rendered(
@@ -451,7 +454,7 @@ def test_render_in_deferred_shading(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("out", ["folder", "folder/"])
 def test_render_writes_into_a_folder(tmp_path: Path, out: str) -> None:
-    result = vkb("render", "-o", f"{tmp_path}/{out}", *SMALL, "--attachments", "final,bloom")
+    result = vkb("render", "-o", f"{tmp_path}/{out}", *SMALL, "--framebuffers", "final,bloom")
     assert result.exit_code == 0
     assert {path.name for path in (tmp_path / "folder").iterdir()} == {"bloom.png", "final.png"}
 
@@ -459,7 +462,7 @@ def test_render_writes_into_a_folder(tmp_path: Path, out: str) -> None:
 def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     result = vkb(
-        *("render", "-o", out, *SMALL, "--attachments", "final", "--time", "0.25"),
+        *("render", "-o", out, *SMALL, "--framebuffers", "final", "--time", "0.25"),
         *("--blur-strength", "3", "--camera-position", "0,0,-14", "--camera-fov", "30"),
     )
     assert result.exit_code == 0
@@ -486,7 +489,7 @@ def test_render_loads_scenes(tmp_path: Path) -> None:
     ]
     for name, options, scene in cases:
         out = tmp_path / f"{name}.png"
-        wanted = ("--scene", body, "--attachments", "final", *options)
+        wanted = ("--scene", body, "--framebuffers", "final", *options)
         result = vkb("render", "-o", out, *SMALL, *wanted)
         assert (result.exit_code, result.stderr) == (0, "")
         assert (rgb(pixels(out)) == rgb(rendered(scene=scene)["final"])).all()
@@ -505,7 +508,7 @@ def test_an_animation_is_one_turn_in_numbered_files(tmp_path: Path) -> None:
 
 
 def test_an_animation_in_a_folder(tmp_path: Path) -> None:
-    wanted = ("--frames", "2", "--attachments", "glow,final")
+    wanted = ("--frames", "2", "--framebuffers", "glow,final")
     assert vkb("render", "-o", f"{tmp_path}/new/", *SMALL, *wanted).exit_code == 0
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
         "0000_final.png",
@@ -534,8 +537,8 @@ def test_an_animation_in_a_gif(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--frames", "2", "--attachments", "all"), "a GIF shows one framebuffer"),
-        (("--frames", "2", "--attachments", "depth"), "is not a frame of an animation"),
+        (("--frames", "2", "--framebuffers", "all"), "a GIF shows one framebuffer"),
+        (("--frames", "2", "--framebuffers", "depth"), "is not a frame of an animation"),
         (("--fps", "10"), "--fps needs --frames and a GIF"),
     ],
 )
@@ -565,7 +568,7 @@ def test_render_passes_validation(tmp_path: Path) -> None:
 def test_validation_is_handed_on(tmp_path: Path) -> None:
     # In a new process, since an existing instance keeps its layers.
     words = ("render", "-o", str(tmp_path / "out.exr"), *SMALL, "--validation")
-    ended = python("-m", "vkbloom.cli", *words, VK_LAYER_PATH=str(tmp_path))
+    ended = python("-m", "vkbloom._cli", *words, VK_LAYER_PATH=str(tmp_path))
     assert ended.returncode == 1
     assert "validation" in one_line(ended.stderr)
 
@@ -629,14 +632,14 @@ def test_no_adapter_is_a_failure(
 
 
 def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
-    done = python("-m", "vkbloom.cli", "adapters", "--json")
+    done = python("-m", "vkbloom._cli", "adapters", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert len(json.loads(done.stdout)) == len(vkbloom.adapters())
     absent = str(tmp_path / "absent.gltf")
-    failed = python("-m", "vkbloom.cli", "render", "-o", "x.png", "--scene", absent)
+    failed = python("-m", "vkbloom._cli", "render", "-o", "x.png", "--scene", absent)
     assert (failed.returncode, failed.stdout) == (1, "")
     assert one_line(failed.stderr) == f"{absent}: No such file or directory\n"
-    misused = python("-m", "vkbloom.cli", "render")
+    misused = python("-m", "vkbloom._cli", "render")
     assert (misused.returncode, misused.stdout) == (2, "")
     assert "Missing option" in one_line(misused.stderr)
 
@@ -644,22 +647,22 @@ def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
 @pytest.mark.parametrize("missing", ["click", "rich", "tqdm"])
 def test_a_missing_extra_is_one_line(missing: str) -> None:
     # None in sys.modules makes an import fail as if nothing were installed.
-    hide = f"import sys; sys.modules[{missing!r}] = None; from vkbloom.cli import main; main()"
+    hide = f"import sys; sys.modules[{missing!r}] = None; from vkbloom._cli import main; main()"
     ended = python("-c", hide, "render", "-o", "x.png")
     assert (ended.returncode, ended.stdout) == (1, "")
     assert "pip install vkbloom[cli]" in one_line(ended.stderr)
 
 
 def test_importing_the_entry_point_is_quick() -> None:
-    listed = python("-c", "import sys, vkbloom.cli; print(*sys.modules)").stdout.split()
-    assert "vkbloom.cli" in listed
+    listed = python("-c", "import sys, vkbloom._cli; print(*sys.modules)").stdout.split()
+    assert "vkbloom._cli" in listed
     assert not {"click", "rich", "tqdm", "OpenImageIO", "pygltflib"} & set(listed)
 
 
 @pytest.mark.parametrize(("encoding", "name"), [("ascii", "\u2600"), ("latin-1", r"\u2600")])
 def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str) -> None:
     out = str(tmp_path / "\u2600.exr")
-    ended = python(*("-m", "vkbloom.cli", "render", "-o", out, *SMALL), PYTHONIOENCODING=encoding)
+    ended = python(*("-m", "vkbloom._cli", "render", "-o", out, *SMALL), PYTHONIOENCODING=encoding)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "ms on the " in ended.stdout
     # click uses UTF-8 if the terminal's encoding is ASCII.
@@ -671,7 +674,7 @@ def test_without_standard_output_and_error(tmp_path: Path) -> None:
     animation = ["render", "-o", str(tmp_path / "a.png"), "--frames", "2", *SMALL]
     image = ["apply", str(tmp_path / "a_0000.png"), str(tmp_path / "b.png")]
     for words in (animation, image):
-        command = [sys.executable, "-m", "vkbloom.cli", *words]
+        command = [sys.executable, "-m", "vkbloom._cli", *words]
         ended = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], check=False)
         assert ended.returncode == 0
     assert {file.name for file in tmp_path.iterdir()} == {"a_0000.png", "a_0001.png", "b.png"}
@@ -683,7 +686,7 @@ def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:
     except OSError as error:
         pytest.skip(f"no terminal can be had here: {error}")
     termios.tcsetwinsize(theirs, (24, 80))
-    command = [sys.executable, "-m", "vkbloom.cli", "render", "-o", str(tmp_path / "a.png")]
+    command = [sys.executable, "-m", "vkbloom._cli", "render", "-o", str(tmp_path / "a.png")]
     ended = subprocess.run(
         [*command, *SMALL, "--frames", "2"], stdout=subprocess.PIPE, stderr=theirs, check=False
     )

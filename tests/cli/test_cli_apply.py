@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import some
 from tests.processes import python
-from vkbloom import renderer
-from vkbloom.cli.program import program
-from vkbloom.io.displayed import scaled_to_1
-from vkbloom.io.image_reading import load
-from vkbloom.io.image_writing import save
-from vkbloom.io.images import Picture
-from vkbloom.io.srgb import decode_srgb, encode_srgb
-from vkbloom.methods.mip_chain import Pyramid
-from vkbloom.methods.separable import Separable
+from vkbloom._cli.program import program
+from vkbloom._io.displayed import scaled_to_1
+from vkbloom._io.image_reading import load
+from vkbloom._io.image_writing import save
+from vkbloom._io.images import Picture
+from vkbloom._io.srgb import decode_srgb, encode_srgb
+from vkbloom._methods.mip_chain import Pyramid
+from vkbloom._methods.separable import Separable
+from vkbloom._renderer import renderer
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -86,7 +86,7 @@ def pixels(path: Path) -> NDArray[Any]:
 def applied(image: NDArray[Any], settings: vkbloom.Settings | None = None) -> NDArray[Any]:
     with vkbloom.Renderer() as renderer:
         chosen = settings or NATURAL
-        return renderer.apply(image, chosen, attachments="final")["final"]
+        return renderer.apply(image, chosen, framebuffers="final")["final"]
 
 
 def linear(levels: NDArray[Any]) -> NDArray[np.float32]:
@@ -326,11 +326,11 @@ class TestColours:
         assert "values above 1 are clipped" in clipped
 
 
-class TestAttachments:
+class TestFramebuffers:
     def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
         image = light(20, 30, 3, dtype="float16")
         path = stored(tmp_path / "a.exr", image)
-        result = done(path, tmp_path / "b.exr", "--attachments", "all")
+        result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
         with vkbloom.Renderer() as renderer:
             frames = renderer.apply(image, NATURAL)
         others = [name for name in frames if name != "final"]
@@ -344,12 +344,12 @@ class TestAttachments:
 
     def test_floats_beside_a_png_are_exr(self, tmp_path: Path) -> None:
         path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--attachments", "bloom,final")
+        done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
         assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
 
     def test_raw_ones_are_png(self, tmp_path: Path) -> None:
         path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--attachments", "glow", "--raw", "--method", "separable")
+        done(path, tmp_path / "b.png", "--framebuffers", "glow", "--raw", "--method", "separable")
         assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_glow.png"}
 
     def test_only_final_without_the_option(self, tmp_path: Path) -> None:
@@ -388,13 +388,13 @@ class TestErrors:
                 2,
                 "the method bevy has no --levels; give --method pyramid or",
             ),
-            ("a.exr b.png --attachments glare", 2, "attachments: unknown framebuffer 'glare'"),
+            ("a.exr b.png --framebuffers glare", 2, "framebuffers: unknown framebuffer 'glare'"),
             ("a.exr b.png --input-colour red", 2, "--input-colour: colour: 'red' is not linear"),
             ("a.exr b.png --subimage -1", 2, "--subimage"),
             ("a.exr b.png --raw", 2, "a.exr has float, not 8-bit integers"),
             ("a.exr b.png --raw --input-colour srgb", 2, "--raw does not convert colours"),
             ("a.exr b.png --encoding srgb --output-colour srgb", 2, "already encodes the output"),
-            ("a.exr b.png --attachments bloom --no-bloom", 2, "attachments"),
+            ("a.exr b.png --framebuffers bloom --no-bloom", 2, "framebuffers"),
         ],
     )
     def test_are_one_line_and_leave_nothing(
@@ -444,7 +444,7 @@ class TestErrors:
         content = path.read_bytes()
         path.write_bytes(content[: len(content) // 2])
         # As a process, because libpng writes to the descriptor.
-        ended = python("-m", "vkbloom.cli", "apply", path, tmp_path / "b.png")
+        ended = python("-m", "vkbloom._cli", "apply", path, tmp_path / "b.png")
         assert (ended.returncode, ended.stdout) == (1, "")
         assert ended.stderr.startswith(f"vkbloom: {path}: ")
         assert ended.stderr.count("\n") == 1
@@ -465,21 +465,21 @@ class TestErrors:
 
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
         before = path.read_bytes()
-        monkeypatch.setattr(renderer.Renderer, "apply_each", fail)
+        monkeypatch.setattr(renderer.Renderer, "map", fail)
         result = run(path, path, "--overwrite")
         assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
         assert path.read_bytes() == before
 
     def test_passes_validation(self, tmp_path: Path) -> None:
         path = stored(tmp_path / "a.exr", light(20, 30, 4) + np.float32(0))
-        result = run(path, tmp_path / "b.exr", "--validation", "--attachments", "all")
+        result = run(path, tmp_path / "b.exr", "--validation", "--framebuffers", "all")
         assert (result.exit_code, result.stderr) == (0, "")
 
     def test_validation_is_handed_on(self, tmp_path: Path) -> None:
         # In a process without an instance: one that is there keeps its layers.
         path = stored(tmp_path / "a.exr", light(20, 30, 3))
         words = ("apply", str(path), str(tmp_path / "b.exr"), "--validation")
-        ended = python("-m", "vkbloom.cli", *words, VK_LAYER_PATH=str(tmp_path))
+        ended = python("-m", "vkbloom._cli", *words, VK_LAYER_PATH=str(tmp_path))
         assert ended.returncode == 1
         assert "validation" in ended.stderr
 
@@ -537,7 +537,7 @@ def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:
 def test_no_picture_is_written_to_a_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vkbloom.cli.sequences.is_terminal", lambda: True)
+    monkeypatch.setattr("vkbloom._cli.sequences.is_terminal", lambda: True)
     refused = run(picture(tmp_path / "a.png"), "-")
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert "standard output is a terminal" in refused.stderr

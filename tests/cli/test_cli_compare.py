@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from tests.images import changed, noise_image
 from vkbloom import Frames, Separable
-from vkbloom.cli.program import program
-from vkbloom.io.image_writing import save
-from vkbloom.io.images import Picture
-from vkbloom.views.comparison import Comparison
+from vkbloom._cli.program import program
+from vkbloom._io.image_writing import save
+from vkbloom._io.images import Picture
+from vkbloom._views.comparison import Comparison
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import vkbloom
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 

@@ -15,20 +15,20 @@ from click.testing import CliRunner, Result
 import vkbloom
 from tests.io import foreign
 from tests.io.profiles import store_png
-from vkbloom import large_files
-from vkbloom.cli.program import program
-from vkbloom.io.image_reading import load
-from vkbloom.io.rows import opened_rows
+from vkbloom._cli import large_files
+from vkbloom._cli.program import program
+from vkbloom._io.image_reading import load
+from vkbloom._io.rows import opened_rows
 
 oiio = pytest.importorskip("OpenImageIO")
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-# Ends the process while a file is written: in another thread, if there are several.
+# PendingSubmissions the process while a file is written: in another thread, if there are several.
 SLOW = """
 import sys, time
-from vkbloom import cli
-from vkbloom.io import safe_writing
+from vkbloom import _cli
+from vkbloom._io import safe_writing
 
 def check(*_):
     print("unfinished", flush=True)
@@ -36,7 +36,7 @@ def check(*_):
 
 safe_writing.check_complete = check
 sys.argv = ["vkbloom", "apply", *sys.argv[1:]]
-cli.main()
+_cli.main()
 """
 
 
@@ -105,7 +105,7 @@ def test_a_damaged_png_is_one_line(tmp_path: Path, kept: int) -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (16, 16, 3), np.uint8)
     content = store_png(tmp_path / "a.png", pixels).read_bytes()
     (tmp_path / "a.png").write_bytes(content[:18] + b"\7" + content[19:kept])
-    words = [sys.executable, "-m", "vkbloom.cli", "apply", "a.png", "b.png"]
+    words = [sys.executable, "-m", "vkbloom._cli", "apply", "a.png", "b.png"]
     ended = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1

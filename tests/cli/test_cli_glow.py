@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.images import picture
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -43,7 +43,7 @@ def stored(path: Path, array: NDArray[Any]) -> Path:
 
 def expected(image: NDArray[Any], settings: vkbloom.Settings, **given: Any) -> NDArray[Any]:
     with vkbloom.Renderer() as renderer:
-        return renderer.apply(image, settings, attachments="final", **given)["final"]
+        return renderer.apply(image, settings, framebuffers="final", **given)["final"]
 
 
 def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:

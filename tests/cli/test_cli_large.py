@@ -11,10 +11,11 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.exhaustive import by_turns
-from vkbloom import large_files
-from vkbloom.bands import BloomByBands, ImageByBands
-from vkbloom.cli.program import program
-from vkbloom.io import rows
+from vkbloom._cli import large_files
+from vkbloom._cli.bands import BloomByBands, ImageByBands
+from vkbloom._cli.large_files import apply_file
+from vkbloom._cli.program import program
+from vkbloom._io import rows
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -294,7 +295,7 @@ def test_apply_file_is_the_render_of_the_array(tmp_path: Path, by_rows: list[int
     image = stored(tmp_path / "a.exr", light(50, 41, 3, "float16"))
     done: list[tuple[int, int]] = []
     with vkbloom.Renderer("software") as renderer:
-        vkbloom.apply_file(
+        apply_file(
             image,
             tmp_path / "b.exr",
             vkbloom.presets["kino"],

@@ -15,11 +15,11 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.cli.program import program
-from vkbloom.io.expansion import KNEE, expanded
-from vkbloom.io.files import facts_of
-from vkbloom.io.image_reading import load
-from vkbloom.io.srgb import decode_srgb
+from vkbloom._cli.program import program
+from vkbloom._io.expansion import KNEE, expanded
+from vkbloom._io.image_reading import load
+from vkbloom._io.srgb import decode_srgb
+from vkbloom._renderer.frame_files import facts_of
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 

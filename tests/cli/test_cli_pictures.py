@@ -14,7 +14,7 @@ import vkbloom
 from tests.io.profiles import DISPLAY_P3, profile, profile_chunk, store_png
 from tests.io.test_array_files import halves, store_exr
 from tests.processes import python
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -48,7 +48,7 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def by_rows_or_not(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Read and write pictures in bands of rows, as large ones are, or not."""
     if request.param:
-        monkeypatch.setattr("vkbloom.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom._cli.large_files.LARGE", 1)
 
 
 class TestSequences:
@@ -176,7 +176,7 @@ class TestSequences:
         content = (frames / "f.0011.png").read_bytes()
         (frames / "f.0011.png").write_bytes(content[: len(content) // 2])
         words = ("f.*.png", "out", "--method", "pyramid", "--threshold", "1")
-        ended = python("-m", "vkbloom.cli", "apply", *words)
+        ended = python("-m", "vkbloom._cli", "apply", *words)
         assert ended.returncode == 1
         lines = ended.stderr.splitlines()
         assert len(lines) == 5
@@ -282,7 +282,7 @@ def test_pipes(tmp_path: Path) -> None:
     path = store_png(tmp_path / "a.png", IMAGE)
     for kind in ("png", "exr"):
         done = subprocess.run(
-            [sys.executable, "-m", "vkbloom.cli", "apply", "-", "-", "--pipe-format", kind],
+            [sys.executable, "-m", "vkbloom._cli", "apply", "-", "-", "--pipe-format", kind],
             input=path.read_bytes(),
             capture_output=True,
             check=True,
@@ -295,7 +295,7 @@ def test_pipes(tmp_path: Path) -> None:
 
 def test_a_pipe_without_an_image() -> None:
     ended = subprocess.run(
-        [sys.executable, "-m", "vkbloom.cli", "apply", "-", "-"],
+        [sys.executable, "-m", "vkbloom._cli", "apply", "-", "-"],
         input=b"dear",
         capture_output=True,
         check=False,

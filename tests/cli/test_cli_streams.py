@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import vkbloom
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 pytest.importorskip("OpenImageIO")
 
@@ -80,7 +80,7 @@ def stream_of(file: str, kind: str) -> Iterator[str]:
         ("apply a.png out.exr --emission {}", "a.png"),
         ("apply a.png out.exr --method convolution --psf {}", "a.png"),
         ("apply a.png out.exr --dirt {}", "a.png"),
-        (f"render -o out.exr --attachments final --skybox {{}} {SMALL}", "a.exr"),
+        (f"render -o out.exr --framebuffers final --skybox {{}} {SMALL}", "a.exr"),
         ("grid {} -o out --axis intensity=0.5 --image-format exr", "a.png"),
         ("compare a.png {} --diff out.exr", "a.exr"),
     ],
@@ -144,7 +144,7 @@ def test_a_reader_that_ends_early_is_no_error(folder: Path, line: str) -> None:
     [
         "VK apply a.png out.png",
         "VK compare a.png <(cat a.png) --diff out.png",
-        f"VK render -o out.png --attachments final {SMALL}",
+        f"VK render -o out.png --framebuffers final {SMALL}",
         "VK apply a.png >(cat > got.png); wait",
         "VK apply a.png /dev/stdout | cat > got.png",
     ],

@@ -32,7 +32,7 @@ def at_import(event, _):
 FIRST = left
 sys.addaudithook(at_import)
 if way == "script":
-    from vkbloom.cli import main
+    from vkbloom._cli import main
     main()
 else:
     runpy.run_module("vkbloom", run_name="__main__")
@@ -50,7 +50,7 @@ def test_at_an_import(number: int, way: str) -> None:
 @pytest.mark.parametrize("words", [("adapters",), ("apply", "a.exr", "b.exr")])
 def test_at_any_time(tmp_path: Path, words: tuple[str, ...]) -> None:
     vkbloom.write(tmp_path / "a.exr", np.ones((16, 16, 3), np.float32))
-    code = "print(flush=True); from vkbloom.cli import main; main()"
+    code = "print(flush=True); from vkbloom._cli import main; main()"
     chosen = random.Random(7)
     for _ in range(8):
         with subprocess.Popen(

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 import vkbloom
-from vkbloom.cli import glares as glares_command
-from vkbloom.cli import listing
-from vkbloom.cli import presets as presets_command
-from vkbloom.cli import psfs as psfs_command
-from vkbloom.cli.program import program
-from vkbloom.io.image_reading import load
-from vkbloom.named_glares import GLARES
-from vkbloom.named_settings import PRESETS
-from vkbloom.psf.base import functions
-from vkbloom.registry import STAGES
+from vkbloom._cli import glares as glares_command
+from vkbloom._cli import listing
+from vkbloom._cli import presets as presets_command
+from vkbloom._cli import psfs as psfs_command
+from vkbloom._cli.program import program
+from vkbloom._io.image_reading import load
+from vkbloom._presets.named_glares import GLARES
+from vkbloom._presets.named_settings import PRESETS
+from vkbloom._settings.registry import STAGES
+from vkbloom.psf._base import functions
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -92,7 +92,7 @@ def test_what_needs_values_above_1(renderer: vkbloom.Renderer) -> None:
     image[16:32, 24:40] = 1
     found = {one.name: one.needs_hdr for one in presets_command.entries()}
     for name in ("tutorial", "kino", "unity_hdrp", "filament", "godot_4_6"):
-        bloom = renderer.apply(image, vkbloom.presets[name], attachments=["bloom"])["bloom"]
+        bloom = renderer.apply(image, vkbloom.presets[name], framebuffers=["bloom"])["bloom"]
         assert found[name] == (float(bloom[20:28, 28:36, :3].mean()) < 0.01)
     # The command line expands the picture for it.
     assert not found["photo"]

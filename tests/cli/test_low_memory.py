@@ -13,7 +13,7 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import some
-from vkbloom.grid import memory
+from vkbloom._grid import memory
 
 pytest.importorskip("OpenImageIO")
 
@@ -22,7 +22,7 @@ def limited(megabytes: int, *arguments: str) -> subprocess.CompletedProcess[str]
     """Run a command in a process that can map this much."""
     size = megabytes << 20
     return subprocess.run(
-        [sys.executable, "-m", "vkbloom.cli", *arguments],
+        [sys.executable, "-m", "vkbloom._cli", *arguments],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size)),
         capture_output=True,
         text=True,
@@ -48,7 +48,7 @@ def test_apply_works_or_names_memory(tmp_path: Path, megabytes: int) -> None:
 def test_doctor_does_not_blame_the_driver() -> None:
     ended = limited(600, "doctor")
     assert ended.returncode == 1
-    assert "memory is short" in ended.stdout
+    assert "memory is short: a limit leaves" in ended.stdout
     assert "Update its driver" not in ended.stdout
     assert "mesa-vulkan-drivers" not in ended.stdout.partition("adapters ")[2].partition("\n")[0]
 
@@ -58,7 +58,7 @@ def test_grids_leave_a_reserve(monkeypatch: pytest.MonkeyPatch, renderer: vkbloo
     size = 2 * image.nbytes
     monkeypatch.setattr(memory, "memory_left", lambda: size + size // 20)
     with pytest.raises(MemoryError, match="a tenth as reserve"):
-        renderer.grid(image, axes={"exposure": [0, 1]})
+        vkbloom.grid(image, axes={"exposure": [0, 1]}, renderer=renderer)
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
@@ -69,7 +69,7 @@ def test_explore_ends_with_the_status_of_shells(number: int, status: int) -> Non
             sys.executable,
             "-u",
             "-m",
-            "vkbloom.cli",
+            "vkbloom._cli",
             "explore",
             "--no-open",
             "--adapter",

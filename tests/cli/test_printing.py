@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -103,7 +103,7 @@ def test_completion(tmp_path: Path, shell: str) -> None:
     if found is None:
         pytest.skip(f"{shell} is not installed")
     program_file = tmp_path / "vkbloom"
-    program_file.write_text(f"#!{sys.executable}\nfrom vkbloom.cli import main\n\nmain()\n")
+    program_file.write_text(f"#!{sys.executable}\nfrom vkbloom._cli import main\n\nmain()\n")
     program_file.chmod(program_file.stat().st_mode | stat.S_IXUSR)
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
     script = (_ZSH_FUNCTIONS if shell == "zsh" else "") + _LOAD.format(shell=shell)

@@ -12,8 +12,8 @@ import pytest
 import vkbloom
 from tests.core.builds import ROOT
 from vkbloom import Camera, Pyramid, Scene, Separable
-from vkbloom.cli.live import Live
-from vkbloom.registry import METHODS
+from vkbloom._cli.live import Live
+from vkbloom._settings.registry import METHODS
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 
@@ -118,13 +118,13 @@ def test_without_a_display_it_says_so() -> None:
     pytest.importorskip("glfw")
     names = ("DISPLAY", "WAYLAND_DISPLAY")
     env = {name: value for name, value in os.environ.items() if name not in names}
-    done = view("vkbloom.cli", "view", env=env)
+    done = view("vkbloom._cli", "view", env=env)
     assert (done.returncode, done.stdout) == (1, "")
     assert "no window was opened: " in done.stderr
 
 
 def test_a_scene_s_options_are_refused_with_an_image() -> None:
     pytest.importorskip("glfw")
-    done = view("vkbloom.cli", "view", "x.png", "--shading", "forward", env=dict(os.environ))
+    done = view("vkbloom._cli", "view", "x.png", "--shading", "forward", env=dict(os.environ))
     assert done.returncode == 2
     assert "leave it out with an IMAGE" in done.stderr

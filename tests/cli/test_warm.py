@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import vkbloom
 from tests.processes import output
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 APPLY = """
 import numpy as np, vkbloom

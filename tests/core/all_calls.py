@@ -29,8 +29,9 @@ from tests.device import stand_in
 from tests.device.device_work import OnDevice
 from tests.images import picture
 from tests.planned import CAMERA, INDICES, MESH, SKY, VERTICES
-from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core, requests
-from vkbloom.device_arrays import placed
+from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
+from vkbloom._renderer import requests
+from vkbloom._renderer.device_arrays import placed
 
 THREADS: Final = 16
 #: Renderers of the threads that share none with all others.
@@ -89,13 +90,13 @@ def render(renderer: Renderer, which: int, size: int) -> Any:
 
 def leave(renderer: Renderer, which: int, size: int) -> Any:
     """Leave a sequence half way: some of its submissions are still pending."""
-    frames = next(iter(renderer.apply_many(IMAGES[size], [SETTINGS[which]] * 5)))
+    frames = next(iter(renderer.sweep(IMAGES[size], [SETTINGS[which]] * 5)))
     return [frames["final"]]
 
 
 def upload(renderer: Renderer, which: int, size: int) -> Any:
     image = renderer.upload(IMAGES[size])
-    return host(renderer.apply(image, SETTINGS[which], attachments="final"))
+    return host(renderer.apply(image, SETTINGS[which], framebuffers="final"))
 
 
 def recycle(renderer: Renderer, which: int, size: int) -> Any:
@@ -124,7 +125,7 @@ def on_device(renderer: Renderer, which: int, size: int) -> Any:
     out = OnDevice(np.zeros(final.shape, final.dtype))
     handle = renderer.upload(image)
     renderer.apply(handle, SETTINGS[which], out={"final": out})
-    again: Any = renderer.apply(final, SETTINGS[which], attachments="final")["final"]
+    again: Any = renderer.apply(final, SETTINGS[which], framebuffers="final")["final"]
     written = placed(IMAGES[size], "cuda", core)
     found = [one.numpy() for one in (*frames.values(), again, written)]
     return [*found, out.array, core.cuda(), core.cuda_name(0)]
@@ -225,7 +226,7 @@ def open_and_close(renderer: Renderer, which: int, size: int) -> Any:
     def work() -> None:
         try:
             while True:
-                own.apply(image, SETTINGS[which], attachments="final")
+                own.apply(image, SETTINGS[which], framebuffers="final")
                 assert own._core.instance
         except ValueError:
             assert own.closed

@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.core.descriptors import open_descriptors
-from tests.device.device_work import Consumer, OnDevice
+from tests.device.device_work import Consumer, OnDevice, vjp
 from tests.exhaustive import some
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
-from vkbloom.scene.textures import Texture
+from vkbloom._renderer.surface import Surface
+from vkbloom._scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4
@@ -85,13 +86,13 @@ def glared(renderer: Renderer) -> Arrays:
 
 def batch(renderer: Renderer) -> Arrays:
     settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
-    frames = renderer.apply_many(picture(*SIZE), settings)
+    frames = renderer.sweep(picture(*SIZE), settings)
     return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
 
 
 def grid(renderer: Renderer) -> Arrays:
     settings = [vkbloom.Pyramid(levels=2, radius=step / 2) for step in range(5)]
-    frames = renderer.render_many(UFO, settings, SIZE, attachments=("final", "bloom"))
+    frames = renderer.sweep(UFO, settings, size=SIZE, framebuffers=("final", "bloom"))
     return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
 
 
@@ -104,7 +105,7 @@ def readback(renderer: Renderer) -> Arrays:
 
     def final(exposure: float, **out: Any) -> NDArray[Any]:
         settings = vkbloom.Separable(exposure=exposure)
-        return renderer.apply(image, settings, attachments="final", **out)["final"]
+        return renderer.apply(image, settings, framebuffers="final", **out)["final"]
 
     own = final(1.0, out={"final": np.zeros((512, 512, 4), np.uint8)})
     first = final(0.5)
@@ -120,7 +121,7 @@ def handles(renderer: Renderer) -> Arrays:
     """Uploaded images of two sizes, each in the memory of earlier ones."""
     kept = renderer.upload(picture(*SIZE, seed=9))
     images = [picture(24 + seed // 3, 16, seed=seed) for seed in range(6)]
-    frames = renderer.apply_each([*images, kept], vkbloom.Separable(threshold=0.5))
+    frames = renderer.map([*images, kept], vkbloom.Separable(threshold=0.5))
     arrays = {f"{i} final": one["final"] for i, one in enumerate(frames)}
     arrays["twice"] = renderer.apply(kept, vkbloom.Separable())["final"]
     return arrays
@@ -130,7 +131,7 @@ def gradients(renderer: Renderer) -> Arrays:
     """Adjoint passes for an image, and sums for fields."""
     image = picture(24, 16, seed=4)
     settings = vkbloom.Pyramid(levels=2, threshold=0.3, knee=0.5)
-    frames, pullback = renderer.vjp(image, settings)
+    frames, pullback = vkbloom.vjp(image, settings, renderer=renderer)
     found = pullback({"final": np.ones(image.shape)})
     names = ("image", "threshold", "intensity")
     return {"final": frames["final"], **{name: found[name] for name in names}}
@@ -139,9 +140,9 @@ def gradients(renderer: Renderer) -> Arrays:
 def presented(renderer: Renderer) -> Arrays:
     """Frames on two surfaces; one changes its size, and is left to the renderer."""
     shown = []
-    with vkbloom.Surface(renderer, size=SIZE) as closed:
+    with Surface(renderer, size=SIZE) as closed:
         shown += [closed.present(UFO, time=step / 9) for step in range(3)]
-    left = vkbloom.Surface(renderer, size=SIZE)
+    left = Surface(renderer, size=SIZE)
     shown += [left.present(UFO, size=(16, 16)) for _ in range(2)]
     left._size = (32, 16)
     shown += [left.present(UFO) for _ in range(4)]
@@ -152,7 +153,7 @@ def presents() -> bool:
     """Return whether there is a surface without a window."""
     with open_renderer() as renderer:
         try:
-            vkbloom.Surface(renderer).close()
+            Surface(renderer).close()
         except vkbloom.Error:
             return False
     return True
@@ -167,25 +168,25 @@ AXES = {"radius": [0.25, 0.5, 0.75], "exposure": [0.5, 1.0]}
 
 def grid_in_memory(renderer: Renderer) -> Arrays:
     base = vkbloom.Pyramid(levels=2)
-    return variables(renderer.grid(picture(*SIZE), base, AXES, progress=False))
+    return variables(vkbloom.grid(picture(*SIZE), base, AXES, progress=False, renderer=renderer))
 
 
 #: The folder of the grid that a fault has ended. The next call continues it.
 FOLDER = Path(tempfile.gettempdir()) / f"vkbloom-fault-walk-{os.getpid()}"
 
 
-def grid_to_zarr(_: Renderer) -> Arrays:
-    """Opens its own renderer. A complete store is removed, so that the next run starts again."""
+def stored_grid(renderer: Renderer) -> Arrays:
+    """A complete store is removed, so that the next run starts again."""
     base = vkbloom.Pyramid(levels=2)
-    dataset = vkbloom.grid_to_zarr(
+    dataset = vkbloom.grid(
         picture(*SIZE),
         base,
         AXES,
-        FOLDER,
+        store=FOLDER,
         chunks={"exposure": 2},
         reduce={"mean": vkbloom.reductions.Mean()},
-        validation=True,
         progress=False,
+        renderer=renderer,
     )
     arrays = variables(dataset)
     assert arrays["done"].all()
@@ -195,13 +196,13 @@ def grid_to_zarr(_: Renderer) -> Arrays:
 
 @functools.cache
 def own_settings() -> tuple[vkbloom.Settings, ...]:
-    """Return the settings of two own methods, of draws and of dispatches; compiled once."""
-    folder = Path("examples/own_methods")
+    """Return the settings of two custom methods, of draws and of dispatches; compiled once."""
+    folder = Path("examples/custom_methods")
     return tuple(vkbloom.load_method(folder / f"{name}.hook")() for name in ("karis", "compute"))
 
 
 def own_passes(renderer: Renderer) -> Arrays:
-    frames = renderer.apply_many(picture(*SIZE), own_settings())
+    frames = renderer.sweep(picture(*SIZE), own_settings())
     return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
 
 
@@ -212,7 +213,9 @@ def on_device(renderer: Any) -> Arrays:
     """
     images = np.stack([picture(*SIZE, dtype="float16", seed=seed) for seed in range(3)])
     settings = vkbloom.Separable(threshold=0.3)
-    one, pullback = renderer.vjp(OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]))
+    one, pullback = vjp(
+        OnDevice(images[0, ::-1]), settings, emission=OnDevice(images[1]), renderer=renderer
+    )
     found = pullback({"bloom": OnDevice(np.ones(one["bloom"].shape, np.float16))})
     arrays = {name: array.numpy() for name, array in one.items()}
     arrays |= {f"by {name}": found[name].numpy() for name in ("image", "emission")}
@@ -224,7 +227,7 @@ def on_device(renderer: Any) -> Arrays:
     assert second.info["nan"] == 0
     arrays |= {"second": second["final"].numpy()}
     del first, second
-    for index, frames in enumerate(renderer.apply_each(OnDevice(images), settings)):
+    for index, frames in enumerate(renderer.map(OnDevice(images), settings)):
         arrays[f"{index} final"] = frames["final"].numpy()
     return {**arrays, "copied": copied}
 
@@ -244,7 +247,7 @@ WORK: dict[str, Work] = {
     "batch": batch,
     "grid": grid,
     "grid in memory": grid_in_memory,
-    "grid to Zarr": grid_to_zarr,
+    "grid to Zarr": stored_grid,
     "readback": readback,
     "handles": handles,
     "gradients": gradients,
@@ -361,7 +364,7 @@ class Walk:
     def close_at(self, n: int, result: int, names: str) -> bool:
         """Closing a renderer while its device is busy."""
         renderer = open_renderer()
-        frames = renderer.apply_many(picture(64, 64), [vkbloom.Separable()] * 9)
+        frames = renderer.sweep(picture(64, 64), [vkbloom.Separable()] * 9)
         next(frames)
         next(frames)
         _, _, failed = self._at(n, result, names, renderer.close)
@@ -377,8 +380,7 @@ class Walk:
             raise error
         if arrays is not None:
             same(arrays, right)
-        # A grid in a store has a renderer of its own, which is closed by now.
-        if isinstance(error, vkbloom.DeviceLostError) and self.work is not grid_to_zarr:
+        if isinstance(error, vkbloom.DeviceLostError):
             for _ in range(2):
                 try:
                     self.work(renderer)

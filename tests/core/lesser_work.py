@@ -21,7 +21,7 @@ from tests import tolerance
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom
-from vkbloom.scene import skybox
+from vkbloom._scene import skybox
 
 DTYPES = ("uint8", "float16", "float32")
 # One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
@@ -51,9 +51,7 @@ def use_handles(renderer: Renderer) -> None:
                 renderer.apply(image, Pyramid(levels=2))["final"],
             )
     for _ in range(2):
-        for image, frames in zip(
-            images, renderer.apply_each(iter(images), Separable()), strict=True
-        ):
+        for image, frames in zip(images, renderer.map(iter(images), Separable()), strict=True):
             tolerance.assert_matches_reference(frames, image, Separable())
 
 
@@ -64,7 +62,7 @@ def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
     width = frames["down_0"].shape[1]
     assert width >= 4096
     name = type(settings).__module__.rpartition(".")[2]
-    with mock.patch(f"vkbloom.reference.{name}.WIDEST_LEVEL", width):
+    with mock.patch(f"vkbloom.reference._{name}.WIDEST_LEVEL", width):
         tolerance.assert_matches_reference(frames, image, settings)
 
 
@@ -83,11 +81,11 @@ def try_all(renderer: Renderer) -> dict[str, str]:
     def apply(image: Any, settings: vkbloom.Settings) -> None:
         tolerance.assert_matches_reference(renderer.apply(image, settings), image, settings)
         last = settings.replace(exposure=0.5)
-        alone = renderer.apply(image, last, attachments=("final",))["final"]
+        alone = renderer.apply(image, last, framebuffers=("final",))["final"]
         np.testing.assert_array_equal(alone, renderer.apply(image, last)["final"])
 
     def apply_alone(image: Any, settings: vkbloom.Settings) -> None:
-        alone = renderer.apply(image, settings, attachments=("final",))["final"]
+        alone = renderer.apply(image, settings, framebuffers=("final",))["final"]
         np.testing.assert_array_equal(alone, renderer.apply(image, settings)["final"])
 
     scene = Scene.ufo()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tests.core.fault_walk import SIZE, core, open_renderer
 from tests.images import picture
 from vkbloom import Renderer, Separable
-from vkbloom.requests import named, new_arrays
+from vkbloom._renderer.requests import named, new_arrays
 
 BEYOND = 40  # a frame that does without one refused block may stop at the next
 

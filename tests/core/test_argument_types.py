@@ -76,7 +76,6 @@ NEEDED: dict[str, Any] = {
     "a": IMAGE,
     "b": IMAGE,
     "settings": SEPARABLE,
-    "settings_seq": [SEPARABLE],
     "to": SEPARABLE,
     "vary": ["intensity"],
     "psf": GAUSSIAN,
@@ -101,26 +100,27 @@ NEEDED: dict[str, Any] = {
     ),
 }
 OTHERS: dict[str, dict[str, Any]] = {
-    "apply_file": {"source": "a.exr", "target": "b.exr"},
     "load_method": {"source": "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(1); }\n"},
     "unreal": {"image": np.ones((3, 3))},
     "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),
     "response": {"bloom": lambda image, intensity: image},
-    "render_many": {"scene": vkbloom.Scene.ufo()},
     "samples": {"values": np.ones((3, 3))},
 }
 FUNCTIONS: tuple[Callable[..., Any], ...] = (
-    vkbloom.apply_file,
+    vkbloom.apply,
+    vkbloom.capture,
     vkbloom.check_grid,
     vkbloom.contact_sheet,
     vkbloom.fit,
     vkbloom.fit_pyramid,
     vkbloom.gaussian_weights,
-    vkbloom.grid_to_zarr,
+    vkbloom.grid,
     vkbloom.load_method,
     vkbloom.read,
     vkbloom.response_curves,
+    vkbloom.render,
     vkbloom.translate,
+    vkbloom.vjp,
     vkbloom.write,
     vkbloom.Camera,
     vkbloom.Renderer,
@@ -144,7 +144,7 @@ FUNCTIONS: tuple[Callable[..., Any], ...] = (
         and name not in ("Settings", "Glare", "GlareLight")
     ),
 )
-METHODS = ("apply", "apply_each", "apply_many", "capture", "grid", "plan", "render_many", "upload")
+METHODS = ("apply", "map", "plan", "render", "sweep", "upload")
 
 
 @pytest.fixture(autouse=True)
@@ -173,6 +173,8 @@ def wrong_arguments(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
     """Yield pairs of a parameter and a value of a wrong type: one of each type, with another value
     of the type for the next parameter."""
     for place, (name, parameter) in enumerate(inspect.signature(function).parameters.items()):
+        if parameter.kind is parameter.VAR_KEYWORD:
+            continue
         types = accepted(str(parameter.annotation))
         if types is not None:
             for kind in sorted(set(VALUES) - types):
@@ -195,7 +197,9 @@ def needed(function: Callable[..., Any]) -> dict[str, Any]:
     parameters = inspect.signature(function).parameters.items()
     values = NEEDED | OTHERS.get(function.__name__, {})
     return {
-        name: values[name] for name, parameter in parameters if parameter.default is parameter.empty
+        name: values[name]
+        for name, parameter in parameters
+        if parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
     }
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tests.images import picture
 from vkbloom import OutOfMemoryError, Renderer, Separable, _core
-from vkbloom.requests import new_array
+from vkbloom._renderer.requests import new_array
 
 #: At least 1.3 MiB in every dtype, so that the device writes without staging memory.
 SIDE = 600
@@ -26,7 +26,7 @@ def own(new_renderer: Callable[[], Renderer]) -> Renderer:
 
 
 def final(renderer: Renderer, image: NDArray[np.generic], exposure: float) -> NDArray[np.generic]:
-    return renderer.apply(image, Separable(bloom=False, exposure=exposure), attachments="final")[
+    return renderer.apply(image, Separable(bloom=False, exposure=exposure), framebuffers="final")[
         "final"
     ]
 
@@ -100,7 +100,7 @@ def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
     expected = final(own, image, 0.5).copy()
     array = final(own, image, 1.0)
     frames = own.apply(
-        image, Separable(bloom=False, exposure=0.5), attachments="final", out={"final": array}
+        image, Separable(bloom=False, exposure=0.5), framebuffers="final", out={"final": array}
     )
     assert frames["final"] is array
     np.testing.assert_array_equal(array, expected)
@@ -114,7 +114,7 @@ def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> N
     pages = new_array(own._core, (3 * image.size,), "float16")
     pages[:] = 7
     out = pages[start : start + image.size].reshape(image.shape)
-    own.apply(image, Separable(bloom=False, exposure=0.5), attachments="final", out={"final": out})
+    own.apply(image, Separable(bloom=False, exposure=0.5), framebuffers="final", out={"final": out})
     np.testing.assert_array_equal(out, expected)
     assert (pages[:start] == 7).all()
     assert (pages[start + image.size :] == 7).all()

@@ -15,19 +15,10 @@ import pytest
 import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
-from vkbloom import (
-    BevyBloom,
-    DualKawase,
-    Pyramid,
-    Renderer,
-    Scene,
-    Separable,
-    Settings,
-    _core,
-    requests,
-)
-from vkbloom.requests import new_arrays
-from vkbloom.sources import scene_arguments
+from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
+from vkbloom._renderer import requests
+from vkbloom._renderer.requests import new_arrays
+from vkbloom._renderer.sources import scene_arguments
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.
@@ -54,15 +45,15 @@ SEQUENCE: list[Settings] = [
 # The same frames
 
 
-@pytest.mark.parametrize("attachments", ["all", "final"], ids=str)
+@pytest.mark.parametrize("framebuffers", ["all", "final"], ids=str)
 def test_images_one_by_one_and_many(
-    new_renderer: Callable[[], Renderer], attachments: str | Sequence[str]
+    new_renderer: Callable[[], Renderer], framebuffers: str | Sequence[str]
 ) -> None:
     image = picture(40, 30, 3, seed=1)
     alone, together = new_renderer(), new_renderer()
-    sequence = [settings for settings in SEQUENCE if settings.bloom or "bloom" not in attachments]
-    expected = [alone.apply(image, s, attachments=attachments) for s in sequence]
-    frames = list(together.apply_many(image, sequence, attachments=attachments))
+    sequence = [settings for settings in SEQUENCE if settings.bloom or "bloom" not in framebuffers]
+    expected = [alone.apply(image, s, framebuffers=framebuffers) for s in sequence]
+    frames = list(together.sweep(image, sequence, framebuffers=framebuffers))
     assert len(frames) == len(sequence)
     for got, right in zip(frames, expected, strict=True):
         assert_same(got, right)
@@ -81,7 +72,7 @@ def test_scenes_one_by_one_and_many(
     alone, together = new_renderer(), new_renderer()
     sequence = [settings for settings in SEQUENCE if isinstance(settings, Separable)]
     expected = [alone.render(scene, s, SIZE, shading=shading, time=0.2) for s in sequence]
-    frames = list(together.render_many(scene, sequence, SIZE, shading=shading, time=0.2))
+    frames = list(together.sweep(scene, sequence, size=SIZE, shading=shading, time=0.2))
     for got, right in zip(frames, expected, strict=True):
         assert_same(got, right)
         assert list(got.timings) == list(right.timings)
@@ -114,7 +105,7 @@ def test_frames_that_fill_a_submission_alone(
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
     source = _core.image_source(image)
-    work = [requests.Work(source, one) for one in settings]
+    work = [requests.Request(source, one) for one in settings]
     results = list(requests.run(work, counting, ("final",)))
     assert len(results) == 20
     assert max(counting.sizes) == frames * image.nbytes
@@ -131,7 +122,7 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
     source = _core.image_source(image)
-    work = [requests.Work(source, one) for one in settings]
+    work = [requests.Request(source, one) for one in settings]
     results = list(requests.run(work, counting, ("final",)))
     assert [one for one, _ in results] == settings
     assert max(counting.counts) == most
@@ -140,7 +131,7 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:
     image = picture(20, 10, 4, seed=3)
-    frames = list(renderer.apply_many(image, [Separable()] * 10))
+    frames = list(renderer.sweep(image, [Separable()] * 10))
     kept = frames[0]["final"].copy()
     for one in frames:
         for array in one.values():
@@ -153,22 +144,22 @@ def test_arrays_are_the_takers(renderer: Renderer) -> None:
 def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
     image = picture(20, 10, 4, seed=4)
     image[3, 4] = (np.nan, np.inf, 0.0, -np.inf)
-    frames = list(renderer.apply_many(image, [Separable(), Pyramid(), Separable()]))
+    frames = list(renderer.sweep(image, [Separable(), Pyramid(), Separable()]))
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
 
 
 def test_settings_that_are_not_a_sequence_are_refused(renderer: Renderer) -> None:
     wrong: Any = Separable()
-    with pytest.raises(TypeError, match=r"^settings_seq: "):
-        list(renderer.apply_many(picture(4, 4, 3, seed=5), wrong))
+    with pytest.raises(TypeError, match=r"^settings: "):
+        list(renderer.sweep(picture(4, 4, 3, seed=5), wrong))
 
 
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
-    assert list(renderer.apply_many(picture(4, 4, 3, seed=5), [])) == []
-    assert list(renderer.render_many(scene, [], SIZE)) == []
+    assert list(renderer.sweep(picture(4, 4, 3, seed=5), [])) == []
+    assert list(renderer.sweep(scene, [], size=SIZE)) == []
 
 
-# Taken ahead, and no further
+# ImportedArray ahead, and no further
 
 
 @pytest.mark.parametrize("slow", [0, 1, 2, 5])
@@ -192,7 +183,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
             taken += 1
             yield Separable(exposure=taken % 7 / 7)
 
-    frames = renderer.apply_many(picture(8, 8, 4, seed=6), endless(), attachments=("final",))
+    frames = renderer.sweep(picture(8, 8, 4, seed=6), endless(), framebuffers=("final",))
     assert taken == 0
     next(frames)
     assert taken == 1
@@ -221,7 +212,7 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
         lambda: assert_same(renderer.apply(1.0 - image, LOW), last),
         lambda: None,
     ]
-    for index, frames in enumerate(renderer.apply_many(image, settings)):
+    for index, frames in enumerate(renderer.sweep(image, settings)):
         assert_same(frames, expected[index])
         calls[index % len(calls)]()
 
@@ -231,8 +222,8 @@ def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
     settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
     expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
     both = zip(
-        renderer.apply_many(image, settings),
-        renderer.render_many(scene, settings, SIZE),
+        renderer.sweep(image, settings),
+        renderer.sweep(scene, settings, size=SIZE),
         strict=True,
     )
     for (of_image, of_scene), (right_image, right_scene) in zip(both, expected, strict=True):
@@ -250,14 +241,14 @@ def test_threads(renderer: Renderer, scene: Scene) -> None:
     def sequences(which: int) -> None:
         start.wait()
         for _ in range(3):
-            got = renderer.apply_many(images[which], settings)
+            got = renderer.sweep(images[which], settings)
             for frames, right in zip(got, many[which], strict=True):
                 assert_same(frames, right)
 
     def abandoned() -> None:
         start.wait()
         for step in range(12):
-            got = renderer.apply_many(images[step % 3], settings)
+            got = renderer.sweep(images[step % 3], settings)
             for index in range(step % 5):
                 assert_same(next(got), many[step % 3][index])
 
@@ -277,13 +268,13 @@ def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
     image = picture(30, 20, 3, seed=13)
     settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
     expected = [renderer.apply(image, s) for s in settings]
-    frames = renderer.apply_many(image, settings)
+    frames = renderer.sweep(image, settings)
     for right in expected:
         with ThreadPoolExecutor(1) as pool:
             assert_same(pool.submit(next, frames).result(), right)
 
 
-# Ends before the end
+# PendingSubmissions before the end
 
 
 @pytest.mark.parametrize(
@@ -293,7 +284,7 @@ def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int,
     image = picture(40, 30, 3, seed=14)
     right = renderer.apply(image, LOW)
     for _ in range(2):
-        frames = renderer.apply_many(image, SEQUENCE)
+        frames = renderer.sweep(image, SEQUENCE)
         for _ in range(taken):
             next(frames)
         if end == "close":
@@ -305,7 +296,7 @@ def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int,
 
 def test_a_sequence_forgotten_with_its_renderer() -> None:
     renderer = Renderer(validation=True)
-    frames = renderer.apply_many(picture(40, 30, 3, seed=15), SEQUENCE)
+    frames = renderer.sweep(picture(40, 30, 3, seed=15), SEQUENCE)
     for _ in range(4):
         next(frames)
     del renderer, frames
@@ -316,7 +307,7 @@ def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Rend
     image = picture(40, 30, 3, seed=16)
     renderer = new_renderer()
     expected = [renderer.apply(image, settings) for settings in SEQUENCE]
-    frames = renderer.apply_many(image, SEQUENCE)
+    frames = renderer.sweep(image, SEQUENCE)
     got = [next(frames) for _ in range(4)]
     # With validation: pending submissions are waited for, and all objects are destroyed.
     renderer.close()
@@ -334,9 +325,9 @@ def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Rend
 
 def wrong_ones() -> list[tuple[Any, type[Exception], str]]:
     return [
-        ("separable", TypeError, "settings"),
+        (Separable, TypeError, "settings"),
         (Separable(bloom_size=(100_000, 1)), ValueError, "100000 x 1"),
-        (Separable(bloom=False), ValueError, "attachments: unknown framebuffer 'bloom'"),
+        (Separable(bloom=False), ValueError, "framebuffers: unknown framebuffer 'bloom'"),
     ]
 
 
@@ -348,9 +339,9 @@ def test_an_error_comes_in_its_turn(
     image = picture(20, 30, 4, seed=17)
     right = [Separable(blur_strength=strength / 8) for strength in range(20)]
     sequence = [*right[:place], wrong, *right[place:]]
-    frames = renderer.apply_many(image, sequence, attachments=("bloom", "final"))
+    frames = renderer.sweep(image, sequence, framebuffers=("bloom", "final"))
     for settings in right[:place]:
-        assert_same(next(frames), renderer.apply(image, settings, attachments=("bloom", "final")))
+        assert_same(next(frames), renderer.apply(image, settings, framebuffers=("bloom", "final")))
     with pytest.raises(kind, match=words):
         next(frames)
     with pytest.raises(StopIteration):
@@ -364,7 +355,7 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
             yield Separable(exposure=exposure)
         raise KeyError("mine")
 
-    frames = renderer.apply_many(picture(4, 4, 3, seed=18), broken())
+    frames = renderer.sweep(picture(4, 4, 3, seed=18), broken())
     for _ in range(place):
         next(frames)
     with pytest.raises(KeyError, match="mine"):
@@ -373,14 +364,14 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
 
 def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) -> None:
     wrong: Any = [[0.0]]
-    with pytest.raises(TypeError, match="image"):
-        renderer.apply_many(wrong, [Separable()])
-    with pytest.raises(TypeError, match="attachments"):
-        renderer.apply_many(picture(4, 4, 3, seed=19), [Separable()], attachments=wrong)
+    with pytest.raises(TypeError, match="source"):
+        renderer.sweep(wrong, [Separable()])
+    with pytest.raises(TypeError, match="framebuffers"):
+        renderer.sweep(picture(4, 4, 3, seed=19), [Separable()], framebuffers=wrong)
     with pytest.raises(ValueError, match="shading"):
-        renderer.render_many(scene, [Separable()], shading=wrong)
+        renderer.sweep(scene, [Separable()], shading=wrong)
     with pytest.raises(TypeError):
-        renderer.apply_many(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
+        renderer.sweep(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to
@@ -429,7 +420,7 @@ def run_failing(
     results: list[Any] = []
     core: Any = FailingCore(failing)
     nothing: Any = None
-    work = [requests.Work(nothing, one) for one in settings]
+    work = [requests.Request(nothing, one) for one in settings]
     try:
         for result in requests.run(work, core, None):
             results.append(result)

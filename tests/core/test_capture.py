@@ -20,10 +20,10 @@ import vkbloom
 scene = vkbloom.Scene.ufo()
 with vkbloom.Renderer("software") as renderer:
     plan = renderer.plan(scene, None, (64, 36))
-    with renderer.capture(sys.argv[1] + "/bloom.rdc"):
+    with vkbloom.capture(sys.argv[1] + "/bloom.rdc", renderer=renderer):
         renderer.render(scene, size=(64, 36))
     try:
-        with renderer.capture(sys.argv[1] + "/failed.rdc"):
+        with vkbloom.capture(sys.argv[1] + "/failed.rdc", renderer=renderer):
             raise KeyError
     except KeyError:
         pass
@@ -53,13 +53,13 @@ replay.Shutdown()
 def test_without_renderdoc_the_error_says_how(renderer: Renderer) -> None:
     with (
         pytest.raises(vkbloom.Error, match=r"RenderDoc is not loaded; .* LD_PRELOAD="),
-        renderer.capture("bloom.rdc"),
+        vkbloom.capture("bloom.rdc", renderer=renderer),
     ):
         pass
     with Renderer() as closed:
         pass
     with pytest.raises(ValueError, match="the renderer is closed"):
-        closed.capture("bloom.rdc")
+        vkbloom.capture("bloom.rdc", renderer=closed)
 
 
 def test_a_capture_names_the_passes_in_their_order(tmp_path: Path) -> None:
@@ -94,4 +94,4 @@ def test_a_capture_names_the_passes_in_their_order(tmp_path: Path) -> None:
     found = ["scene" if name == "skybox" else name for name in passes]
     assert found == [one.name for one in plan.passes], done.stdout + done.stderr
     resources = {line.removeprefix("resource ") for line in lines}
-    assert {*plan.outputs, "skybox", "uniforms", "vertices", "readback"} <= resources
+    assert {*plan.framebuffers, "skybox", "uniforms", "vertices", "readback"} <= resources

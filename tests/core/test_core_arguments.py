@@ -14,8 +14,8 @@ import pytest
 
 from tests.planned import scene_plan, scene_source
 from vkbloom import Renderer, Scene, Separable, _core
-from vkbloom.adapter import bundled_driver
-from vkbloom.sources import scene_arguments
+from vkbloom._renderer.adapter import bundled_driver
+from vkbloom._renderer.sources import scene_arguments
 
 METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "unreal")
 
@@ -321,7 +321,7 @@ def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
 
 @pytest.mark.parametrize("names", [["final"], "final", 5], ids=str)
 def test_names_of_another_type_are_refused(renderer: Renderer, names: Any) -> None:
-    with pytest.raises(TypeError, match="attachments: a tuple is needed"):
+    with pytest.raises(TypeError, match="framebuffers: a tuple is needed"):
         renderer._core.plan(_core.image_source(IMAGE), Separable(), names)
 
 

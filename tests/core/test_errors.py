@@ -39,7 +39,7 @@ def test_a_scene_is_needed(renderer: Renderer, given: Any) -> None:
         renderer.render(given, None, SIZE)
 
 
-@pytest.mark.parametrize("settings", ["tutorial", 5, {}, Separable])
+@pytest.mark.parametrize("settings", [5, {}, Separable])
 def test_settings_are_needed(renderer: Renderer, scene: Scene, settings: Any) -> None:
     with pytest.raises(TypeError, match=r"^settings: "):
         renderer.render(scene, settings, SIZE)
@@ -118,9 +118,9 @@ def test_times(
     with pytest.raises(error, match=r"^time: "):
         renderer.render(scene, None, SIZE, time=time)
     with pytest.raises(error, match=r"^time: "):
-        renderer.grid(scene, None, {"exposure": [0.0]}, size=SIZE, time=time)
+        vkbloom.grid(scene, None, {"exposure": [0.0]}, size=SIZE, time=time, renderer=renderer)
     with pytest.raises(error, match=r"^time: "):
-        renderer.grid(scene, None, {"time": [0.0, time]}, size=SIZE)
+        vkbloom.grid(scene, None, {"time": [0.0, time]}, size=SIZE, renderer=renderer)
 
 
 @pytest.mark.parametrize("shading", ["", "Forward", 5, None])
@@ -137,13 +137,13 @@ def test_positions_and_names_of_arguments(renderer: Renderer, scene: Scene) -> N
         render(scene, None, SIZE, colour="red")
 
 
-# Attachments
+# Framebuffers
 
 
 @pytest.mark.parametrize("name", ["", "nope", "Final", "blur_horizontal_0_0", "skybox"])
-def test_unknown_attachments(renderer: Renderer, scene: Scene, name: str) -> None:
-    with pytest.raises(ValueError, match="attachments") as caught:
-        renderer.render(scene, None, SIZE, attachments=("final", name))
+def test_unknown_framebuffers(renderer: Renderer, scene: Scene, name: str) -> None:
+    with pytest.raises(ValueError, match="framebuffers") as caught:
+        renderer.render(scene, None, SIZE, framebuffers=("final", name))
     assert repr(name) in str(caught.value)
     for known in ("glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"):
         assert known in str(caught.value)
@@ -158,24 +158,24 @@ def test_unknown_attachments(renderer: Renderer, scene: Scene, name: str) -> Non
         (Separable(loops=2), "blur_horizontal_0_0"),
     ],
 )
-def test_attachments_that_these_settings_do_not_have(
+def test_framebuffers_that_these_settings_do_not_have(
     renderer: Renderer, scene: Scene, settings: Separable, name: str
 ) -> None:
-    with pytest.raises(ValueError, match=f"attachments: .*'{name}'"):
-        renderer.render(scene, settings, SIZE, attachments=name)
+    with pytest.raises(ValueError, match=f"framebuffers: .*'{name}'"):
+        renderer.render(scene, settings, SIZE, framebuffers=name)
 
 
-@pytest.mark.parametrize("attachments", [5, None, [5], [None], [b"final"]], ids=str)
-def test_attachments_are_names(renderer: Renderer, scene: Scene, attachments: Any) -> None:
-    with pytest.raises(TypeError, match="attachments"):
-        renderer.render(scene, None, SIZE, attachments=attachments)
+@pytest.mark.parametrize("framebuffers", [5, None, [5], [None], [b"final"]], ids=str)
+def test_framebuffers_are_names(renderer: Renderer, scene: Scene, framebuffers: Any) -> None:
+    with pytest.raises(TypeError, match="framebuffers"):
+        renderer.render(scene, None, SIZE, framebuffers=framebuffers)
 
 
-def test_attachments_that_are_no_text(renderer: Renderer, scene: Scene) -> None:
+def test_framebuffers_that_are_no_text(renderer: Renderer, scene: Scene) -> None:
     with pytest.raises(ValueError):  # noqa: PT011  a UnicodeEncodeError is one, in Python's words
-        renderer.render(scene, None, SIZE, attachments=["\ud800"])
-    with pytest.raises(ValueError, match="attachments"):
-        renderer.render(scene, None, SIZE, attachments=["x" * 100_000])
+        renderer.render(scene, None, SIZE, framebuffers=["\ud800"])
+    with pytest.raises(ValueError, match="framebuffers"):
+        renderer.render(scene, None, SIZE, framebuffers=["x" * 100_000])
 
 
 # Arrays to fill
@@ -239,14 +239,14 @@ def test_use_after_close(scene: Scene) -> None:
         with pytest.raises(ValueError, match="closed"):
             renderer.render(scene, None, SIZE)
     with pytest.raises(ValueError, match="closed"):
-        renderer.render(scene, None, SIZE, attachments=())
+        renderer.render(scene, None, SIZE, framebuffers=())
     assert renderer.closed
 
 
 def test_a_mistake_before_the_first_frame(scene: Scene) -> None:
     with Renderer(validation=True) as renderer:
-        with pytest.raises(ValueError, match="attachments"):
-            renderer.render(scene, None, SIZE, attachments="nope")
+        with pytest.raises(ValueError, match="framebuffers"):
+            renderer.render(scene, None, SIZE, framebuffers="nope")
         assert renderer.render(scene, None, SIZE)["final"].any()
 
 
@@ -276,4 +276,4 @@ def test_the_tree_of_exceptions() -> None:
 def test_out_names_what_is_wanted(renderer: Renderer, scene: Scene, name: str) -> None:
     spare = np.zeros((9, 16), np.float32)
     with pytest.raises(ValueError, match=rf"^out: '{name}' is not among the framebuffers: final$"):
-        renderer.render(scene, size=(16, 9), attachments="final", out={name: spare})
+        renderer.render(scene, size=(16, 9), framebuffers="final", out={name: spare})

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
-from vkbloom.fields import fields_of
+from vkbloom._settings.fields import fields_of
 
 #: The core's bounds (csrc/run/age.h, pipeline.h, image_cache.h).
-LEAST_AGE = 64
+MIN_AGE = 64
 PIPELINES = 256
 IMAGE_BYTES = 256 << 20
 
@@ -27,7 +27,7 @@ def noise(height: int, width: int) -> NDArray[np.float32]:
 def finals(
     renderer: Renderer, image: NDArray[np.float32], settings: Sequence[Settings]
 ) -> list[NDArray[np.float32]]:
-    return [frames["final"] for frames in renderer.apply_many(image, settings)]
+    return [frames["final"] for frames in renderer.sweep(image, settings)]
 
 
 HALF = 500 if EXHAUSTIVE else 100
@@ -42,7 +42,7 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
     for side in range(2 * HALF):
         # Both halves have all heights and all widths, and so all variants.
         height, width = 20 + side % 50, 20 + (7 * side + side // 50) % 50
-        renderer.apply(image[:height, :width], Pyramid(levels=1 + side % 16), attachments="final")
+        renderer.apply(image[:height, :width], Pyramid(levels=1 + side % 16), framebuffers="final")
         cached.append(renderer._core.cached)
         created.append(renderer._core.pipeline_count)
     # Both halves have all sixteen numbers of levels.
@@ -63,11 +63,11 @@ def test_unused_images_are_freed(new_renderer: Callable[[], Renderer]) -> None:
     large = Separable(loops=10, bloom_size=(1024, 1024), format="rgba32float")
     expected = renderer.apply(image, large)["final"].copy()
     assert renderer._core.cached[2] > IMAGE_BYTES
-    for step in range(LEAST_AGE - 1):
-        renderer.apply(image, Pyramid(exposure=step / 100), attachments="final")
+    for step in range(MIN_AGE - 1):
+        renderer.apply(image, Pyramid(exposure=step / 100), framebuffers="final")
     assert renderer._core.cached[2] > IMAGE_BYTES
     for step in range(2):
-        renderer.apply(image, Pyramid(exposure=step / 100), attachments="final")
+        renderer.apply(image, Pyramid(exposure=step / 100), framebuffers="final")
     assert renderer._core.cached[2] <= IMAGE_BYTES // 2
     np.testing.assert_array_equal(renderer.apply(image, large)["final"], expected)
 
@@ -94,7 +94,7 @@ def test_unused_pipelines_are_freed(monkeypatch: pytest.MonkeyPatch) -> None:
         expected = finals(renderer, single, chosen[:4])
         counts = []
         for image, settings in requests:
-            renderer.apply(image, settings, attachments="final")
+            renderer.apply(image, settings, framebuffers="final")
             counts.append(renderer._core.cached[0])
         assert renderer._core.pipeline_count > PIPELINES + 8
         assert max(counts) <= PIPELINES + 8
@@ -108,9 +108,9 @@ def test_pipelines_do_not_go_under_submissions_that_wait(
     """Frames are taken late, while many others are made, under the validation layer."""
     renderer = new_renderer()
     image = noise(8, 8)
-    waiting = renderer.apply_many(image, [Separable(exposure=step / 8) for step in range(40)])
+    waiting = renderer.sweep(image, [Separable(exposure=step / 8) for step in range(40)])
     next(waiting)
-    for step in range(LEAST_AGE + 20):
+    for step in range(MIN_AGE + 20):
         renderer.apply(noise(9, 9 + step % 5), Pyramid(exposure=step / 100))
     assert len(list(waiting)) == 39
 
@@ -119,7 +119,7 @@ def test_alternating_sizes_reuse_images(new_renderer: Callable[[], Renderer]) ->
     renderer = new_renderer()
     sizes = [(16, 16), (33, 20), (8, 50), (64, 64)]
     created = []
-    for _ in range(2 * LEAST_AGE // len(sizes)):
+    for _ in range(2 * MIN_AGE // len(sizes)):
         for height, width in sizes:
             renderer.apply(noise(height, width), Pyramid())
             renderer.apply(noise(height, width), Separable())

@@ -13,7 +13,7 @@ import pytest
 
 from tests.framebuffers import INFO, TIMINGS, make, mixed, noise
 from vkbloom import Separable
-from vkbloom.frames import Frames, dimensions
+from vkbloom._renderer.frames import Frames, dimensions
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Images that stay on the device, and sequences of images: upload and apply_each."""
+"""Images that stay on the device, and sequences of images: upload and map."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
-from vkbloom import AdapterInfo, BevyBloom, Pyramid, Renderer, Separable, _core, requests
+from vkbloom import AdapterInfo, BevyBloom, Pyramid, Renderer, Separable, _core
+from vkbloom._renderer import requests
 
 #: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
@@ -80,16 +82,19 @@ def test_a_handle_is_accepted_wherever_an_image_is(renderer: Renderer) -> None:
     handle = renderer.upload(image)
     settings = [Separable(exposure=exposure) for exposure in (0.0, 1.0)]
     for got, right in zip(
-        renderer.apply_many(handle, settings), renderer.apply_many(image, settings), strict=True
+        renderer.sweep(handle, settings), renderer.sweep(image, settings), strict=True
     ):
         assert_same(got, right)
-    for frames in renderer.apply_each([handle, image, handle], settings[1]):
+    for frames in renderer.map([handle, image, handle], settings[1]):
         assert_same(frames, renderer.apply(image, settings[1]))
     assert renderer.plan(handle, settings[0]) == renderer.plan(image, settings[0])
     axes = {"exposure": [0.0, 1.0, 2.0], "intensity": [0.5, 1.0]}
     pairs: list[tuple[Any, Any]] = [(handle, image), ({"a": handle}, {"a": image})]
     for sources in pairs:
-        one, two = (renderer.grid(source, Separable(), axes, progress=False) for source in sources)
+        one, two = (
+            vkbloom.grid(source, Separable(), axes, progress=False, renderer=renderer)
+            for source in sources
+        )
         assert one.equals(two)
         assert one.attrs["passes_run"] == two.attrs["passes_run"]
 
@@ -124,7 +129,7 @@ def test_a_handle_has_its_mask_and_emission(
     got = renderer.apply(handle, settings)
     assert_same(got, expected)
     assert got.info == expected.info
-    for frames in renderer.apply_each([handle, other, handle], settings):
+    for frames in renderer.map([handle, other, handle], settings):
         assert (frames["final"] == expected["final"]).all() or frames.info["nan"] == 0
     for name, array in {"mask": np.ones((21, 33), np.float32), "emission": image}.items():
         with pytest.raises(ValueError, match=f"{name}: the image was uploaded already"):
@@ -162,7 +167,7 @@ def test_a_handle_belongs_to_its_renderer(new_renderer: Callable[[], Renderer]) 
         with pytest.raises(ValueError, match="another renderer"):
             call(handle, Separable())
     with pytest.raises(ValueError, match="another renderer"):
-        next(other.apply_each([handle]))
+        next(other.map([handle]))
     mine.close()
     for call in (mine.apply, mine.plan):
         with pytest.raises(ValueError, match="the renderer is closed"):
@@ -259,7 +264,7 @@ def test_the_memory_of_a_handle_goes_with_it(
     renderer = new_renderer()
     image = np.full((2048, 2048, 4), 0.5, np.float32)
     settings = Separable(bloom=False)
-    renderer.apply(renderer.upload(image), settings, attachments=())
+    renderer.apply(renderer.upload(image), settings, framebuffers=())
     # What earlier tests of this process have left may go at any time.
     gc.collect()
 
@@ -269,7 +274,7 @@ def test_the_memory_of_a_handle_goes_with_it(
 
     before = megabytes()
     handle = renderer.upload(image)
-    renderer.apply(handle, settings, attachments=())
+    renderer.apply(handle, settings, framebuffers=())
     assert megabytes() >= before + 60
     del handle
     assert megabytes() < before + 30
@@ -285,14 +290,14 @@ LOW = BevyBloom(max_mip_dimension=16)
 def test_images_one_by_one_and_in_a_row(new_renderer: Callable[[], Renderer]) -> None:
     alone, together = new_renderer(), new_renderer()
     settings = [Separable(threshold=0.5), Pyramid(levels=2)] * (len(IMAGES) // 2)
-    results = list(together.apply_each(images(), settings))
+    results = list(together.map(images(), settings))
     assert len(results) == len(IMAGES)
     for got, image, one in zip(results, images(), settings, strict=True):
         right = alone.apply(image, one)
         assert_same(got, right)
         assert got.settings == one
         assert got.info == right.info
-    for got, image in zip(together.apply_each(iter(images()[:4]), LOW), images(), strict=False):
+    for got, image in zip(together.map(iter(images()[:4]), LOW), images(), strict=False):
         assert_same(got, alone.apply(image, LOW))
 
 
@@ -310,7 +315,7 @@ def test_one_array_filled_again_and_again(renderer: Renderer) -> None:
             array[:] = -1
 
     settings = Separable(bloom=False)
-    for level, frames in enumerate(renderer.apply_each(filled(), settings), 1):
+    for level, frames in enumerate(renderer.map(filled(), settings), 1):
         given += 1
         assert asked <= given + 2
         assert (frames["final"] == level).all()
@@ -328,7 +333,7 @@ def test_a_generator_gets_its_array_back(renderer: Renderer) -> None:
             buffer.extend(b"\0")
             del buffer[-1]
 
-    assert len(list(renderer.apply_each(resized(), LOW))) == 4
+    assert len(list(renderer.map(resized(), LOW))) == 4
 
 
 def wrong(kind: str) -> Iterator[Any]:
@@ -351,7 +356,7 @@ def wrong(kind: str) -> Iterator[Any]:
 def test_an_error_comes_at_its_images_turn(
     renderer: Renderer, kind: str, error: type[Exception], text: str
 ) -> None:
-    results = renderer.apply_each(wrong(kind))
+    results = renderer.map(wrong(kind))
     for seed in (1, 2):
         assert_same(next(results), renderer.apply(picture(16, 16, seed=seed)))
     with pytest.raises(error, match=text):
@@ -368,21 +373,21 @@ def test_arguments_are_checked_at_the_call(new_renderer: Callable[[], Renderer])
         (7, None, TypeError, "an iterable of images"),
         ([image], [Separable()] * 2, ValueError, "2 Settings do not match the 1"),
         ([image], 3, TypeError, "settings"),
-        ([image], [Separable(), "x"], TypeError, "settings"),
+        ([image], [Separable(), 3], TypeError, "settings"),
     ]:
         with pytest.raises(error, match=text):
-            renderer.apply_each(images_, settings)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="attachments"):
-        renderer.apply_each([image], attachments=3)  # type: ignore[arg-type]
-    assert list(renderer.apply_each([])) == []
+            renderer.map(images_, settings)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="framebuffers"):
+        renderer.map([image], framebuffers=3)  # type: ignore[arg-type]
+    assert list(renderer.map([])) == []
     renderer.close()
     with pytest.raises(ValueError, match="closed"):
-        renderer.apply_each([image])
+        renderer.map([image])
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_lengths_that_are_known_at_the_end_only(renderer: Renderer, count: int) -> None:
-    results = renderer.apply_each((picture(16, 16) for _ in range(2)), [Separable()] * count)
+    results = renderer.map((picture(16, 16) for _ in range(2)), [Separable()] * count)
     for _ in range(min(count, 2)):
         next(results)
     with pytest.raises(ValueError, match="settings: "):
@@ -391,7 +396,7 @@ def test_lengths_that_are_known_at_the_end_only(renderer: Renderer, count: int) 
 
 def test_a_renderer_that_closes_meanwhile(new_renderer: Callable[[], Renderer]) -> None:
     renderer = new_renderer()
-    results = renderer.apply_each(picture(16, 16) for _ in range(9))
+    results = renderer.map(picture(16, 16) for _ in range(9))
     next(results)
     renderer.close()
     with pytest.raises(ValueError, match="closed"):
@@ -399,7 +404,7 @@ def test_a_renderer_that_closes_meanwhile(new_renderer: Callable[[], Renderer]) 
 
 
 def test_unread_results_of_images_are_dropped(renderer: Renderer) -> None:
-    results = renderer.apply_each(picture(300, 301, 4, "float32") for _ in range(9))
+    results = renderer.map(picture(300, 301, 4, "float32") for _ in range(9))
     next(results)
     del results
     gc.collect()
@@ -418,7 +423,7 @@ def test_a_change_in_any_row_of_a_large_image_is_uploaded(
     settings = Separable(bloom=False)
 
     def final() -> NDArray[Any]:
-        frames = renderer.apply(image, settings, attachments=("final",))
+        frames = renderer.apply(image, settings, framebuffers=("final",))
         assert frames.info["nan"] == np.isnan(image).sum()
         assert frames.info["inf"] == np.isinf(image).sum()
         return frames["final"]
@@ -430,4 +435,4 @@ def test_a_change_in_any_row_of_a_large_image_is_uploaded(
         got = final()
         finite = np.isfinite(image)
         np.testing.assert_array_equal(got[finite], image[finite])
-        assert renderer.apply(image, settings, attachments=("final",)).timings == {}
+        assert renderer.apply(image, settings, framebuffers=("final",)).timings == {}

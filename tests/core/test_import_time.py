@@ -10,25 +10,25 @@ from tests.processes import output
 
 # NumPy loads some of the standard library itself, differently by version.
 LATE = (
-    "vkbloom.cli",
-    "vkbloom.doctor",
-    "vkbloom.explorer",
-    "vkbloom.glare.dirt",
-    "vkbloom.glare.flares",
-    "vkbloom.glare.streaks",
-    "vkbloom.grid",
-    "vkbloom.io",
-    "vkbloom.methods.bevy",
-    "vkbloom.methods.convolution",
-    "vkbloom.methods.pygfx",
-    "vkbloom.named_glares",
-    "vkbloom.named_settings",
+    "vkbloom._cli",
+    "vkbloom._doctor",
+    "vkbloom._explorer",
+    "vkbloom._glare.dirt",
+    "vkbloom._glare.flares",
+    "vkbloom._glare.streaks",
+    "vkbloom._grid",
+    "vkbloom._io",
+    "vkbloom._methods.bevy",
+    "vkbloom._methods.convolution",
+    "vkbloom._methods.pygfx",
+    "vkbloom._presets.named_glares",
+    "vkbloom._presets.named_settings",
     "vkbloom.plans",
     "vkbloom.psf",
     "vkbloom.reference",
-    "vkbloom.scene",
+    "vkbloom._scene",
     "vkbloom.testing",
-    "vkbloom.views",
+    "vkbloom._views",
     "hashlib",
     "html",
     "importlib.metadata",
@@ -45,19 +45,19 @@ def loaded(code: str) -> set[str]:
 
 
 def test_the_import_loads_what_is_needed() -> None:
-    assert "numpy" not in loaded("import vkbloom.cli")
+    assert "numpy" not in loaded("import vkbloom._cli")
     code = "import vkbloom; vkbloom.Renderer, vkbloom.Pyramid"
     added = loaded(code) - loaded("import numpy, numpy.typing, dataclasses")
-    assert "vkbloom.renderer" in added
+    assert "vkbloom._renderer.renderer" in added
     assert sorted(added & set(LATE)) == []
 
 
-@pytest.mark.parametrize("name", [*vkbloom.__all__, "scene", "__version__"])
+@pytest.mark.parametrize("name", [*vkbloom.__all__, "__version__"])
 def test_every_public_name_is_there_after_the_import(name: str) -> None:
     assert getattr(vkbloom, name) is not None
 
 
 def test_late_modules_are_there_at_the_first_use() -> None:
-    code = "import vkbloom; vkbloom.reference.apply; vkbloom.scene.Mesh; vkbloom.reductions.Mean"
+    code = "import vkbloom; vkbloom.reference.apply; vkbloom.Scene; vkbloom.reductions.Mean"
     code += "; vkbloom.testing.stability"
-    assert "vkbloom.grid.reductions" in loaded(code)
+    assert "vkbloom._grid.reductions" in loaded(code)

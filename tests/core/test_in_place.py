@@ -59,7 +59,7 @@ def test_in_place_or_copied_is_the_same(
 ) -> None:
     image = special(*size, channels, dtype)
     # A sequence is always copied: the array may change before the device has run.
-    (copied,) = renderer.apply_many(image, [settings])
+    (copied,) = renderer.sweep(image, [settings])
     around = np.zeros((size[1] + 2, size[0] + 32, channels), dtype)
     around[1:-1, 16:-16] = image
     read_only = image.copy()
@@ -101,7 +101,7 @@ def test_an_output_over_the_image(renderer: Renderer, shift: int) -> None:
     image[:] = special(512, height, 4, "float32")
     expected = renderer.apply(image.copy(), SETTINGS[0])["final"]
     out = memory[height + shift : 2 * height + shift]
-    renderer.apply(image, SETTINGS[0], attachments=("final",), out={"final": out})
+    renderer.apply(image, SETTINGS[0], framebuffers=("final",), out={"final": out})
     np.testing.assert_array_equal(out, expected)
 
 
@@ -117,18 +117,18 @@ def test_an_array_that_changes_is_noticed(renderer: Renderer) -> None:
 def test_specials_come_and_go(renderer: Renderer, dtype: str) -> None:
     """The passes know whether the image has NaN or infinity, and stop checking if it has none."""
     image = picture(640, 560, 4, dtype, 9)
-    (before,) = renderer.apply_many(image, [SETTINGS[0]], attachments=("final",))
+    (before,) = renderer.sweep(image, [SETTINGS[0]], framebuffers=("final",))
     lacking = image.copy()
     lacking[100, 200, :3] = 0
-    (expected,) = renderer.apply_many(lacking, [SETTINGS[0]], attachments=("final",))
+    (expected,) = renderer.sweep(lacking, [SETTINGS[0]], framebuffers=("final",))
     for value in (np.nan, np.inf, -np.inf):
         changed = image.copy()
         changed[100, 200, :3] = value
-        final = renderer.apply(changed, SETTINGS[0], attachments=("final",))["final"].copy()
+        final = renderer.apply(changed, SETTINGS[0], framebuffers=("final",))["final"].copy()
         np.testing.assert_array_equal(final[100, 200, :3], changed[100, 200, :3])
         final[100, 200, :3] = expected["final"][100, 200, :3]
         np.testing.assert_array_equal(final, expected["final"])
-    again = renderer.apply(image, SETTINGS[0], attachments=("final",))
+    again = renderer.apply(image, SETTINGS[0], framebuffers=("final",))
     np.testing.assert_array_equal(again["final"], before["final"])
 
 
@@ -141,7 +141,7 @@ def test_a_sequence_may_reuse_its_array(renderer: Renderer) -> None:
             shared[:] = one
             yield shared
 
-    for frames, one in zip(renderer.apply_each(images(), SETTINGS[0]), pictures, strict=True):
+    for frames, one in zip(renderer.map(images(), SETTINGS[0]), pictures, strict=True):
         expected = renderer.apply(one, SETTINGS[0])["final"]
         np.testing.assert_array_equal(frames["final"], expected)
 

@@ -74,7 +74,7 @@ class Long(NamedTuple):
         return self.image[: len(self.image) // 2, : len(self.image) // 2]
 
     def run(self, renderer: Renderer) -> None:
-        renderer.apply(self.image, self.settings, attachments="final")
+        renderer.apply(self.image, self.settings, framebuffers="final")
 
 
 @pytest.fixture(scope="module")
@@ -163,13 +163,13 @@ def test_a_long_frame_is_interrupted(case: Case) -> None:
 def test_an_interrupted_frame_keeps_its_arrays(case: Case) -> None:
     # The device writes into the array when no one else refers to it.
     renderer, image, settings = case.renderer, case.long.image, case.long.settings
-    expected = renderer.apply(image, settings, attachments="final")["final"]
+    expected = renderer.apply(image, settings, framebuffers="final")["final"]
     renderer.apply(image[:8, :8], settings)
     with case.interrupted():
-        renderer.apply(image, settings, attachments="final", out={"final": np.zeros_like(image)})
+        renderer.apply(image, settings, framebuffers="final", out={"final": np.zeros_like(image)})
     gc.collect()
     others = [np.zeros_like(image) for _ in range(4)]
-    again = renderer.apply(image, settings, attachments="final")["final"]
+    again = renderer.apply(image, settings, framebuffers="final")["final"]
     np.testing.assert_array_equal(again, expected)
     assert not any(other.any() for other in others)
 
@@ -190,7 +190,7 @@ def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
     array = np.zeros_like(image)
     weakref.finalize(array, use_elsewhere)
     with case.interrupted():
-        renderer.apply(image, settings, attachments="final", out={"final": array})
+        renderer.apply(image, settings, framebuffers="final", out={"final": array})
     del array
     gc.collect()
     assert not finished
@@ -206,7 +206,7 @@ def test_a_sequence_is_interrupted(case: Case) -> None:
         for step in range(3)
     ]
     with case.interrupted(0.3):
-        for _ in case.renderer.apply_many(case.long.image, settings):
+        for _ in case.renderer.sweep(case.long.image, settings):
             pass
     case.check()
 
@@ -233,12 +233,13 @@ class Stopper:
 def test_a_grid_is_interrupted(case: Case) -> None:
     stopper = Stopper(case.alarm)
     with pytest.raises(Alarm):
-        case.renderer.grid(
+        vkbloom.grid(
             case.long.half,
             case.long.settings,
             STRENGTHS,
             reduce={"mean": stopper},
             progress=False,
+            renderer=case.renderer,
         )
     assert stopper.points < POINTS
     case.check()
@@ -258,11 +259,11 @@ def test_an_interrupted_store_is_completed(
     monkeypatch.setattr(Renderer, "close", noted_close)
 
     def to_store(stopper: Stopper) -> xarray.Dataset:
-        return vkbloom.grid_to_zarr(
+        return vkbloom.grid(
             case.long.half,
             case.long.settings,
             STRENGTHS,
-            tmp_path / "grid",
+            store=tmp_path / "grid",
             chunks={"blur_strength": 2},
             reduce={"mean": stopper},
             validation=True,
@@ -280,12 +281,13 @@ def test_an_interrupted_store_is_completed(
     assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape. A block may be complete without a mark.
     assert second.points <= POINTS - done + 1
-    right = case.renderer.grid(
+    right = vkbloom.grid(
         case.long.half,
         case.long.settings,
         STRENGTHS,
         reduce={"mean": Stopper(None)},
         progress=False,
+        renderer=case.renderer,
     )
     assert bool(got["done"].all())
     for name in ("final", "mean"):
@@ -362,7 +364,7 @@ def test_a_device_that_takes_too_long(
     with pytest.raises(
         DeviceLostError, match=r"not finished within 0\.\d s.*VKBLOOM_TIMEOUT"
     ) as hung:
-        renderer.apply(long.image, longer, attachments="final")
+        renderer.apply(long.image, longer, framebuffers="final")
     assert hung.value.vk_call == "vkWaitForFences"
     assert hung.value.vk_result == 2  # VK_TIMEOUT
     with pytest.raises(DeviceLostError):
@@ -441,7 +443,7 @@ renderer = vkbloom.Renderer(validation=True)
 # Exit handlers of a GPU's driver may crash or hang in a child: docs/robustness.md, Forks.
 leaves = sys.argv[1] == "leave" or (renderer.info.type != "cpu" and sys.argv[1] != "exit")
 right = renderer.apply(image, vkbloom.Separable())["final"]
-batches = renderer.apply_many(image, [vkbloom.Separable()] * 9)
+batches = renderer.sweep(image, [vkbloom.Separable()] * 9)
 next(batches); next(batches)
 child = os.fork()
 if child == 0:

@@ -12,7 +12,7 @@ import pytest
 from tests.framebuffers import assert_same
 from tests.screens import noise, screen
 from vkbloom import Camera, Frames, Renderer, Scene, Separable
-from vkbloom.settings import Shading
+from vkbloom._settings.settings import Shading
 
 SIZE = (160, 90)
 ALL = ["glow", "blur_vertical", "bloom", "scene", "final"]
@@ -156,7 +156,7 @@ def test_scenes_of_the_same_camera_are_told_apart(opened: Renderer, scene: Scene
         assert_same(opened.render(scene, None, SIZE), before)
 
 
-# Attachments
+# Framebuffers
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_passes_of_unrequested_framebuffers_do_not_run(
     ran: list[str],
 ) -> None:
     renderer = new_renderer()
-    part = renderer.render(scene, None, SIZE, attachments=wanted)
+    part = renderer.render(scene, None, SIZE, framebuffers=wanted)
     assert list(part.timings) == ran
     whole = renderer.render(scene, None, SIZE)
     left = [name for name in ALL if name not in ran]
@@ -197,7 +197,7 @@ def test_unrequested_framebuffers_keep_their_content(
     opened: Renderer, scene: Scene, alone: Alone
 ) -> None:
     # The scene of another time is rendered, the glow's is not: each is as old as it is.
-    opened.render(scene, None, SIZE, time=0.5, attachments="scene")
+    opened.render(scene, None, SIZE, time=0.5, framebuffers="scene")
     frames = opened.render(scene, None, SIZE)
     assert list(frames.timings) == ["scene", "final"]
     assert_same(frames, alone(scene, None, SIZE))
@@ -206,7 +206,7 @@ def test_unrequested_framebuffers_keep_their_content(
 def test_unrequested_framebuffers_are_not_allocated(opened: Renderer, scene: Scene) -> None:
     # Bloom buffers beyond any memory are no trouble where nothing of them is wanted.
     huge = Separable(bloom_size=(16384, 16384), format="rgba32float")
-    frames = opened.render(scene, huge, SIZE, attachments=["scene", "depth"])
+    frames = opened.render(scene, huge, SIZE, framebuffers=["scene", "depth"])
     assert list(frames) == ["scene", "depth"]
     assert list(frames.timings) == []
 
@@ -261,11 +261,11 @@ def test_a_walk_through_many_settings(opened: Renderer, scene: Scene) -> None:
         )
         size, time = pick([SIZE, (50, 50)]), pick([0.0, 0.6])
         wanted = pick(["all", "all", "final", "scene", "depth"])
-        frames = opened.render(scene, settings, size, time=time, attachments=wanted)
+        frames = opened.render(scene, settings, size, time=time, framebuffers=wanted)
         if step % 8 == 0:
             assert_same(
                 frames,
-                fresh(scene, settings, size, time=time, attachments=wanted),
+                fresh(scene, settings, size, time=time, framebuffers=wanted),
             )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vkbloom import Pyramid, Renderer, Scene, Separable
-from vkbloom.io import pipeline_cache
+from vkbloom._io import pipeline_cache
 
 SIZE = (16, 16)
 
@@ -198,11 +198,11 @@ def test_a_cpu_compiles_each_shader_of_a_plan_once(
     renderer = new_renderer()
     if renderer.info.type != "cpu":
         pytest.skip("GPUs have other variants, and know who reads a target")
-    renderer.apply(image, pyramid, attachments="final")
+    renderer.apply(image, pyramid, framebuffers="final")
     created = renderer._core.pipeline_count
-    shaders = [step.shader for step in renderer.plan(image, pyramid, attachments="final").passes]
+    shaders = [step.shader for step in renderer.plan(image, pyramid, framebuffers="final").passes]
     assert created == len(set(shaders)) < len(shaders)
-    renderer.render(scene, size=SIZE, attachments="final")
-    plan = renderer.plan(scene, size=SIZE, attachments="final")
+    renderer.render(scene, size=SIZE, framebuffers="final")
+    plan = renderer.plan(scene, size=SIZE, framebuffers="final")
     shaders = [step.shader for step in plan.passes]
     assert renderer._core.pipeline_count - created == len(set(shaders)) < len(shaders)

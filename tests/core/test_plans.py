@@ -28,7 +28,7 @@ from vkbloom import (
     _core,
     presets,
 )
-from vkbloom.sources import image_source, scene_arguments
+from vkbloom._renderer.sources import image_source, scene_arguments
 
 SIZE = (96, 54)
 
@@ -49,10 +49,9 @@ METHODS: dict[str, Settings] = {
 
 def assert_planned(plan: Plan, frames: Any) -> None:
     """The plan has the framebuffers of the frames, and the passes that ran for them."""
-    assert list(plan.outputs) == list(frames)
-    assert plan.attachments == tuple(frames)
+    assert list(plan.framebuffers) == list(frames)
     for name, array in frames.items():
-        assert plan.outputs[name] == (array.shape, array.dtype)
+        assert plan.framebuffers[name] == (array.shape, array.dtype)
     assert list(dict.fromkeys(one.name for one in plan.passes)) == list(frames.timings)
     # Every image is written before it is read, and every requested one is written.
     made = {"image"} if plan.source == "image" else set()
@@ -61,7 +60,7 @@ def assert_planned(plan: Plan, frames: Any) -> None:
     for one in plan.passes:
         assert set(one.reads) <= made
         made |= set(one.writes)
-    assert set(plan.outputs) <= made
+    assert set(plan.framebuffers) <= made
 
 
 def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
@@ -81,9 +80,9 @@ def test_the_last_plan_is_used_again_only_for_the_same_call() -> None:
         lambda renderer: renderer.apply(image[:8, :, :3].astype(np.float16), second),
         lambda renderer: renderer.apply(image, second, mask=mask),
         lambda renderer: renderer.apply(image, second, mask=mask, emission=image),
-        lambda renderer: renderer.apply(image, second, attachments="bloom"),
-        lambda renderer: renderer.render(scene, second, (16, 12), attachments="bloom"),
-        lambda renderer: renderer.render(scene, second, (16, 12), time=0.3, attachments="bloom"),
+        lambda renderer: renderer.apply(image, second, framebuffers="bloom"),
+        lambda renderer: renderer.render(scene, second, (16, 12), framebuffers="bloom"),
+        lambda renderer: renderer.render(scene, second, (16, 12), time=0.3, framebuffers="bloom"),
         lambda renderer: renderer.render(Scene(scene.body), second, (16, 12)),
         lambda renderer: renderer.render(Scene(lamp), second, (16, 12)),
     ]
@@ -105,11 +104,11 @@ def test_a_plan_of_an_image_is_what_runs(
     with Renderer() as renderer:
         for number, (name, method) in some(enumerate(METHODS.items()), 9):
             # All framebuffers or `final` alone, by turns of methods and variants.
-            attachments: str | Sequence[str] = ("final",) if (number + turn) % 2 else "all"
+            framebuffers: str | Sequence[str] = ("final",) if (number + turn) % 2 else "all"
             dtype = ("uint8", "float16", "float32")[number % 3]
             image = picture(SIZE[0], SIZE[1], 3 + number % 2, dtype=dtype, seed=number)
-            plan = renderer.plan(image, method, attachments=attachments)
-            frames = renderer.apply(image, method, attachments=attachments)
+            plan = renderer.plan(image, method, framebuffers=framebuffers)
+            frames = renderer.apply(image, method, framebuffers=framebuffers)
             assert_planned(plan, frames)
             assert (plan.source, plan.size, plan.dtype) == ("image", SIZE, image.dtype), name
             if variant == "fragment":
@@ -161,7 +160,7 @@ def test_plans_that_are_equal(renderer: Renderer, scene: Scene, plain: Any) -> N
     same = renderer.plan(plain + 1, Pyramid(levels=2))
     assert plan == same
     assert hash(plan) == hash(same)
-    assert renderer.plan(plain, Pyramid(levels=2), attachments=list(plan.outputs)) == plan
+    assert renderer.plan(plain, Pyramid(levels=2), framebuffers=list(plan.framebuffers)) == plan
     assert pickle.loads(pickle.dumps(plan)) == plan
     assert pickle.loads(pickle.dumps(plan)).passes == plan.passes
     others = [
@@ -169,7 +168,7 @@ def test_plans_that_are_equal(renderer: Renderer, scene: Scene, plain: Any) -> N
         renderer.plan(plain[:8], Pyramid(levels=2)),
         renderer.plan(plain[..., :3], Pyramid(levels=2)),
         renderer.plan(plain.astype(np.float16), Pyramid(levels=2)),
-        renderer.plan(plain, Pyramid(levels=2), attachments="final"),
+        renderer.plan(plain, Pyramid(levels=2), framebuffers="final"),
         renderer.plan(scene, Pyramid(levels=2), (16, 9)),
         renderer.plan(scene, Pyramid(levels=2), (16, 9), shading="deferred"),
     ]
@@ -181,7 +180,7 @@ def test_a_plan_cannot_be_changed(renderer: Renderer, plain: Any) -> None:
     with pytest.raises(AttributeError):
         plan.size = (1, 1)
     with pytest.raises(TypeError):
-        plan.outputs["final"] = None
+        plan.framebuffers["final"] = None
 
 
 def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
@@ -195,7 +194,7 @@ def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
     [
         ({"size": (16, 9)}, "size: the source is not a scene"),
         ({"shading": "deferred"}, "shading: the source is not a scene"),
-        ({"attachments": ("glare",)}, "attachments: unknown framebuffer 'glare'"),
+        ({"framebuffers": ("glare",)}, "framebuffers: unknown framebuffer 'glare'"),
         ({"settings": Separable(bloom_size=(100_000, 1))}, "100000 x 1"),
     ],
 )
@@ -287,7 +286,7 @@ def test_a_dry_run_of_images_is_what_runs(
         ran = [
             list(
                 renderer.apply(
-                    IMAGES[number], method, attachments="all" if names is None else names
+                    IMAGES[number], method, framebuffers="all" if names is None else names
                 ).timings
             )
             for number, method, names in calls
@@ -323,7 +322,7 @@ def test_dry_run_of_nothing_is_empty_and_of_wrong_values_is_refused() -> None:
 
 
 def test_mermaid(renderer: Renderer, plain: Any) -> None:
-    plan = renderer.plan(plain, Separable(bloom=False), attachments="final")
+    plan = renderer.plan(plain, Separable(bloom=False), framebuffers="final")
     (one,) = plan.passes
     assert plan.to_mermaid().splitlines() == [
         "flowchart LR",
@@ -343,7 +342,7 @@ def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> N
         parts = [part.strip().split(" & ") for part in arrow.split("-->")]
         reads = [list(one.reads)] if one.reads else []
         assert parts == [*reads, [f"pass{number}"], list(one.writes)]
-    for name, (shape, dtype) in plan.outputs.items():
+    for name, (shape, dtype) in plan.framebuffers.items():
         assert f'    {name}["{name}<br>{shape[1]} x {shape[0]}, {dtype}"]' in lines
 
 

@@ -86,7 +86,7 @@ def test_a_final_that_comes_again_is_kept(
     finals = []
     runs = []
     for _ in range(5):
-        frames = renderer.apply(image, Separable(), attachments=("final",))
+        frames = renderer.apply(image, Separable(), framebuffers=("final",))
         finals.append(frames["final"].copy())
         runs.append(list(frames.timings))
         # It is the caller's alone.
@@ -114,15 +114,15 @@ def test_three_channels_are_stored_without_alpha(
     image = picture(*size, 4, dtype, 4)
     if dtype != "uint8":
         image[5, 7, 1], image[402, 700, 2] = np.nan, np.inf
-    expected = renderer.apply(image, settings, attachments=("final",))["final"][..., :3]
+    expected = renderer.apply(image, settings, framebuffers=("final",))["final"][..., :3]
     image = np.ascontiguousarray(image[..., :3])
     # New memory, memory around it that must stay, and memory to which a pass cannot store.
-    new = renderer.apply(image, settings, attachments=("final",))["final"]
+    new = renderer.apply(image, settings, framebuffers=("final",))["final"]
     np.testing.assert_array_equal(new, expected)
     for start in (16, 4):
-        renderer.apply(image[::-1], settings, attachments=("final",))
+        renderer.apply(image[::-1], settings, framebuffers=("final",))
         out, around = placed(image.shape, dtype, start)
-        renderer.apply(image, settings, attachments=("final",), out={"final": out})
+        renderer.apply(image, settings, framebuffers=("final",), out={"final": out})
         np.testing.assert_array_equal(out, expected)
         out.view(np.uint8)[:] = 0xA5
         assert (around == 0xA5).all()
@@ -133,7 +133,7 @@ def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:
     settings = [Separable(blur_strength=strength / 4) for strength in range(6)]
     renderer = new_renderer()
     expected = [renderer.apply(image, s) for s in settings]
-    frames = renderer.apply_many(image, settings)
+    frames = renderer.sweep(image, settings)
     for right in expected:
         got = next(frames)
         for name, array in got.items():
@@ -141,11 +141,11 @@ def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:
             array[:] = 0
     # Arrays that the device may still write to are freed only after a wait.
     for taken in range(4):
-        frames = renderer.apply_many(image, settings)
+        frames = renderer.sweep(image, settings)
         for _ in range(taken):
             next(frames)
         frames.close()  # type: ignore[attr-defined]
-    frames = renderer.apply_many(image, settings)
+    frames = renderer.sweep(image, settings)
     for _ in range(3):
         next(frames)
     renderer.close()

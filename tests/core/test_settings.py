@@ -19,9 +19,10 @@ import pytest
 
 import vkbloom
 from tests.processes import output
-from vkbloom import TUTORIAL, Separable, Settings, _core, gaussian_weights, presets
-from vkbloom.fields import fields_of
-from vkbloom.registry import METHODS
+from vkbloom import Separable, Settings, _core, gaussian_weights, presets
+from vkbloom._methods.separable import TUTORIAL
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS
 
 DEFAULTS = {
     "bloom": True,
@@ -378,10 +379,12 @@ def test_layers_that_are_not_pairs_are_refused() -> None:
 
 
 def test_a_preset_imports_its_method_alone() -> None:
-    code = "import sys, vkbloom; vkbloom.Separable, vkbloom.presets; {}; print(*sys.modules)"
+    code = (
+        "import sys, vkbloom; vkbloom.Separable, 'kino' in vkbloom.presets; {}; print(*sys.modules)"
+    )
     uses = "pass", "vkbloom.presets['kino']"
     names, kino = (output("-c", code.format(use)).split() for use in uses)
-    assert {*kino} - {*names} == {"vkbloom.methods.kino"}
+    assert {*kino} - {*names} == {"vkbloom._methods.kino"}
 
 
 def test_presets() -> None:
@@ -421,7 +424,8 @@ def test_methods_have_the_order_of_the_core() -> None:
     header = Path(__file__).parents[2] / "csrc/passes/settings.h"
     rows = re.findall(r"^    METHOD\(\w+, (\w+), ", header.read_text(), re.MULTILINE)
     assert rows.pop() == "own", "the method whose passes are given at run time has no class here"
-    code = "import vkbloom.methods.pygfx; from vkbloom.registry import METHODS; print(*METHODS)"
+    registry = "from vkbloom._settings.registry import METHODS"
+    code = f"import vkbloom._methods.pygfx; {registry}; print(*METHODS)"
     assert output("-c", code).split() == rows
     assert [kind.method for kind in METHODS.values()] == rows
 

@@ -13,8 +13,8 @@ import pytest
 
 import vkbloom
 from vkbloom import psf
-from vkbloom.registry import METHODS
-from vkbloom.suggestions import nearest
+from vkbloom._settings.registry import METHODS
+from vkbloom._suggestions import nearest
 
 IMAGE = np.zeros((8, 8, 3), np.float32)
 
@@ -93,36 +93,35 @@ def test_names_of_python(call: Callable[[], Any], kind: type[Exception], message
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("kino", "settings: 'kino' is not a Settings; give vkbloom.presets['kino']"),
-        ("Kno", "settings: 'Kno' is not a Settings; give vkbloom.presets['kino']"),
-        ("pyramid", "settings: 'pyramid' is not a Settings; give vkbloom.Pyramid()"),
+        ("Kno", "settings: unknown preset 'Kno'; did you mean 'kino'?"),
+        ("pyramid", "settings: 'pyramid' is a method; give vkbloom.Pyramid()"),
         (vkbloom.Pyramid, "; give Pyramid(), an object of the class"),
         ({"levels": 3}, "; give vkbloom.Settings.from_dict(...) of it"),
-        ("?", "; presets: tutorial, "),
+        ("?", "settings: unknown preset '?'; available: tutorial, "),
     ],
 )
 def test_settings_by_name(renderer: vkbloom.Renderer, given: Any, message: str) -> None:
     calls: list[Callable[[], Any]] = [
         lambda: renderer.apply(IMAGE, given),
         lambda: renderer.plan(IMAGE, given),
-        lambda: renderer.grid(IMAGE, given, {"intensity": [1]}),
+        lambda: vkbloom.grid(IMAGE, given, {"intensity": [1]}, renderer=renderer),
         lambda: renderer.render(vkbloom.Scene.ufo(), given),
-        lambda: renderer.apply_each([IMAGE], given),
+        lambda: renderer.map([IMAGE], given),
     ]
     for call in calls:
-        with pytest.raises(TypeError) as error:
+        with pytest.raises(ValueError if isinstance(given, str) else TypeError) as error:
             call()
         assert message in str(error.value)
 
 
 def test_framebuffers(renderer: vkbloom.Renderer) -> None:
     message = "unknown framebuffer 'blom'; did you mean 'bloom'\\? available: "
-    with pytest.raises(ValueError, match=f"attachments: {message}glow, "):
-        renderer.apply(IMAGE, attachments=["blom"])
-    with pytest.raises(ValueError, match=f"attachments: {message}"):
-        renderer.apply_each([IMAGE], attachments=["blom"])
+    with pytest.raises(ValueError, match=f"framebuffers: {message}glow, "):
+        renderer.apply(IMAGE, framebuffers=["blom"])
+    with pytest.raises(ValueError, match=f"framebuffers: {message}"):
+        renderer.map([IMAGE], framebuffers=["blom"])
     with pytest.raises(KeyError) as error:
-        renderer.apply(IMAGE, attachments=["bloom", "final"])["blom"]
+        renderer.apply(IMAGE, framebuffers=["bloom", "final"])["blom"]
     assert str(error.value.args[0]) == (
         "unknown framebuffer 'blom'; did you mean 'bloom'? available: bloom, final"
     )
@@ -130,7 +129,7 @@ def test_framebuffers(renderer: vkbloom.Renderer) -> None:
 
 def test_axes_and_fits(renderer: vkbloom.Renderer) -> None:
     with pytest.raises(ValueError, match="; did you mean 'intensity'\\? "):
-        renderer.grid(IMAGE, vkbloom.Pyramid(), {"intensty": [1]})
+        vkbloom.grid(IMAGE, vkbloom.Pyramid(), {"intensty": [1]}, renderer=renderer)
     lit = IMAGE + 1
     with pytest.raises(ValueError, match="no field 'intensty'; did you mean 'intensity'\\? "):
         vkbloom.fit(lit, lit, vkbloom.Pyramid(), ["intensty"], renderer=renderer)
@@ -154,8 +153,8 @@ vec4 hook() { return GLOW_tex(GLOW_pos) * softness; }
             own(softnes=1)
         with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
             own().replace(softnes=1)
-        with pytest.raises(TypeError, match=f"give {own.__name__}\\(\\)"):
-            renderer.apply(IMAGE, "soft_one")  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match=f"give {own.__name__}\\(\\)"):
+            renderer.apply(IMAGE, "soft_one")
         assert own().replace(softness=1) == pickle.loads(pickle.dumps(own(softness=1)))
     finally:
         METHODS.unregister("soft_one")

@@ -18,7 +18,8 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.images import picture
 from tests.processes import output
-from vkbloom import Renderer, Scene, Separable, Surface, _core
+from vkbloom import Renderer, Scene, Separable, _core
+from vkbloom._renderer.surface import Surface
 
 SIZE = (48, 27)
 
@@ -85,7 +86,7 @@ def test_sizes(surface: Surface, renderer: Renderer, scene: Scene) -> None:
         with Surface(renderer, size=size) as opened:
             assert opened.size == size
             assert opened.present(scene)
-            assert opened.present(scene, size=(64, 36), attachment="glow")
+            assert opened.present(scene, size=(64, 36), framebuffer="glow")
 
 
 def test_an_image_is_presented(surface: Surface, renderer: Renderer) -> None:
@@ -135,9 +136,9 @@ def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"attachment": "depth"}, "attachment: 'depth' has no colours to show"),
-        ({"attachment": "all"}, "attachments: "),
-        ({"attachment": "blur"}, "blur"),
+        ({"framebuffer": "depth"}, "framebuffer: 'depth' has no colours to show"),
+        ({"framebuffer": "all"}, "framebuffers: "),
+        ({"framebuffer": "blur"}, "blur"),
         ({"size": (0, 5)}, r"size: \(0, 5\) is out of range"),
     ],
 )

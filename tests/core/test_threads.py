@@ -43,16 +43,14 @@ def one(renderer: Renderer, scene: Scene, kind: str, which: int, size: tuple[int
         return list(renderer.apply(picture(*size), settings).values())
     if kind == "out":
         out = np.zeros((size[1], size[0], 4), np.float32)
-        renderer.apply(picture(*size), settings, attachments="final", out={"final": out})
+        renderer.apply(picture(*size), settings, framebuffers="final", out={"final": out})
         return [out]
     if kind == "left":
         # A sequence that is dropped half way: some of its submissions are still pending.
-        return [next(iter(renderer.apply_many(picture(*size), [settings] * 5)))["final"]]
+        return [next(iter(renderer.sweep(picture(*size), [settings] * 5)))["final"]]
     return [
         frames["final"]
-        for frames in renderer.apply_many(
-            picture(*size), [settings, *SETTINGS], attachments="final"
-        )
+        for frames in renderer.sweep(picture(*size), [settings, *SETTINGS], framebuffers="final")
     ]
 
 

@@ -19,8 +19,9 @@ from PIL import ImageGrab
 
 import vkbloom
 from tests.images import picture
-from vkbloom import Pyramid, Renderer, Separable, Surface
-from vkbloom.views import pictures
+from vkbloom import Pyramid, Renderer, Separable
+from vkbloom._renderer.surface import Surface
+from vkbloom._views import pictures
 
 UFO = vkbloom.Scene.ufo()
 SIZE = (192, 108)
@@ -69,8 +70,8 @@ def pixels(renderer: Renderer) -> None:
             assert difference(renderer.render(UFO, size=SIZE, time=0.75)["final"]) == 0, mailbox
     with Surface(renderer, window) as surface:
         for name in ("brightness", "scene", "albedo"):
-            assert surface.present(UFO, shading="deferred", attachment=name)
-            frames = renderer.render(UFO, size=SIZE, shading="deferred", attachments=name)
+            assert surface.present(UFO, shading="deferred", framebuffer=name)
+            frames = renderer.render(UFO, size=SIZE, shading="deferred", framebuffers=name)
             # The device's curve is not the exact one.
             assert difference(pictures.picture(frames[name], name), 1) <= 1, name
         # `scene` is shown in place of a `final` that would be a copy of it.
@@ -80,7 +81,7 @@ def pixels(renderer: Renderer) -> None:
             assert difference(expected) == 0, settings
         settings = Separable(encoding="srgb", tonemap="aces")
         assert surface.present(UFO, settings, shading="deferred")
-        frames = renderer.render(UFO, settings, SIZE, shading="deferred", attachments="final")
+        frames = renderer.render(UFO, settings, SIZE, shading="deferred", framebuffers="final")
         assert difference(frames["final"]) == 0
         cases: tuple[tuple[Any, str, int], ...] = (
             ("none", "uint8", 0),

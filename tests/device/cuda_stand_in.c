@@ -112,12 +112,12 @@ struct work {
     void (*callback)(void);  // NULL: none
 };
 
-enum { MOST_WORK = 64 };
+enum { MAX_WORK = 64 };
 
 static struct {
     pthread_mutex_t mutex;
     pthread_cond_t changed;
-    struct work work[MOST_WORK];
+    struct work work[MAX_WORK];
     unsigned first, count;
     unsigned long done;
     int started;
@@ -148,7 +148,7 @@ static void *work_off(void *unused)
         pthread_mutex_unlock(&queue.mutex);
         do_work(&work);
         pthread_mutex_lock(&queue.mutex);
-        queue.first = (queue.first + 1) % MOST_WORK;
+        queue.first = (queue.first + 1) % MAX_WORK;
         --queue.count;
         ++queue.done;
         pthread_cond_broadcast(&queue.changed);
@@ -165,9 +165,9 @@ static void push(struct work work)
     pthread_mutex_lock(&queue.mutex);
     if (!queue.started++ && pthread_create(&thread, NULL, work_off, NULL) == 0)
         pthread_detach(thread);
-    while (queue.count == MOST_WORK)
+    while (queue.count == MAX_WORK)
         pthread_cond_wait(&queue.changed, &queue.mutex);
-    queue.work[(queue.first + queue.count++) % MOST_WORK] = work;
+    queue.work[(queue.first + queue.count++) % MAX_WORK] = work;
     pthread_cond_broadcast(&queue.changed);
     pthread_mutex_unlock(&queue.mutex);
 }

@@ -24,7 +24,7 @@ import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Convolution, Pyramid, Renderer, Separable
-from vkbloom.device_arrays import merged
+from vkbloom._renderer.device_arrays import merged
 
 VALIDATION = "validated" in sys.argv
 #: Whether calls return before the device has finished.
@@ -33,6 +33,10 @@ ADAPTER = os.environ.get("VKBLOOM_TEST_NAME") or "software"
 
 _get = ctypes.pythonapi.PyCapsule_GetPointer
 _get.restype, _get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+
+
+# Arrays on the device have no type of NumPy.
+vjp: Any = vkbloom.vjp
 
 
 class OnDevice:
@@ -146,14 +150,14 @@ def sequences(renderer: Any) -> None:
     moved = np.moveaxis(np.ascontiguousarray(np.moveaxis(images, -1, 1)), 1, -1)
     for batch in (images, moved, images[::2]):
         wanted = expected[::2] if len(batch) == 3 else expected
-        for frames, right in zip(renderer.apply_each(OnDevice(batch)), wanted, strict=True):
+        for frames, right in zip(renderer.map(OnDevice(batch)), wanted, strict=True):
             same(frames, right)
     for frames, right in zip(
-        renderer.apply_each([OnDevice(one) for one in images]), expected, strict=True
+        renderer.map([OnDevice(one) for one in images]), expected, strict=True
     ):
         same(frames, right)
     settings = [Pyramid(levels=2, intensity=step / 4) for step in range(12)]
-    many = renderer.apply_many(OnDevice(images[0]), settings)
+    many = renderer.sweep(OnDevice(images[0]), settings)
     for frames, one in zip(many, settings, strict=True):
         same(frames, renderer.apply(images[0], one))
     handle = renderer.upload(OnDevice(images[1]), mask=np.ones((16, 24), np.float32))
@@ -167,7 +171,7 @@ def layers(renderer: Any) -> None:
     batch = OnDevice(images[:, ::-1])
     # In turns with single images: both have images of the same names.
     for settings, together in ((LOW, 10), (Separable(), 10), (Convolution(), 0), (LOW, 10)):
-        frames = list(renderer.apply_each(batch, settings))
+        frames = list(renderer.map(batch, settings))
         for made, image in zip(frames, images, strict=True):
             same(made, renderer.apply(image[::-1], settings))
         shared = len({one["final"]._memory for one in frames}) == 1
@@ -176,14 +180,14 @@ def layers(renderer: Any) -> None:
     batches: Any = renderer._batches
     size = batches._size and batches._size[2]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vkbloom.batches.BYTES", 5 * (size or 0))
+        patch.setattr("vkbloom._renderer.batches.BYTES", 5 * (size or 0))
         for count in (9, 10):
             part = OnDevice(images[:count, ::-1])
-            frames = list(renderer.apply_each(part, LOW, attachments="final"))
+            frames = list(renderer.map(part, LOW, framebuffers="final"))
             for made, image in zip(frames, images[:count], strict=True):
-                expected = renderer.apply(image[::-1], LOW, attachments="final")
+                expected = renderer.apply(image[::-1], LOW, framebuffers="final")
                 same(made, expected)
-        abandoned = renderer.apply_each(batch, LOW)
+        abandoned = renderer.map(batch, LOW)
         same(next(abandoned), renderer.apply(images[0, ::-1], LOW))
         abandoned.close()
     # What the arrays of a batch give to others begins at their own pixels.
@@ -199,7 +203,7 @@ def layers(renderer: Any) -> None:
     same(renderer.apply(last, LOW), renderer.apply(right, LOW))
     # As PyTorch takes them: with rows of 256 bytes and more they follow one another.
     wide = np.stack([picture(32, 4, 4, "float16", seed=i) for i in range(6)])
-    finals = [one["final"] for one in renderer.apply_each(OnDevice(wide), Pyramid(levels=2))]
+    finals = [one["final"] for one in renderer.map(OnDevice(wide), Pyramid(levels=2))]
     found = merged([*finals, finals[0]])
     assert [len(one) for one in found] == ([6, 1] if renderer.info.type != "cpu" else [1] * 7)
     # The last one comes again; on a CPU each is an array of its own.
@@ -219,12 +223,15 @@ def places(renderer: Any) -> None:
     first = renderer.apply(OnDevice(image))
     second = renderer.apply(first["final"])
     same(second, renderer.apply(first["final"].numpy()))
-    out, other = OnDevice(np.zeros_like(image)), np.zeros(*renderer.plan(image).outputs["bloom"])
+    out, other = (
+        OnDevice(np.zeros_like(image)),
+        np.zeros(*renderer.plan(image).framebuffers["bloom"]),
+    )
     frames = renderer.apply(OnDevice(image), out={"final": out, "bloom": other})
     np.testing.assert_array_equal(out.array, renderer.apply(image)["final"])
     assert frames["bloom"] is other
     renderer.apply(image, out={"final": out})
-    assert renderer.plan(Kind(image)).outputs["final"] == (image.shape, image.dtype)
+    assert renderer.plan(Kind(image)).framebuffers["final"] == (image.shape, image.dtype)
 
 
 class Kind(OnDevice):
@@ -313,11 +320,11 @@ class Consumer:
 def recycling(renderer: Any) -> None:
     """Memory is used again when the last consumer lets go, and not before."""
     image = OnDevice(picture(64, 64))
-    final = renderer.apply(image, attachments="final")["final"]
+    final = renderer.apply(image, framebuffers="final")["final"]
     address, right = final.__cuda_array_interface__["data"][0], final.numpy()
     capsule = final.__dlpack__(stream=1)
     del final
-    others = [renderer.apply(image, attachments="final")["final"] for _ in range(5)]
+    others = [renderer.apply(image, framebuffers="final")["final"] for _ in range(5)]
     assert address not in [one.__cuda_array_interface__["data"][0] for one in others]
     del others
     view = np.ctypeslib.as_array((ctypes.c_float * right.size).from_address(address))
@@ -325,7 +332,7 @@ def recycling(renderer: Any) -> None:
     del capsule
     places = set()
     for _ in range(10):
-        one = renderer.apply(image, attachments="final")["final"]
+        one = renderer.apply(image, framebuffers="final")["final"]
         places.add(one.__cuda_array_interface__["data"][0])
     assert len(places) <= 7
 
@@ -379,10 +386,10 @@ def gradients(renderer: Any) -> None:
         image, cotangent = strided(rng, ("float16", "float32")[step % 2]), strided(rng, "float32")
         cotangent = np.resize(cotangent, image.shape).astype(("float32", "float16")[step // 2 % 2])
         glowing: dict[str, Any] = {"emission": image[::-1].copy()} if step % 2 == 0 else {}
-        expected = renderer.vjp(image, settings, **glowing)[1]({"final": cotangent})
+        expected = vjp(image, settings, **glowing, renderer=renderer)[1]({"final": cotangent})
         before = bytes_so_far()
         glowing = {name: OnDevice(part) for name, part in glowing.items()}
-        frames, pullback = renderer.vjp(OnDevice(image), settings, **glowing)
+        frames, pullback = vjp(OnDevice(image), settings, **glowing, renderer=renderer)
         found = pullback({"final": OnDevice(cotangent)})
         assert isinstance(frames["final"], vkbloom.DeviceArray)
         assert isinstance(found["image"], vkbloom.DeviceArray)
@@ -397,8 +404,8 @@ def gradients(renderer: Any) -> None:
         found = pullback({"final": Interfaced(np.moveaxis(first, 0, -1))})
         equal_gradients(found, expected, tolerance=tolerance)
     one = np.lib.stride_tricks.as_strided(np.ones(1, np.float32), image.shape, (0, 0, 0))
-    expected = renderer.vjp(image, Pyramid(levels=2))[1]({"final": np.ones(image.shape)})
-    _, pullback = renderer.vjp(OnDevice(image), Pyramid(levels=2))
+    expected = vjp(image, Pyramid(levels=2), renderer=renderer)[1]({"final": np.ones(image.shape)})
+    _, pullback = vjp(OnDevice(image), Pyramid(levels=2), renderer=renderer)
     equal_gradients(pullback({"final": OnDevice(one)}), expected)
 
 
@@ -408,20 +415,20 @@ def gradient_places(renderer: Any) -> None:
     mask = np.random.default_rng(1).random((16, 24), np.float32)
     settings = Separable(threshold=0.3, composite="mix", intensity=0.4)
     both = {"final": np.ones_like(image), "bloom": np.ones((16, 24, 4), np.float32)}
-    expected = renderer.vjp(image, settings, mask=mask)[1](both)
+    expected = vjp(image, settings, mask=mask, renderer=renderer)[1](both)
     moved = {name: OnDevice(part) for name, part in both.items()}
-    _, pullback = renderer.vjp(OnDevice(image), settings, mask=OnDevice(mask))
+    _, pullback = vjp(OnDevice(image), settings, mask=OnDevice(mask), renderer=renderer)
     equal_gradients(pullback(moved), expected)
     equal_gradients(pullback({**both, "bloom": OnDevice(both["bloom"].astype("u1"))}), expected)
     for device, place in (("host", np.ndarray), (None, np.ndarray), ("device", None)):
-        pullback = renderer.vjp(image, settings, mask=mask, device=device)[1]
+        pullback = vjp(image, settings, mask=mask, device=device, renderer=renderer)[1]
         equal_gradients(pullback(moved), expected, place or vkbloom.DeviceArray)
     # The image is not read: its derivative is 0, where the others are.
-    _, pullback = renderer.vjp(OnDevice(image), settings, emission=OnDevice(image))
+    _, pullback = vjp(OnDevice(image), settings, emission=OnDevice(image), renderer=renderer)
     found = pullback({"bloom": moved["bloom"]})["image"]
     assert isinstance(found, vkbloom.DeviceArray)
     assert not found.numpy().any()
-    _, pullback = renderer.vjp(OnDevice(image), settings)
+    _, pullback = vjp(OnDevice(image), settings, renderer=renderer)
     wrong = image.copy()
     wrong[3, 4, 1] = np.nan
     refused: list[tuple[str, Any, type[Exception], str]] = [
@@ -438,8 +445,11 @@ def gradient_places(renderer: Any) -> None:
     for name, given, kind, part in refused:
         raises(kind, part, functools.partial(pullback, {name: given}))
     # NaN of the image is not the cotangent's.
-    spoilt = renderer.vjp(wrong, settings)[1]({"final": image})
-    equal_gradients(renderer.vjp(OnDevice(wrong), settings)[1]({"final": OnDevice(image)}), spoilt)
+    spoilt = vjp(wrong, settings, renderer=renderer)[1]({"final": image})
+    equal_gradients(
+        vjp(OnDevice(wrong), settings, renderer=renderer)[1]({"final": OnDevice(image)}),
+        spoilt,
+    )
 
 
 def raises(kind: type[Exception], part: str, call: Callable[[], object]) -> None:
@@ -461,7 +471,7 @@ def errors(renderer: Any) -> None:
         (OnDevice(image[:0]), ValueError, "sides of at least 1"),
         (OnDevice(image[..., 0]), ValueError, "is not (H, W, 3)"),
         (OnDevice(np.moveaxis(image, -1, 0)), ValueError, "image.permute(1, 2, 0)"),
-        (OnDevice(image[None]), ValueError, "apply_each(image)"),
+        (OnDevice(image[None]), ValueError, "map(image)"),
         (Interfaced(image, data=(1, False)), ValueError, "may have been freed"),
         (Interfaced(image, data=(2, False)), ValueError, "managed (unified)"),
         (Interfaced(image, data=(3, False)), ValueError, "it is on Stand-in 0"),
@@ -497,12 +507,10 @@ LOW = vkbloom.BevyBloom(max_mip_dimension=16)
 
 def use_low_levels() -> None:
     """Calls without settings use LOW."""
-    apply, each = Renderer.apply, Renderer.apply_each
+    apply, each = Renderer.apply, Renderer.map
     changed: Any = Renderer
     changed.apply = lambda self, image, settings=LOW, **more: apply(self, image, settings, **more)
-    changed.apply_each = lambda self, images, settings=LOW, **more: each(
-        self, images, settings, **more
-    )
+    changed.map = lambda self, images, settings=LOW, **more: each(self, images, settings, **more)
 
 
 def main(everything: Sequence[Callable[[Any], None]] = WORK) -> None:

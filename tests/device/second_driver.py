@@ -12,14 +12,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+import vkbloom
 from tests import tolerance
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from tests.methods.cases import DTYPES, METHODS, presets_of_low_levels
 from tests.screens import CAMERA, panel
 from vkbloom import Convolution, Pyramid, Renderer, Scene, Separable, Settings, psf, reference
-from vkbloom.scene import skybox
-from vkbloom.scene.textures import Texture
+from vkbloom._scene import skybox
+from vkbloom._scene.textures import Texture
 
 VARIANTS = ("fragment", "cpu", "gpu")
 SIZE, FRAME = (24, 17), (48, 32)
@@ -36,12 +37,12 @@ def compare_given(renderer: Renderer, dtype: str) -> None:
     mask = picture(*SIZE, 1, dtype, seed=3)[..., 0]
     settings = Pyramid(levels=3, threshold=0.3, knee=0.5)
     frames = renderer.apply(
-        renderer.upload(image, mask=mask, emission=emission), settings, attachments="all"
+        renderer.upload(image, mask=mask, emission=emission), settings, framebuffers="all"
     )
     tolerance.assert_matches_reference(frames, image, settings, mask=mask, emission=emission)
     if dtype != "float32":
         return
-    _, pullback = renderer.vjp(image, settings)
+    _, pullback = vkbloom.vjp(image, settings, renderer=renderer)
     cotangent = np.ones(image.shape, np.float32)
     expected = reference.vjp(image, settings)[1]({"final": cotangent})["image"]
     np.testing.assert_allclose(pullback({"final": cotangent})["image"], expected, atol=1e-4)

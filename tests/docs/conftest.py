@@ -9,9 +9,9 @@ import pytest
 
 from tests.docs.pages import ROOT, blocks
 from vkbloom import presets, write
-from vkbloom.io.image_writing import save
-from vkbloom.io.images import Picture
-from vkbloom.verdicts import measuring
+from vkbloom._io.image_writing import save
+from vkbloom._io.images import Picture
+from vkbloom.testing import _measuring as measuring
 
 
 @pytest.fixture
@@ -28,10 +28,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     np.save("picture.npy", photo)
     (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
     Path("grid.toml").write_text(grid)
-    (own,) = blocks(ROOT / "docs" / "own_methods.md", "glsl")
+    (own,) = blocks(ROOT / "docs" / "custom_methods.md", "glsl")
     Path("soft.hook").write_text(own)
     (twin,) = [
-        text for text in blocks(ROOT / "docs" / "own_methods.md", "python") if "def soft" in text
+        text for text in blocks(ROOT / "docs" / "custom_methods.md", "python") if "def soft" in text
     ]
     Path("twin.py").write_text(twin)
     return tmp_path

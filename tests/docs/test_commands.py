@@ -21,7 +21,7 @@ from benchmarks.__main__ import command as benchmarks
 from click.testing import CliRunner
 
 from tests.docs.pages import ROOT, TEXTS, blocks
-from vkbloom.cli.program import program
+from vkbloom._cli.program import program
 
 #: Why a command is not run here, by how it begins; its arguments are parsed.
 NOT_RUN: Final = {

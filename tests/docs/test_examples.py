@@ -33,7 +33,6 @@ METHODS_OF = (
     vkbloom.Renderer,
     vkbloom.Scene,
     vkbloom.Settings,
-    vkbloom.Surface,
     psf.PSF,
     testing.FrameRegression,
     testing.Probe,
@@ -68,7 +67,10 @@ def test_examples_of_a_module(name: str, request: pytest.FixtureRequest) -> None
     tests = examples_in(module)
     if any('"software"' in one.source for test in tests for one in test.examples):
         request.getfixturevalue("software")  # skips where there is none
-    if name not in ("vkbloom.renderer", "vkbloom.surface"):  # they show what closing does
+    if name not in (
+        "vkbloom._renderer.renderer",
+        "vkbloom._renderer.surface",
+    ):  # they show what closing does
         request.getfixturevalue("kept_renderers")
     for test in tests:
         runner.run(test, out=report.append)

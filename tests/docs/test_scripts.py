@@ -18,7 +18,7 @@ import pytest
 import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
-from vkbloom.verdicts import measuring
+from vkbloom.testing import _measuring as measuring
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
 RUN: Final[dict[str, tuple[str, str]]] = {
@@ -63,7 +63,7 @@ ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
     "examples/cluster/": "tests/docs/test_cluster_scripts.py",
     "examples/image_quality/": "tests/plugin/test_image_quality.py",
-    "examples/own_methods/": "tests/own/test_rendering.py",
+    "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
     "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.explorer.explorer_hosts import CHROMIUM, served
-from vkbloom.explorer.viewer import Viewer
+from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -18,8 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import vkbloom
-from vkbloom.explorer.server import Server
-from vkbloom.explorer.viewer import Viewer
+from vkbloom._explorer.server import Server
+from vkbloom._explorer.viewer import Viewer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PATIENCE = 60.0  # seconds: waiting costs nothing where a busy machine answers at last

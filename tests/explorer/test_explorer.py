@@ -18,11 +18,11 @@ import vkbloom
 from tests.exhaustive import some
 from tests.framebuffers import decode, make, noise
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
-from vkbloom.explorer.controls import as_code, controls, settings_from
-from vkbloom.explorer.fast_pictures import picture_of, texts_of
-from vkbloom.explorer.viewer import Viewer
-from vkbloom.registry import METHODS
-from vkbloom.views.pictures import reduced
+from vkbloom._explorer.controls import as_code, controls, settings_from
+from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._explorer.viewer import Viewer
+from vkbloom._settings.registry import METHODS
+from vkbloom._views.pictures import reduced
 
 EXAMPLES = [
     *presets.values(),
@@ -346,7 +346,7 @@ class TestViewer:
         assert opened("mask", "mask.png", mask)["glows"] == {"mask": "mask.png"}
         for _ in range(2):
             frame(viewer, Pyramid())
-            expected = renderer.apply(image, Pyramid(), attachments="final", **given)["final"]
+            expected = renderer.apply(image, Pyramid(), framebuffers="final", **given)["final"]
             assert np.array_equal(viewer.frames["a"]["final"], expected)
             # Of another dtype, with an alpha.
             answer = opened("emission", "glow.exr", glow.read_bytes())
@@ -358,7 +358,7 @@ class TestViewer:
         assert opened("mask")["glows"] == {"emission": "glow.exr"}
         frame(viewer, Pyramid())
         del given["mask"]
-        expected = renderer.apply(image, Pyramid(), attachments="final", **given)["final"]
+        expected = renderer.apply(image, Pyramid(), framebuffers="final", **given)["final"]
         assert np.array_equal(viewer.frames["a"]["final"], expected)
         assert opened("image", "a.png", file)["glows"] == {}
 
@@ -390,7 +390,7 @@ class TestViewer:
         assert (facts["framebuffer"], facts["size"], facts["dtype"]) == ("final", [80, 45], "uint8")
         assert facts["code"] == "vkbloom.Separable(blur_scale=1.5)"
         assert set(facts["passes"]) <= {"glow", "blur_vertical", "bloom", "scene", "final"}
-        plan = renderer.plan(scene, settings, (80, 45), attachments="final")
+        plan = renderer.plan(scene, settings, (80, 45), framebuffers="final")
         assert facts["plan"] == [json.loads(json.dumps(one._asdict())) for one in plan.passes]
         assert viewer.settings["a"] == settings
         assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
@@ -570,7 +570,7 @@ class TestWidget:
         assert sent[0][0]["sides"]["a"] == Pyramid().to_dict()
         assert (explorer.settings, explorer.against) == (Pyramid(), Separable())
         with pytest.raises(TypeError, match="settings"):
-            explorer.settings = "pyramid"  # type: ignore[assignment]
+            explorer.settings = Pyramid  # type: ignore[assignment]
 
     def test_without_anywidget(self, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "anywidget", None)

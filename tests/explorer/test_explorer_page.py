@@ -1,6 +1,6 @@
 """The explorer's page in a browser: Debian's Chromium, run by playwright.
 
-The shown pixels are compared with those of the renderer: in the page of `vkbloom.explorer.server`,
+The shown pixels are compared with those of the renderer: in the page of `vkbloom._explorer.server`,
 and in JupyterLab.
 """
 
@@ -24,8 +24,8 @@ from tests.exhaustive import by_turns, witness
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, jupyterlab
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
-from vkbloom.explorer.fast_pictures import picture_of
-from vkbloom.explorer.viewer import Viewer
+from vkbloom._explorer.fast_pictures import picture_of
+from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -124,7 +124,7 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
 def assert_shows(
     picture: NDArray[np.uint8], renderer: Renderer, scene: Scene, settings: Any
 ) -> None:
-    expected = renderer.render(scene, settings, size_of(picture), attachments="final")["final"]
+    expected = renderer.render(scene, settings, size_of(picture), framebuffers="final")["final"]
     assert np.array_equal(picture, expected[:, :, :3])
 
 
@@ -284,7 +284,7 @@ def test_the_plan_has_the_times_of_its_passes(
     page: Page, renderer: Renderer, scene: Scene, tmp_path: Path
 ) -> None:
     page.get_by_text("Plan", exact=True).click()
-    plan = renderer.plan(scene, None, size_of(see(page, tmp_path)), attachments="final")
+    plan = renderer.plan(scene, None, size_of(see(page, tmp_path)), framebuffers="final")
     rows = page.locator(".vkb-plan tbody tr")
 
     def times() -> dict[str, str]:

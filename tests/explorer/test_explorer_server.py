@@ -18,8 +18,8 @@ from click.testing import CliRunner
 import vkbloom
 from tests.framebuffers import noise
 from vkbloom import Renderer, Separable
-from vkbloom.cli.program import program
-from vkbloom.explorer.viewer import Viewer
+from vkbloom._cli.program import program
+from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
 
@@ -31,7 +31,7 @@ from tornado.httpclient import (  # noqa: E402
 )
 from tornado.websocket import WebSocketClientConnection, websocket_connect  # noqa: E402
 
-from vkbloom.explorer.server import Server  # noqa: E402
+from vkbloom._explorer.server import Server  # noqa: E402
 
 #: Connections of the running test, which it leaves open.
 OPENED: list[WebSocketClientConnection] = []
@@ -297,7 +297,7 @@ def test_an_image_begins_as_in_apply(
             # Nothing is to be served.
             raise ValueError("recorded")
 
-    monkeypatch.setattr("vkbloom.cli.explore.Viewer", Recorded)
+    monkeypatch.setattr("vkbloom._cli.explore.Viewer", Recorded)
     result = CliRunner().invoke(program, ["explore", "--no-open", *words])
     assert "recorded" in result.stderr
     ((image, settings),) = begun

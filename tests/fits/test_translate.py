@@ -10,8 +10,8 @@ import pytest
 
 import vkbloom
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
-from vkbloom.cli import fields, translate
-from vkbloom.fits.translating import lights
+from vkbloom._cli import fields, translate
+from vkbloom._fit.translating import lights
 
 SIZE = (96, 64)
 

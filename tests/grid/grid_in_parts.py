@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 import vkbloom
-from vkbloom.grid.chunks import Chunks
+from vkbloom._grid.chunks import Chunks
 
 
 def render(store: Path, part: str | None) -> None:
     """Render 192 points in 48 chunks."""
-    vkbloom.grid_to_zarr(
+    vkbloom.grid(
         np.random.default_rng(3).random((12, 10, 3), dtype=np.float32),
         vkbloom.Separable(threshold=0.2),
         {
@@ -27,7 +27,7 @@ def render(store: Path, part: str | None) -> None:
             "exposure": np.linspace(-1, 1, 6),
             "blur_strength": np.linspace(1, 2, 4),
         },
-        store,
+        store=store,
         chunks={"blur_strength": 4},
         reduce={"mean": vkbloom.reductions.Mean()},
         part=part,

@@ -12,7 +12,7 @@ import vkbloom
 
 def fill(store: Path | str) -> None:
     """Render what is missing."""
-    vkbloom.grid_to_zarr(
+    vkbloom.grid(
         np.random.default_rng(3).random((12, 10, 3), dtype=np.float32),
         vkbloom.Separable(threshold=0.2),
         {
@@ -20,7 +20,7 @@ def fill(store: Path | str) -> None:
             "exposure": np.linspace(-1, 1, 20),
             "blur_strength": np.linspace(1, 2, 10),
         },
-        store,
+        store=store,
         chunks={"exposure": 20, "blur_strength": 1},
         reduce={"mean": vkbloom.reductions.Mean()},
         progress=False,

@@ -9,9 +9,9 @@ from threading import Barrier
 import numpy as np
 
 from vkbloom import Separable
-from vkbloom.grid.keys import open_keys
-from vkbloom.grid.layout import Grid, Layout, Variable, ask
-from vkbloom.grid.store import GridStore
+from vkbloom._grid.keys import open_keys
+from vkbloom._grid.layout import Grid, Layout, Variable, ask
+from vkbloom._grid.store import GridStore
 
 
 def laid_out(intensity: float) -> tuple[Grid, Layout]:
@@ -25,7 +25,7 @@ def laid_out(intensity: float) -> tuple[Grid, Layout]:
         size=None,
         shading="forward",
         time=0,
-        attachments="final",
+        framebuffers="final",
         reduce=None,
     )
     final = Variable(("y", "x", "channel"), (4, 4, 3), np.dtype(np.uint8), {})

@@ -17,8 +17,8 @@ import pytest
 import vkbloom
 from tests.framebuffers import noise
 from tests.grid.stores import contents
-from vkbloom import Frames, Separable, check_grid, grid_to_zarr, reductions
-from vkbloom.grid import cluster
+from vkbloom import Frames, Separable, check_grid, reductions
+from vkbloom._grid import cluster
 
 distributed = pytest.importorskip("distributed")
 xr = pytest.importorskip("xarray")
@@ -48,7 +48,7 @@ def make(store: Path, client: Any = None, **changes: Any) -> Any:
         "progress": False,
         **changes,
     }
-    return grid_to_zarr(source(), Separable(), AXES, store, client=client, **arguments)
+    return vkbloom.grid(source(), Separable(), AXES, store=store, client=client, **arguments)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def slow_mean(frames: Frames) -> float:
     return float(frames["final"].mean())
 
 
-slow_mean.attachments = ("final",)  # type: ignore[attr-defined]
+slow_mean.framebuffers = ("final",)  # type: ignore[attr-defined]
 
 
 def test_workers_write_what_one_process_writes(
@@ -107,7 +107,7 @@ def test_renderers_are_kept_between_runs_and_closed_at_the_end(client: Any, tmp_
 
     watcher = threading.Thread(target=watch)
     watcher.start()
-    make(tmp_path / "a.zarr", client, reduce={"mean": slow_mean}, attachments=())
+    make(tmp_path / "a.zarr", client, reduce={"mean": slow_mean}, framebuffers=())
     mark.set()
     watcher.join()
     assert max(seen) == 1
@@ -142,9 +142,9 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_refused_store_leaves_no_renderer(client: Any, tmp_path: Path) -> None:
-    make(tmp_path / "a.zarr", client, reduce={"n": reductions.Max()}, attachments=())
+    make(tmp_path / "a.zarr", client, reduce={"n": reductions.Max()}, framebuffers=())
     with pytest.raises(ValueError, match="another grid"):
-        make(tmp_path / "a.zarr", client, reduce={"n": reductions.Mean()}, attachments=())
+        make(tmp_path / "a.zarr", client, reduce={"n": reductions.Mean()}, framebuffers=())
     assert list(client.run(lambda: len(cluster._held)).values()) == [0, 0]
 
 
@@ -160,7 +160,7 @@ def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Pat
 
     killer = threading.Thread(target=kill)
     killer.start()
-    plain: dict[str, Any] = {"reduce": {"mean": slow_mean}, "attachments": ("final",)}
+    plain: dict[str, Any] = {"reduce": {"mean": slow_mean}, "framebuffers": ("final",)}
     made = make(tmp_path / "a.zarr", client, **plain)
     killer.join()
     assert killed.is_set()
@@ -173,7 +173,7 @@ def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Pat
 class Failing:
     """Fails at one point, until a file is there."""
 
-    attachments = ("final",)
+    framebuffers = ("final",)
 
     def __init__(self, file: Path, *, mends: bool) -> None:
         self.file, self.mends = file, mends
@@ -188,13 +188,13 @@ class Failing:
 
 def test_failed_run_is_repeated(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "tried", mends=True)}
-    made = make(tmp_path / "a.zarr", client, reduce=reduce, attachments=())
+    made = make(tmp_path / "a.zarr", client, reduce=reduce, framebuffers=())
     assert made["done"].values.all()
 
 
 def test_repeated_failure_keeps_completed_blocks(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "mended", mends=False)}
-    changes: dict[str, Any] = {"reduce": reduce, "attachments": (), "chunks": {"blur_scale": 6}}
+    changes: dict[str, Any] = {"reduce": reduce, "framebuffers": (), "chunks": {"blur_scale": 6}}
     with pytest.raises(ZeroDivisionError, match="this point"):
         make(tmp_path / "a.zarr", client, **changes)
     report = check_grid(tmp_path / "a.zarr")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vkbloom.grid.order import blocks, default_chunk, points
+from vkbloom._grid.order import blocks, default_chunk, points
 
 
 @st.composite

@@ -20,10 +20,10 @@ from tests.framebuffers import noise
 from tests.grid.grid_in_parts import render
 from tests.grid.prepared_at_once import prepare, prepare_all
 from tests.grid.stores import contents
-from vkbloom import check_grid, grid_to_zarr
-from vkbloom.cli.program import program
-from vkbloom.grid.order import blocks
-from vkbloom.grid.parts import _ARRAYS, read_part
+from vkbloom import check_grid
+from vkbloom._cli.program import program
+from vkbloom._grid.order import blocks
+from vkbloom._grid.parts import _ARRAYS, read_part
 
 pytest.importorskip("zarr")
 SCRIPT = "tests.grid.grid_in_parts"
@@ -43,7 +43,7 @@ def start(store: Path, *words: str) -> subprocess.Popen[str]:
 
 def make(store: Any, **changes: Any) -> Any:
     image = noise(16, 21, 3, dtype="float32")
-    return grid_to_zarr(image, vkbloom.Separable(), AXES, store, progress=False, **changes)
+    return vkbloom.grid(image, vkbloom.Separable(), AXES, store=store, progress=False, **changes)
 
 
 def test_sixteen_parts_of_four_processes_of_which_two_are_killed(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_damage_in_a_part_is_repaired_by_it_alone(tmp_path: Path) -> None:
 def test_another_grid_is_refused(tmp_path: Path) -> None:
     make(tmp_path / "a.zarr", part=(1, 2))
     with pytest.raises(ValueError, match="contains another grid; variables"):
-        make(tmp_path / "a.zarr", part=(2, 2), attachments=("bloom",))
+        make(tmp_path / "a.zarr", part=(2, 2), framebuffers=("bloom",))
 
 
 def test_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import make, noise
 from vkbloom import reductions
-from vkbloom.views.comparison import compare
+from vkbloom._views.comparison import compare
 
 # Of one pair of doubles.
 EXACT = 1e-12
@@ -32,15 +32,15 @@ class TestMeanAndMax:
         bloom[0, 0] = np.nan
         bloom[1, 1] = np.inf
         found = frames(bloom=bloom)
-        assert reductions.Mean(attachment="bloom")(found) == 2.0
-        assert reductions.Max(attachment="bloom")(found) == 2.0
+        assert reductions.Mean(framebuffer="bloom")(found) == 2.0
+        assert reductions.Max(framebuffer="bloom")(found) == 2.0
         nothing = frames(final=np.full((1, 1, 3), np.nan, np.float32))
         assert np.isnan(reductions.Mean()(nothing))
         assert np.isnan(reductions.Max()(nothing))
 
     def test_depth(self) -> None:
         depth = np.array([[0.25, 0.75]], np.float32)
-        assert reductions.Mean(attachment="depth")(frames(depth=depth)) == 0.5
+        assert reductions.Mean(framebuffer="depth")(frames(depth=depth)) == 0.5
 
 
 class TestEncircledEnergy:

@@ -23,10 +23,10 @@ from tests.exhaustive import by_turns
 from tests.framebuffers import noise
 from tests.grid import grid_to_kill
 from tests.grid.stores import contents
-from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, grid_to_zarr, psf, reductions
-from vkbloom.grid.filling import Filler
-from vkbloom.grid.identity import differences
-from vkbloom.grid.store import GridStore
+from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf, reductions
+from vkbloom._grid.filling import Filler
+from vkbloom._grid.identity import differences
+from vkbloom._grid.store import GridStore
 
 xr = pytest.importorskip("xarray")
 zarr = pytest.importorskip("zarr")
@@ -53,12 +53,12 @@ def make(store: Any, **changes: Any) -> Any:
     arguments: dict[str, Any] = {
         "chunks": CHUNKS,
         "reduce": REDUCE,
-        "attachments": ("final", "bloom"),
+        "framebuffers": ("final", "bloom"),
         **changes,
     }
     settings = arguments.pop("settings", Separable())
     axes = arguments.pop("axes", AXES)
-    return grid_to_zarr(arguments.pop("source", source()), settings, axes, store, **arguments)
+    return vkbloom.grid(arguments.pop("source", source()), settings, axes, store=store, **arguments)
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +75,13 @@ def copy(undisturbed: Path, tmp_path: Path) -> Path:
 
 class TestWhole:
     def test_store_equals_the_grid_in_memory(self, undisturbed: Path, renderer: Renderer) -> None:
-        expected = renderer.grid(
-            source(), Separable(), AXES, attachments=("final", "bloom"), reduce=REDUCE
+        expected = vkbloom.grid(
+            source(),
+            Separable(),
+            AXES,
+            framebuffers=("final", "bloom"),
+            reduce=REDUCE,
+            renderer=renderer,
         )
         found = xr.open_zarr(undisturbed)
         assert set(found) == {*expected, "done"}
@@ -121,13 +126,19 @@ class TestWhole:
         assert "vkbloom_grid" not in again.attrs
         assert mended == []
 
+    def test_netcdf_holds_a_store(self, undisturbed: Path, tmp_path: Path) -> None:
+        opened = xr.open_zarr(undisturbed)
+        opened.to_netcdf(tmp_path / "a.nc", engine="scipy")
+        again = xr.load_dataset(tmp_path / "a.nc", engine="scipy")
+        assert np.array_equal(again["final"], opened["final"])
+
     def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
         black = np.zeros((4, 4, 3), np.uint8)
-        make(tmp_path / "a.zarr", source=black, reduce=None, attachments="final")
+        make(tmp_path / "a.zarr", source=black, reduce=None, framebuffers="final")
         assert check_grid(tmp_path / "a.zarr").complete
 
     def test_scenes_lists_and_one_point(self, tmp_path: Path, scene: vkbloom.Scene) -> None:
-        plain: dict[str, Any] = {"chunks": None, "reduce": None, "attachments": "final"}
+        plain: dict[str, Any] = {"chunks": None, "reduce": None, "framebuffers": "final"}
         lone = make(tmp_path / "a.zarr", source=scene, axes={}, size=(20, 10), **plain)
         assert lone["final"].shape == (10, 20, 4)
         assert bool(lone["done"])
@@ -159,18 +170,20 @@ class TestWhole:
     ) -> None:
         validated: dict[str, Any] = {"validation": True}
         store = tmp_path / "a.zarr"
-        stored = grid_to_zarr(source(), settings, {axis: values}, store, **validated)
+        stored = vkbloom.grid(source(), settings, {axis: values}, store=store, **validated)
         # The same one, which is kept.
         renderer = vkbloom.Renderer("auto", **validated)
         for place, value in enumerate(values):
             expected = renderer.apply(source(), settings.replace(**{axis: value}))["final"]
             np.testing.assert_array_equal(stored["final"][place], expected)
-        in_memory = renderer.grid(source(), settings, {axis: values}, progress=False)
+        in_memory = vkbloom.grid(
+            source(), settings, {axis: values}, progress=False, renderer=renderer
+        )
         assert list(in_memory[axis].values) == list(stored[axis].values)
-        again = grid_to_zarr(source(), settings, {axis: values}, store, **validated)
+        again = vkbloom.grid(source(), settings, {axis: values}, store=store, **validated)
         assert again.attrs["passes_run"] == 0
         with pytest.raises(ValueError, match=rf"axes\.{axis}"):
-            grid_to_zarr(source(), settings, {axis: values[:1]}, store, **validated)
+            vkbloom.grid(source(), settings, {axis: values[:1]}, store=store, **validated)
 
     def test_masks_and_emissions_belong_to_the_source(
         self, tmp_path: Path, renderer: Renderer
@@ -183,21 +196,21 @@ class TestWhole:
         axes = {"exposure": [0.0, 1.0]}
         store = tmp_path / "glow.zarr"
         both = [source(), noise(16, 21, 3, dtype="float32", seed=6)]
-        grid = grid_to_zarr(both, Pyramid(), axes, store, **given)
+        grid = vkbloom.grid(both, Pyramid(), axes, store=store, **given)
         for number, image in enumerate(both):
             expected = renderer.apply(image, Pyramid(exposure=1.0), **given)["final"]
             assert np.array_equal(grid["final"].isel(image=number, exposure=1), expected)
-        in_memory = renderer.grid(both, Pyramid(), axes, **given, progress=False)
+        in_memory = vkbloom.grid(both, Pyramid(), axes, **given, progress=False, renderer=renderer)
         assert np.array_equal(in_memory["final"], grid["final"])
-        assert grid_to_zarr(both, Pyramid(), axes, store, **given).attrs["passes_run"] == 0
+        assert vkbloom.grid(both, Pyramid(), axes, store=store, **given).attrs["passes_run"] == 0
         with pytest.raises(ValueError, match=r"source\.mask\.sha256"):
-            grid_to_zarr(both, Pyramid(), axes, store, **{**given, "mask": 255 - levels})
+            vkbloom.grid(both, Pyramid(), axes, store=store, **{**given, "mask": 255 - levels})
         with pytest.raises(ValueError, match=r"mask: shape \(2, 2\) is not the image's"):
-            renderer.grid(both, Pyramid(), axes, mask=np.ones((2, 2), np.uint8))
+            vkbloom.grid(both, Pyramid(), axes, mask=np.ones((2, 2), np.uint8), renderer=renderer)
         with pytest.raises(ValueError, match="mask: the source is a scene"):
-            renderer.grid(vkbloom.Scene.ufo(), axes=axes, mask=levels)
+            vkbloom.grid(vkbloom.Scene.ufo(), axes=axes, mask=levels, renderer=renderer)
         with pytest.raises(ValueError, match="uploaded already"):
-            renderer.grid(renderer.upload(source()), axes=axes, mask=levels)
+            vkbloom.grid(renderer.upload(source()), axes=axes, mask=levels, renderer=renderer)
 
     def test_default_chunks_hold_about_a_megabyte(self, tmp_path: Path) -> None:
         axes = {"intensity": np.linspace(0, 1, 40), "blur_scale": np.linspace(1, 2, 3)}
@@ -208,7 +221,7 @@ class TestWhole:
             axes=axes,
             chunks=None,
             reduce=None,
-            attachments="final",
+            framebuffers="final",
         )
         # 36 KiB a point: 28 of them, along the axis that is visited fastest.
         assert made["final"].chunks[:2] == ((28, 12), (1, 1, 1))
@@ -349,8 +362,8 @@ class TestRefused:
             ({"source": noise(16, 21, 3, dtype="float32", seed=9)}, "source.images"),
             ({"mask": np.ones((16, 21), np.uint8)}, "source.mask: not in the store"),
             ({"emission": source()}, "source.emission: not in the store"),
-            ({"attachments": "final"}, "variables.bloom: .* not requested"),
-            ({"reduce": {**REDUCE, "mean": reductions.Mean(attachment="glow")}}, "reduce.mean"),
+            ({"framebuffers": "final"}, "variables.bloom: .* not requested"),
+            ({"reduce": {**REDUCE, "mean": reductions.Mean(framebuffer="glow")}}, "reduce.mean"),
             ({"chunks": {}}, r"chunk: \[3, 1, 2\] in the store, \[1, 1, 1\] requested"),
         ],
         ids=str,
@@ -364,19 +377,16 @@ class TestRefused:
         assert contents(copy) == before
 
     def test_another_version_is_refused(self, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(vkbloom.grid.layout, "installed_version", lambda: "9.9")
+        monkeypatch.setattr(vkbloom._grid.layout, "installed_version", lambda: "9.9")
         with pytest.raises(ValueError, match=r'version: "0.1.0" in the store, "9.9" requested'):
             make(copy)
 
     def test_another_format_version_is_refused(self, copy: Path) -> None:
-        root = json.loads((copy / "zarr.json").read_text())
-        root["attributes"]["vkbloom_grid"]["format"] = 99
-        (copy / "zarr.json").write_text(json.dumps(root))
+        identity_changed(copy, format=99)
         for call in (make, check_grid):
             with pytest.raises(ValueError, match="its format version 99 is not 3"):
                 call(copy)
-        root["attributes"]["vkbloom_grid"]["format"] = "x" * 100_000
-        (copy / "zarr.json").write_text(json.dumps(root))
+        identity_changed(copy, format="x" * 100_000)
         for call in (make, check_grid):
             with pytest.raises(ValueError, match=r'its format version "x+ \.\.\. x+" is not 3'):
                 call(copy)
@@ -401,10 +411,10 @@ class TestRefused:
             make(3)
 
     def test_a_reference_frame_is_part_of_the_grid(self, tmp_path: Path) -> None:
-        one = {"reduce": {"p": reductions.PSNR(against=source())}, "attachments": ()}
+        one = {"reduce": {"p": reductions.PSNR(against=source())}, "framebuffers": ()}
         make(tmp_path / "a.zarr", **one)
         make(tmp_path / "a.zarr", **one)
-        other = {"reduce": {"p": reductions.PSNR(against=source() + 1)}, "attachments": ()}
+        other = {"reduce": {"p": reductions.PSNR(against=source() + 1)}, "framebuffers": ()}
         with pytest.raises(ValueError, match=r"reduce.p"):
             make(tmp_path / "a.zarr", **other)
 
@@ -504,6 +514,16 @@ def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps(metadata))
 
 
+def identity_changed(store: Path, **changes: Any) -> None:
+    """Change what a store says of its grid."""
+
+    def change(root: dict[str, Any]) -> None:
+        attributes = root["attributes"]
+        attributes["vkbloom_grid"] = json.dumps(json.loads(attributes["vkbloom_grid"]) | changes)
+
+    rewritten(store / "zarr.json", change)
+
+
 CHUNKS_OF_KINDS = ["final/c.0.1.1.0.0.0", "done/c.0.0.0", "channel/c.0", "exposure/c.0"]
 #: A Zstandard frame of 19 bytes that declares 64 GiB, and one of 8 KB that contains 256 MiB.
 DECLARES_TOO_MUCH = b"\x28\xb5\x2f\xfd\xe0" + (1 << 36).to_bytes(8, "little") + b"\x19\0\0abc"
@@ -561,10 +581,7 @@ class TestHostile:
         ids=str,
     )
     def test_wrong_chunk_in_the_identity_is_refused(self, copy: Path, chunk: Any) -> None:
-        rewritten(
-            copy / "zarr.json",
-            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=chunk),
-        )
+        identity_changed(copy, chunk=chunk)
         before = contents(copy)
         assert "which describes the grid" in check_grid(copy).problems[0]
         with pytest.raises(ValueError, match="contains another grid; chunk: "):
@@ -572,11 +589,8 @@ class TestHostile:
         assert contents(copy) == before
 
     def test_chunk_of_other_arrays_is_refused(self, copy: Path) -> None:
-        # Taken over, all that is there would be rendered again.
-        rewritten(
-            copy / "zarr.json",
-            lambda root: root["attributes"]["vkbloom_grid"].update(chunk=[1, 1, 1]),
-        )
+        # ImportedArray over, all that is there would be rendered again.
+        identity_changed(copy, chunk=[1, 1, 1])
         before = contents(copy)
         with pytest.raises(ValueError, match=r"contains another grid, and its zarr.json is"):
             make(copy, chunks=None)
@@ -616,9 +630,7 @@ class TestHostile:
     def test_damaged_identity_is_reported_and_refused(
         self, copy: Path, change: dict[str, Any]
     ) -> None:
-        rewritten(
-            copy / "zarr.json", lambda root: root["attributes"]["vkbloom_grid"].update(change)
-        )
+        identity_changed(copy, **change)
         before = contents(copy)
         report = check_grid(copy)
         assert (report.points, report.done, report.complete) == (0, 0, False)
@@ -713,7 +725,9 @@ def test_file_size_limit_leaves_no_partial_file(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
     try:
         with pytest.raises(OSError, match="File too large") as caught:
-            grid_to_zarr(image, Separable(), {"intensity": [0, 1]}, store, chunks={"intensity": 2})
+            vkbloom.grid(
+                image, Separable(), {"intensity": [0, 1]}, store=store, chunks={"intensity": 2}
+            )
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert str(caught.value).startswith(f"[Errno 27] File too large: '{store}/")
@@ -723,9 +737,9 @@ def test_file_size_limit_leaves_no_partial_file(tmp_path: Path) -> None:
 
 
 def test_custom_reductions_are_known_by_name(tmp_path: Path) -> None:
-    make(tmp_path / "a.zarr", reduce={"n": count_frames}, attachments=())
+    make(tmp_path / "a.zarr", reduce={"n": count_frames}, framebuffers=())
     with pytest.raises(ValueError, match="count_frames"):
-        make(tmp_path / "a.zarr", reduce={"n": count_other}, attachments=())
+        make(tmp_path / "a.zarr", reduce={"n": count_other}, framebuffers=())
 
 
 def count_frames(frames: Frames) -> int:

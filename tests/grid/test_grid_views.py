@@ -10,9 +10,10 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+import vkbloom
 from tests.framebuffers import noise
 from vkbloom import Renderer, Separable, contact_sheet, reductions, response_curves
-from vkbloom.grid.selection import select
+from vkbloom._grid.selection import select
 
 xr = pytest.importorskip("xarray")
 pytest.importorskip("matplotlib")
@@ -30,7 +31,9 @@ def dataset(renderer: Renderer) -> Any:
         "mean": reductions.Mean(),
         "energy": reductions.EncircledEnergy(radii=(2, 4)),
     }
-    return renderer.grid(image, Separable(), axes, attachments=("final", "bloom"), reduce=reduce)
+    return vkbloom.grid(
+        image, Separable(), axes, framebuffers=("final", "bloom"), reduce=reduce, renderer=renderer
+    )
 
 
 def pixels(png: bytes, tmp_path: Path) -> Any:
@@ -76,14 +79,14 @@ class TestContactSheet:
         assert (sheet[-20, -40] == 40).all()
 
     def test_other_framebuffers(self, dataset: Any) -> None:
-        assert contact_sheet(dataset, attachment="bloom") != contact_sheet(dataset)
+        assert contact_sheet(dataset, framebuffer="bloom") != contact_sheet(dataset)
 
     @pytest.mark.parametrize(
         ("arguments", "told"),
         [
             ({"rows": "knee"}, "rows: 'knee'"),
             ({"rows": "tonemap", "columns": "tonemap"}, "is already the horizontal axis"),
-            ({"attachment": "glow"}, "attachment: 'glow'"),
+            ({"framebuffer": "glow"}, "framebuffer: 'glow'"),
             ({"at": {"knee": 0}}, "at: 'knee'"),
             ({"at": {"intensity": 0}}, "is a shown axis"),
             ({"at": {"tonemap": "agx"}}, "has no value 'agx'"),
@@ -126,8 +129,12 @@ class TestSelect:
         self, renderer: Renderer, axis: str, values: Any, at: Any, place: int
     ) -> None:
         image = noise(6, 8, 3, dtype="uint8")
-        grid = renderer.grid(
-            image, Separable(), {"blur_scale": [0.5, 1.0], axis: values}, attachments=["final"]
+        grid = vkbloom.grid(
+            image,
+            Separable(),
+            {"blur_scale": [0.5, 1.0], axis: values},
+            framebuffers=["final"],
+            renderer=renderer,
         )
         found = select(grid, {axis: at}, ("blur_scale",))
         assert found.identical(grid.isel({axis: place}))
@@ -148,7 +155,9 @@ class TestSelect:
     def test_values_that_are_not_there(
         self, renderer: Renderer, axis: str, values: Any, at: Any
     ) -> None:
-        grid = renderer.grid(noise(6, 8, 3, dtype="uint8"), Separable(), {axis: values})
+        grid = vkbloom.grid(
+            noise(6, 8, 3, dtype="uint8"), Separable(), {axis: values}, renderer=renderer
+        )
         with pytest.raises(ValueError, match=f"at: {axis} has no value {re.escape(repr(at))}"):
             select(grid, {axis: at}, ())
 

@@ -44,25 +44,25 @@ def settings() -> Iterator[vkbloom.Settings]:
 
 
 CALLS: dict[str, Callable[[vkbloom.Renderer], object]] = {
-    "attachments each": lambda one: one.apply_each([IMAGE], attachments=("nonsense",)),
-    "attachments iterator": lambda one: one.apply_each(iter([IMAGE]), attachments="nonsense"),
-    "attachments settings": lambda one: one.apply_each(
-        iter([IMAGE]), [vkbloom.Pyramid(levels=2)], attachments=("blur_vertical",)
+    "framebuffers each": lambda one: one.map([IMAGE], framebuffers=("nonsense",)),
+    "framebuffers iterator": lambda one: one.map(iter([IMAGE]), framebuffers="nonsense"),
+    "framebuffers settings": lambda one: one.map(
+        iter([IMAGE]), [vkbloom.Pyramid(levels=2)], framebuffers=("blur_vertical",)
     ),
-    "attachments many": lambda one: one.apply_many(
-        IMAGE, [vkbloom.Pyramid(levels=2)], attachments=("nonsense",)
+    "framebuffers many": lambda one: one.sweep(
+        IMAGE, [vkbloom.Pyramid(levels=2)], framebuffers=("nonsense",)
     ),
-    "attachments scene": lambda one: one.render_many(
-        vkbloom.Scene.ufo(), [vkbloom.Pyramid(levels=2)], (64, 48), attachments=("nonsense",)
+    "framebuffers scene": lambda one: one.sweep(
+        vkbloom.Scene.ufo(), [vkbloom.Pyramid(levels=2)], size=(64, 48), framebuffers=("nonsense",)
     ),
-    "attachments type": lambda one: one.apply_many(IMAGE, settings(), attachments=(3,)),  # type: ignore[arg-type]
+    "framebuffers type": lambda one: one.sweep(IMAGE, settings(), framebuffers=(3,)),  # type: ignore[arg-type]
     "psf: 'spencer'": lambda _: vkbloom.Convolution(psf="spencer"),
     "psf: complex": lambda _: vkbloom.Convolution(psf=np.ones((3, 3), complex)),
     "psf: an array": lambda _: vkbloom.Convolution(psf=[[1, 2], [3]]),
     "image: an array is needed, not 'dirt.png'": lambda _: vkbloom.Dirt(image="dirt.png"),
     "radii": lambda _: vkbloom.psf.spencer().encircled_energy(["x"]),
-    "reduce: 3": lambda one: one.grid(IMAGE, axes={"exposure": [2]}, reduce=3),  # type: ignore[arg-type]
-    "axes: {3: [1]}": lambda one: one.grid(IMAGE, axes={3: [1]}),  # type: ignore[dict-item]
+    "reduce: 3": lambda one: vkbloom.grid(IMAGE, axes={"exposure": [2]}, reduce=3, renderer=one),  # type: ignore[arg-type]
+    "axes: {3: [1]}": lambda one: vkbloom.grid(IMAGE, axes={3: [1]}, renderer=one),  # type: ignore[dict-item]
     "metadata: 3": lambda _: vkbloom.write("o.png", IMAGE, metadata=3),  # type: ignore[arg-type]
     "path: b'o.png'": lambda _: vkbloom.write(b"o.png", IMAGE),  # type: ignore[arg-type]
     "path: b'i.png'": lambda _: vkbloom.read(b"i.png"),  # type: ignore[call-overload]
@@ -92,5 +92,5 @@ def test_subimages_are_integers(tmp_path: Path, subimage: Any) -> None:
 def test_names_of_levels_of_larger_images_are_accepted(renderer: vkbloom.Renderer) -> None:
     image = np.zeros((300, 300, 3), np.float32)
     settings = vkbloom.Pyramid(levels=7)
-    (frames,) = renderer.apply_each(iter([image]), settings, attachments=("down_6",))
+    (frames,) = renderer.map(iter([image]), settings, framebuffers=("down_6",))
     assert list(frames) == ["down_6"]

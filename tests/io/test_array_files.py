@@ -25,7 +25,7 @@ from tests.io.profiles import (
     store_png,
     to_xyz,
 )
-from vkbloom.io.srgb import decode_srgb, encode_srgb
+from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.checks import check_image, check_mask
+from vkbloom._checks import check_image, check_mask
 
 IMAGE = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
 
@@ -51,7 +51,9 @@ def test_data_arrays_in_any_order(renderer: vkbloom.Renderer) -> None:
         ValueError, match=r"\('a', 'b', 'c'\) are not y, x, channel; rename them: image\.rename"
     ):
         renderer.apply(image.rename(y="a", x="b", channel="c"))
-    grid: Any = renderer.grid(image, axes={"intensity": [0.5, 1]}, attachments=("final", "bloom"))
+    grid: Any = vkbloom.grid(
+        image, axes={"intensity": [0.5, 1]}, framebuffers=("final", "bloom"), renderer=renderer
+    )
     again = renderer.apply(grid["final"].isel(intensity=1))
     assert again["final"].shape == IMAGE.shape
     bloom = renderer.apply(grid["bloom"].isel(intensity=1))

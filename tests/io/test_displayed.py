@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom.cli.program import program
-from vkbloom.reference import tone_map
+from vkbloom._cli.program import program
+from vkbloom.reference import _tone_map as tone_map
 
 oiio = pytest.importorskip("OpenImageIO")
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -179,8 +179,8 @@ class TestCommandLine:
         file, _ = self.apply(tmp_path, "b.png", "--view", f"{display}/{HDR}")
         assert chunk(file, b"cICP") == bytes([9, 16, 0, 1])
         np.testing.assert_allclose(stored(file), shown(RAMP, display, HDR), atol=HALF)
-        monkeypatch.setattr("vkbloom.large_files.LARGE", 1)
-        monkeypatch.setattr("vkbloom.cli.applied.is_large", lambda *_: True)
+        monkeypatch.setattr("vkbloom._cli.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom._cli.applied.is_large", lambda *_: True)
         again, _ = self.apply(tmp_path, "c.png", "--view", f"{display}/{HDR}")
         assert np.array_equal(stored(again), stored(file))
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
-from vkbloom.io import rows
-from vkbloom.io.image_reading import decode
-from vkbloom.io.srgb import decode_srgb
+from vkbloom._io import rows
+from vkbloom._io.image_reading import decode
+from vkbloom._io.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")

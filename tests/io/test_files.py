@@ -22,12 +22,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-import vkbloom.io.files
+import vkbloom._renderer.frame_files
 from tests.exhaustive import by_turns
 from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, noise, read
 from vkbloom import Separable
-from vkbloom.frames import Frames
-from vkbloom.io import safe_writing
+from vkbloom._io import safe_writing
+from vkbloom._renderer.frames import Frames
 
 
 @pytest.fixture
@@ -368,7 +368,7 @@ class TestWriteErrors:
         def interrupted(*_: Any) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("vkbloom.io.safe_writing.os.posix_fallocate", interrupted)
+        monkeypatch.setattr("vkbloom._io.safe_writing.os.posix_fallocate", interrupted)
         with pytest.raises(KeyboardInterrupt):
             safe_writing.reserve(tmp_path / "a.png", 9)
         assert names_in(tmp_path) == []
@@ -382,7 +382,7 @@ class TestWriteErrors:
         file, old, new = tmp_path / name, b"o" * 300_000, b"n" * 200_000
         code = (
             "from pathlib import Path\n"
-            "from vkbloom.io.safe_writing import write_file\n"
+            "from vkbloom._io.safe_writing import write_file\n"
             f"file = Path({str(file)!r})\n"
             "while True:\n"
             "    write_file(file, b'n' * 200_000)\n"
@@ -455,7 +455,7 @@ class TestWriteErrors:
             {"glow": noise(2, 2, 4, dtype="uint8"), "final": noise(9, 9, 3, dtype="uint8")}
         )
         (tmp_path / "out_glow.png").write_text("the one before")
-        original = vkbloom.io.files._write_image
+        original = vkbloom._renderer.frame_files._write_image
 
         def write_image(oiio: Any, frames: Frames, name: str, *files: Path) -> bool:
             if name == "final":
@@ -463,7 +463,7 @@ class TestWriteErrors:
             return original(oiio, frames, name, *files)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(vkbloom.io.files, "_write_image", write_image)
+            patch.setattr(vkbloom._renderer.frame_files, "_write_image", write_image)
             with pytest.raises(OSError, match=r"out_final\.png"):
                 frames.save(tmp_path / "out.png")
         assert names_in(tmp_path) == ["out_glow.png"]

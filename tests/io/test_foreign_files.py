@@ -23,10 +23,10 @@ from tests.io.profiles import (
     store_png,
     to_xyz,
 )
-from vkbloom.io import rows
-from vkbloom.io.containers import orientation_of
-from vkbloom.io.image_reading import decode, is_photograph, opened
-from vkbloom.io.srgb import decode_srgb, encode_srgb
+from vkbloom._io import rows
+from vkbloom._io.containers import orientation_of
+from vkbloom._io.image_reading import decode, is_photograph, opened
+from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")

@@ -11,7 +11,7 @@ import pytest
 
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output
-from vkbloom.scene import skybox
+from vkbloom._scene import skybox
 
 RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
 GLSLANG = any(map(shutil.which, ("glslangValidator", "glslang")))
@@ -22,9 +22,8 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address s
 @pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="a sanitizer needs the address space")
 def test_a_short_run(tmp_path: Path) -> None:
     # In one process, since most of a short run would be imports.
-    names = ["gltf", "ktx", "faces", "equirectangular", "pipelines"]
-    names += ["zarr", "images", "toml", "yaml"]
-    # Of own methods tests/own tests mutations without the compiler, which takes most of the time.
+    names = ["gltf", "ktx", "faces", "equirectangular", "pipelines", "zarr", "images"]
+    # tests/custom tests mutations of custom methods without the compiler, which takes longest.
     names += ["own"] if EXHAUSTIVE and GLSLANG else []
     amount = ["--seconds", "2"] if EXHAUSTIVE else ["--seconds", "0.2", "--inputs", "10"]
     printed = output(RUN, *names, "--plain", *amount, cwd=tmp_path)

@@ -14,12 +14,12 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.io.parts import store_parts
-from vkbloom.io import safe_writing
-from vkbloom.io.displayed import Saved
-from vkbloom.io.image_reading import decode, load
-from vkbloom.io.image_writing import check_writable, save
-from vkbloom.io.images import Picture, SavedColour, Window
-from vkbloom.io.srgb import decode_srgb, encode_srgb
+from vkbloom._io import safe_writing
+from vkbloom._io.displayed import Saved
+from vkbloom._io.image_reading import decode, load
+from vkbloom._io.image_writing import check_writable, save
+from vkbloom._io.images import Picture, SavedColour, Window
+from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vkbloom import BlenderGlare, Convolution, Pyramid, Renderer, kept_arrays, psf
-from vkbloom.core_kernel import CoreKernel, core_kernel
-from vkbloom.io import kernel_cache
+from vkbloom import BlenderGlare, Convolution, Pyramid, Renderer, psf
+from vkbloom import _array_cache as array_cache
+from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom.psf import _kernel_cache as kernel_cache
 
 SPREAD = psf.spencer()
 APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
@@ -24,9 +25,9 @@ APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(kernel_cache, "_written", 0)
-    monkeypatch.setattr(kernel_cache, "LEAST_SECONDS", 0)
+    monkeypatch.setattr(kernel_cache, "MIN_SECONDS", 0)
     # Nothing is found in memory.
-    monkeypatch.setattr(kept_arrays, "_of_renderers", lambda: kept_arrays.KeptArrays(0, 0))
+    monkeypatch.setattr(array_cache, "_of_renderers", lambda: array_cache.ArrayCache(0, 0))
     return tmp_path / "cache" / "kernels"
 
 
@@ -129,7 +130,7 @@ def test_many_at_once_leave_one_whole_file(folder: Path) -> None:
 def test_files_are_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kernel_cache.find_or_make((0,), kernel_of(1))
     size = next(folder.iterdir()).stat().st_size
-    monkeypatch.setattr(kernel_cache, "MOST_BYTES", 3 * size)
+    monkeypatch.setattr(kernel_cache, "MAX_BYTES", 3 * size)
     for number in (1, 2, 0, 3):  # 0 is found, so that 1 is the oldest.
         # Of another process each.
         monkeypatch.setattr(kernel_cache, "_written", 0)
@@ -144,7 +145,7 @@ def test_files_are_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_sweep_does_not_replace_all_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kernel_cache.find_or_make((0,), kernel_of(1))
     size = next(folder.iterdir()).stat().st_size
-    monkeypatch.setattr(kernel_cache, "MOST_BYTES", 3 * size)
+    monkeypatch.setattr(kernel_cache, "MAX_BYTES", 3 * size)
     for number in range(1, 9):
         kernel_cache.find_or_make((number,), kernel_of(1))
     for number in range(3):
@@ -229,7 +230,7 @@ def test_only_what_took_long_has_a_file(
         now += seconds
         return kernel_of(1)()
 
-    monkeypatch.setattr(kernel_cache, "LEAST_SECONDS", 2)
+    monkeypatch.setattr(kernel_cache, "MIN_SECONDS", 2)
     monkeypatch.setattr("time.thread_time", lambda: now)
     kernel_cache.find_or_make((SPREAD,), make)
     assert len([*folder.glob("*")]) == files

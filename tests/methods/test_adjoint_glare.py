@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import vkbloom
 from tests.methods.reference_cases import random_image
 from tests.methods.test_adjoint_passes import check
 from vkbloom import BlenderGlare, Ghosts, Halo, Pyramid, Renderer, reference
-from vkbloom.core_access import core_of
-from vkbloom.gradients.passes import DeviceGradients
-from vkbloom.sources import Inputs
+from vkbloom._gradients.passes import DeviceGradients
+from vkbloom._renderer.sources import Inputs
 
 VARIANTS = ("fragment", "cpu", "gpu")
 #: Sides that are odd and even, one pixel, and less than a sample.
@@ -49,7 +49,7 @@ def both(
     renderer: Renderer, settings: Any, image: Any, name: str = "final"
 ) -> tuple[Any, Any, dict[str, Any]]:
     """The framebuffer, the derivative on the device by the image, and the cotangent."""
-    frames, pullback = renderer.vjp(image, settings)
+    frames, pullback = vkbloom.vjp(image, settings, renderer=renderer)
     shape = frames[name].shape
     cotangents = {name: np.random.default_rng(5).standard_normal(shape).astype(np.float32)}
     found = pullback(cotangents)
@@ -88,7 +88,7 @@ def sums_of(renderer: Renderer, image: Any, settings: Any) -> Any:
     """The passes that gather samples of ghosts and halos."""
     source = Inputs(image).source((image,))
     floats = settings.replace(format="rgba32float")
-    plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+    plan = renderer._core.adjoint(source, floats, ("final",), False)
     return plan and [name for _, name, *_ in plan.passes if name.startswith("adjoint_moved")]
 
 
@@ -118,7 +118,7 @@ def test_what_needs_too_many_sums_comes_from_the_reference(renderer: Renderer) -
     image = random_image(100, 400, channels=3, seed=1).astype(np.float32)
     assert sums_of(renderer, image, settings) is None
     cotangents = {"final": image}
-    found = renderer.vjp(image, settings)[1](cotangents)
+    found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
     assert not isinstance(found, DeviceGradients)
     check(found, reference.vjp(image, settings)[1](cotangents), "image")
 
@@ -169,7 +169,7 @@ def test_many_pixels_are_behind_a_texel_near_the_sun(renderer: Renderer) -> None
     image = random_image(500, 251, channels=3, seed=1).astype(np.float32)
     source = Inputs(image).source((image,))
     floats = settings.replace(format="rgba32float")
-    plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+    plan = renderer._core.adjoint(source, floats, ("final",), False)
     assert plan
     assert sum(name.startswith("adjoint_beams") for _, name, *_ in plan.passes) == 3
     frame, found, cotangents = both(renderer, settings, image, "bloom")

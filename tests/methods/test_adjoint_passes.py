@@ -26,9 +26,8 @@ from vkbloom import (
     UrpBloom,
     reference,
 )
-from vkbloom.core_access import core_of
-from vkbloom.gradients.passes import DeviceGradients, Passes
-from vkbloom.sources import Inputs
+from vkbloom._gradients.passes import DeviceGradients, Passes
+from vkbloom._renderer.sources import Inputs
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, and those that are checked in all sizes.
@@ -111,7 +110,7 @@ CASES: dict[str, Any] = {
 
 
 def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
-    frames, pullback = renderer.vjp(image, settings, **given)
+    frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
     random = np.random.default_rng(5)
     cotangents = {
         name: random.standard_normal(frames[name].shape).astype(np.float32)
@@ -184,18 +183,18 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             pixels = random.random((*size, 4)) ** 2 * (255 if dtype == "u1" else 1.5)
             image = pixels.astype(dtype)
             cotangents = {"final": random.standard_normal(image.shape).astype(np.float32)}
-            found = renderer.vjp(image, settings)[1](cotangents)
+            found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
             check(found, reference.vjp(image, settings)[1](cotangents), "image")
             floats = settings.replace(format="rgba32float")
             source = Inputs(image).source((cotangents["final"],))
-            plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+            plan = renderer._core.adjoint(source, floats, ("final",), False)
             assert plan
             shaders = [shader for _, shader, *_ in plan.passes]
             assert shaders == ["tile_comp", "adjoint_tile_comp"][2 - passes :]
             # The sums need the images between; the other derivatives keep their bits.
             both = Passes(renderer, Inputs(image), floats, cotangents)
             both.fields()
-            again = renderer.vjp(image, settings)[1](cotangents)
+            again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
             assert np.array_equal(again["image"], found["image"])
 
 
@@ -227,13 +226,13 @@ def shaders_of_transpose(
     # A finite image has another pipeline.
     for value in (0.5, np.nan):
         image[0, 0, 1] = value
-        found = renderer.vjp(image, settings)[1](cotangents)
+        found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         check(found, reference.vjp(image, settings)[1](cotangents), "image")
-        again = renderer.vjp(image, settings)[1](cotangents)
+        again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         assert np.array_equal(again["image"], found["image"])
     source = Inputs(image).source((cotangents["final"],))
     floats = settings.replace(format="rgba32float")
-    plan = core_of(renderer).adjoint(source, floats, ("final",), False)
+    plan = renderer._core.adjoint(source, floats, ("final",), False)
     assert plan
     return [shader for _, shader, *_ in plan.passes]
 
@@ -280,7 +279,7 @@ def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
         Separable(glare=(vkbloom.Streaks(halvings=1, iterations=1),)),
         vkbloom.Convolution(psf=KERNEL),
     ):
-        found = renderer.vjp(image, settings)[1](cotangents)
+        found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         assert isinstance(found, DeviceGradients)
         check(found, reference.vjp(image, settings)[1](cotangents), "image")
 
@@ -310,10 +309,10 @@ def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) ->
         # A finite image has another pipeline.
         for value in (0.5, np.nan):
             image[3, 4, 1] = value
-            found = renderer.vjp(image, settings)[1](cotangents)
+            found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
             check(found, reference.vjp(image, settings)[1](cotangents), "image")
         source = Inputs(image).source((cotangents["final"],))
-        plan = core_of(renderer).adjoint(source, settings, ("final",), False)
+        plan = renderer._core.adjoint(source, settings, ("final",), False)
     assert plan
     words = {"adjoint_taps_words_rgba32float"}
     blocks = {"adjoint_filter_dispatch", "adjoint_taps_comp_rgba32float"}

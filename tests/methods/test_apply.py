@@ -148,7 +148,7 @@ def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -
     # As bright as a stage of 8 bits lets it be.
     value: Any = int(255 * 0.95 / max(gain, 1.0)) if dtype == "uint8" else 3.0
     image = flat(value, dtype)
-    bloom = renderer.apply(image, settings, attachments="bloom")["bloom"][..., :3]
+    bloom = renderer.apply(image, settings, framebuffers="bloom")["bloom"][..., :3]
     expected = np.full(bloom.shape, gain * float(real(image)[0, 0, 0]))
     assert_close("bloom", bloom, expected, tolerance(dtype, expected, stages_of_8_bits=2))
 
@@ -166,7 +166,7 @@ def test_gain_passes_the_threshold(
 ) -> None:
     dtype, method = other
     settings = METHODS[method].replace(threshold=threshold, knee=knee)
-    bloom = renderer.apply(flat(1, dtype), settings, attachments="bloom")["bloom"][..., :3]
+    bloom = renderer.apply(flat(1, dtype), settings, framebuffers="bloom")["bloom"][..., :3]
     expected = np.full(bloom.shape, reference.gain(settings))
     assert_close("bloom", bloom, expected, tolerance(dtype, expected))
 
@@ -186,7 +186,7 @@ ENCODINGS = ("none", "gamma22", "srgb", "pq", "hlg")
 
 def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:
     """Compare final with what the reference makes of the renderer's own bloom."""
-    frames = renderer.apply(image, settings, attachments=("bloom", "final"))
+    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
     expected = reference.composite(image, frames["bloom"], settings)
     limit = tolerance(image.dtype, expected)
     assert_close("final", frames["final"], expected, limit)
@@ -243,7 +243,7 @@ def test_intensity(renderer: Renderer, dtype: str, composite: Any, intensity: fl
     settings = Separable(composite=composite, intensity=intensity, blur_strength=0.5)
     assert_composite(renderer, bright(dtype), settings)
     image = bright(dtype)
-    final = renderer.apply(image, settings, attachments="final")["final"]
+    final = renderer.apply(image, settings, framebuffers="final")["final"]
     if intensity == 0:
         # Nothing of the bloom comes in; screen costs a rounding, 1 - (1 - s).
         limit = 0.0 if composite != "screen" else tolerance(dtype, real(image)) / 2
@@ -328,7 +328,7 @@ def test_a_grey_level_that_is_the_threshold_stays_out(renderer: Renderer) -> Non
     ramp = np.repeat(levels[None, :, None], 3, axis=2)
     for level in some(range(256), 52):
         settings = Separable(threshold=level / 255)
-        glow = renderer.apply(ramp, settings, attachments="glow")["glow"][0, :, 0]
+        glow = renderer.apply(ramp, settings, framebuffers="glow")["glow"][0, :, 0]
         np.testing.assert_array_equal(glow, np.where(levels > level, levels, 0), str(level))
 
 
@@ -339,9 +339,9 @@ def test_a_flat_grey_that_is_the_threshold_stays_out_at_every_size(
     for level in (51, 102, 153, 204, 255):
         flat = np.full((9, 13, 3), level, np.uint8)
         settings = Separable(threshold=level / 255, bloom_scale=scale)
-        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()
+        assert not renderer.apply(flat, settings, framebuffers="glow")["glow"][..., :3].any()
         settings = Separable(threshold=(level - 1) / 255, bloom_scale=scale)
-        glow = renderer.apply(flat, settings, attachments="glow")["glow"]
+        glow = renderer.apply(flat, settings, framebuffers="glow")["glow"]
         np.testing.assert_array_equal(glow[..., :3], level)
 
 
@@ -353,4 +353,4 @@ def test_flat_floats_of_the_threshold_stay_out_at_every_size(
     for value in (0.1, 0.3, 0.7, 1.0, 1.1, 3.0):
         flat = np.full((37, 41, 3), value, dtype)
         settings = Separable(threshold=float(dtype(value)), bloom_scale=scale)
-        assert not renderer.apply(flat, settings, attachments="glow")["glow"][..., :3].any()
+        assert not renderer.apply(flat, settings, framebuffers="glow")["glow"][..., :3].any()

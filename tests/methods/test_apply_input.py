@@ -201,7 +201,7 @@ def test_nan_and_infinity_stay_in_final(
     settings = Separable(
         composite=composite, tonemap=tonemap, encoding=encoding, exposure=1.0, intensity=0.5
     )
-    frames = renderer.apply(image, settings, attachments=("bloom", "final"))
+    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
     special = ~np.isfinite(image)
     assert_array_equal(frames["final"][special], image[special])
     # The pixel's other channels, too: to the curves that mix them, these count as 0.
@@ -242,7 +242,7 @@ def test_infinity_does_not_pass_the_threshold(
     image = np.zeros((3, 3, 3), np.float32)
     image[1, 1] = (np.inf, 0.0, 0.0)
     settings = Separable(threshold=threshold, knee=knee)
-    glow = renderer.apply(image, settings, attachments="glow")["glow"]
+    glow = renderer.apply(image, settings, framebuffers="glow")["glow"]
     assert not glow[..., :3].any()
 
 
@@ -301,18 +301,18 @@ def test_alpha_is_untouched(
     assert_array_equal(frames["bloom"], opaque["bloom"])
 
 
-# --- Attachments and out ---
+# --- Framebuffers and out ---
 
 
-def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> None:
+def test_framebuffers_come_in_the_order_of_the_data_flow(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8", seed=8)
     whole = renderer.apply(image, Separable())
-    frames = renderer.apply(image, Separable(), attachments=["final", "glow", "final"])
+    frames = renderer.apply(image, Separable(), framebuffers=["final", "glow", "final"])
     assert list(frames) == ["glow", "final"]
     for name, array in frames.items():
         assert_array_equal(array, whole[name])
-    assert list(renderer.apply(image, Separable(), attachments="bloom")) == ["bloom"]
-    assert list(renderer.apply(image, Separable(), attachments=())) == []
+    assert list(renderer.apply(image, Separable(), framebuffers="bloom")) == ["bloom"]
+    assert list(renderer.apply(image, Separable(), framebuffers=())) == []
 
 
 @pytest.mark.parametrize(
@@ -326,15 +326,15 @@ def test_attachments_come_in_the_order_of_the_data_flow(renderer: Renderer) -> N
         (Separable(), "image"),
     ],
 )
-def test_unknown_attachment(renderer: Renderer, settings: Settings, name: str) -> None:
-    with pytest.raises(ValueError, match=rf"attachments: unknown framebuffer '{name}'.*final"):
-        renderer.apply(picture(4, 4, 3, "uint8"), settings, attachments=(name,))
+def test_unknown_framebuffer(renderer: Renderer, settings: Settings, name: str) -> None:
+    with pytest.raises(ValueError, match=rf"framebuffers: unknown framebuffer '{name}'.*final"):
+        renderer.apply(picture(4, 4, 3, "uint8"), settings, framebuffers=(name,))
 
 
-def test_attachments_of_the_wrong_type(renderer: Renderer) -> None:
+def test_framebuffers_of_the_wrong_type(renderer: Renderer) -> None:
     wrong: Any = (1,)
-    with pytest.raises(TypeError, match="attachments"):
-        renderer.apply(picture(4, 4, 3, "uint8"), Separable(), attachments=wrong)
+    with pytest.raises(TypeError, match="framebuffers"):
+        renderer.apply(picture(4, 4, 3, "uint8"), Separable(), framebuffers=wrong)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -433,7 +433,7 @@ def test_framebuffers_outlive_the_renderer() -> None:
 # --- Many settings ---
 
 
-def test_apply_many(renderer: Renderer) -> None:
+def test_sweep_of_images(renderer: Renderer) -> None:
     image = picture(30, 20, 3, "float32", seed=15)
     sequence: list[Settings] = [
         *METHODS.values(),
@@ -442,14 +442,14 @@ def test_apply_many(renderer: Renderer) -> None:
         *METHODS.values(),
     ]
     count = 0
-    for settings, frames in zip(sequence, renderer.apply_many(image, sequence), strict=True):
+    for settings, frames in zip(sequence, renderer.sweep(image, sequence), strict=True):
         assert frames.settings == settings
         assert_matches_reference(frames, image, settings)
         count += 1
     assert count == len(sequence)
 
 
-def test_apply_many_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
+def test_sweep_of_images_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
     image = picture(30, 20, 3, "float32", seed=16)
     asked = []
 
@@ -458,7 +458,7 @@ def test_apply_many_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
             asked.append(exposure)
             yield Separable(exposure=exposure, tonemap="aces")
 
-    frames = renderer.apply_many(image, exposures(), attachments=("final",))
+    frames = renderer.sweep(image, exposures(), framebuffers=("final",))
     assert asked == []
     first = next(frames)
     assert asked == [0.0]
@@ -467,36 +467,36 @@ def test_apply_many_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
     assert [len(rest.timings) for rest in frames] == [4, 1]
 
 
-def test_apply_many_stops_at_a_wrong_one(renderer: Renderer) -> None:
-    wrong: Any = [Separable(), "separable"]
-    frames = renderer.apply_many(picture(4, 4, 3, "uint8"), wrong)
+def test_sweep_of_images_stops_at_a_wrong_one(renderer: Renderer) -> None:
+    wrong: Any = [Separable(), Separable]
+    frames = renderer.sweep(picture(4, 4, 3, "uint8"), wrong)
     next(frames)
     with pytest.raises(TypeError, match="settings"):
         next(frames)
 
 
-def test_render_many(renderer: Renderer, scene: Scene) -> None:
+def test_sweep_of_a_scene(renderer: Renderer, scene: Scene) -> None:
     sequence = [Separable(), Separable(blur_strength=0.5), Separable(bloom=False)]
     for settings, frames in zip(
         sequence,
-        renderer.render_many(scene, sequence, (64, 36), time=0.25),
+        renderer.sweep(scene, sequence, size=(64, 36), time=0.25),
         strict=True,
     ):
         assert frames.settings == settings
         assert_same(frames, renderer.render(scene, settings, (64, 36), time=0.25))
     names = [
         list(frames)
-        for frames in renderer.render_many(
-            scene, sequence[:2], (64, 36), attachments=("bloom", "final")
+        for frames in renderer.sweep(
+            scene, sequence[:2], size=(64, 36), framebuffers=("bloom", "final")
         )
     ]
     assert names == [["bloom", "final"]] * 2
 
 
-def test_render_many_runs_what_changed(renderer: Renderer, scene: Scene) -> None:
+def test_sweep_of_a_scene_runs_what_changed(renderer: Renderer, scene: Scene) -> None:
     sequence = [Separable(blur_strength=strength) for strength in (1.0, 2.0, 3.0)]
     # At a time of its own: what an earlier test drew would not be drawn again.
-    frames = list(renderer.render_many(scene, sequence, (64, 36), time=0.4321))
+    frames = list(renderer.sweep(scene, sequence, size=(64, 36), time=0.4321))
     for later in frames[1:]:
         assert later.timings
         assert "glow" not in later.timings
@@ -608,7 +608,7 @@ def test_long_odd_side(renderer: Renderer, method: str, side: int | None) -> Non
         assert_matches_reference(frames, view, METHODS[method])
 
 
-@pytest.mark.parametrize("settings", ["separable", {}, Separable, 1.5], ids=str)
+@pytest.mark.parametrize("settings", [{}, Separable, 1.5], ids=str)
 def test_settings_of_the_wrong_type(renderer: Renderer, settings: Any) -> None:
     with pytest.raises(TypeError, match="settings"):
         renderer.apply(picture(4, 4, 3, "uint8"), settings)
@@ -617,7 +617,7 @@ def test_settings_of_the_wrong_type(renderer: Renderer, settings: Any) -> None:
 def test_closed_renderer() -> None:
     image = picture(4, 4, 3, "uint8")
     renderer = vkbloom.Renderer()
-    frames = renderer.apply_many(image, [Separable(), Separable()])
+    frames = renderer.sweep(image, [Separable(), Separable()])
     next(frames)
     renderer.close()
     renderer.close()
@@ -630,8 +630,8 @@ def test_closed_renderer() -> None:
 def test_failed_call_keeps_the_previous_framebuffers(renderer: Renderer) -> None:
     image = picture(8, 8, 3, "uint8", seed=18)
     renderer.apply(image, Separable())
-    with pytest.raises(ValueError, match="attachments"):
-        renderer.apply(255 - image, Separable(), attachments=("nothing",))
+    with pytest.raises(ValueError, match="framebuffers"):
+        renderer.apply(255 - image, Separable(), framebuffers=("nothing",))
     with pytest.raises(ValueError, match="out"):
         renderer.apply(255 - image, Separable(), out={"final": np.zeros((8, 8, 4), np.uint8)})
     again = renderer.apply(image, Separable())

@@ -10,7 +10,7 @@ import pytest
 import vkbloom
 from tests.exhaustive import by_turns
 from vkbloom import Renderer, Settings
-from vkbloom.bands import Band, BloomByBands
+from vkbloom._cli.bands import Band, BloomByBands
 
 WIDTH = 29
 # A height that those of all levels divide, and one without a common divisor.
@@ -65,7 +65,7 @@ def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: 
     bands = list(bloom.finals(chunks(image)))
     assert len(bands) > 2
     whole = renderer.apply(
-        image.image, settings, mask=image.mask, emission=image.emission, attachments=("final",)
+        image.image, settings, mask=image.mask, emission=image.emission, framebuffers=("final",)
     )
     final = np.concatenate(bands)
     if name == "fixed" and renderer.info.type != "cpu":
@@ -131,7 +131,7 @@ def test_wrong_parts_are_refused(renderer: Renderer) -> None:
         plan(("final",), (8, ("up_0",) * 8, 0))
     with pytest.raises(ValueError, match="8 levels are out of range"):
         image.source((level,) * 8)
-    scene = vkbloom.sources.scene_source(vkbloom.Scene.ufo(), (8, 8), "forward", 0.0)
+    scene = vkbloom._renderer.sources.scene_source(vkbloom.Scene.ufo(), (8, 8), "forward", 0.0)
     with pytest.raises(ValueError, match="only images have bands"):
         core.bands(scene, settings, 8)
     with pytest.raises(ValueError, match="only images have bands"):

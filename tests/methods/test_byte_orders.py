@@ -42,19 +42,23 @@ def _written(array: Image) -> Image:
 def _saved(renderer: Renderer, array: Image, given: Image) -> Image:
     file = Path("final.png" if array.dtype.kind == "u" else "final.exr")
     out = np.zeros_like(given)
-    renderer.apply(array, SETTINGS, attachments="final", out={"final": out}).save(file)
+    renderer.apply(array, SETTINGS, framebuffers="final", out={"final": out}).save(file)
     return vkbloom.read(file)
 
 
 #: What calls make of an array `given`, which equals the native `array`.
 CALLS: dict[str, Call] = {
     "apply": lambda r, array, given: r.apply(given, SETTINGS)["final"],
-    "apply_each": lambda r, array, given: next(r.apply_each(given[None], SETTINGS))["final"],
-    "apply_many": lambda r, array, given: next(r.apply_many(given, [SETTINGS]))["final"],
+    "map": lambda r, array, given: next(r.map(given[None], SETTINGS))["final"],
+    "sweep": lambda r, array, given: next(r.sweep(given, [SETTINGS]))["final"],
     "upload": lambda r, array, given: r.apply(r.upload(given), SETTINGS)["final"],
     "plan": lambda r, array, given: len(r.plan(given, SETTINGS).passes),
-    "vjp": lambda r, array, given: r.vjp(given, SETTINGS)[1]({"final": PLAIN})["intensity"],
-    "cotangents": lambda r, array, given: r.vjp(PLAIN, SETTINGS)[1]({"final": given})["image"],
+    "vjp": lambda r, array, given: vkbloom.vjp(given, SETTINGS, renderer=r)[1]({"final": PLAIN})[
+        "intensity"
+    ],
+    "cotangents": lambda r, array, given: vkbloom.vjp(PLAIN, SETTINGS, renderer=r)[1](
+        {"final": given}
+    )["image"],
     "emission": lambda r, array, given: r.apply(array, SETTINGS, emission=given)["final"],
     "mask": lambda r, array, given: r.apply(PLAIN, SETTINGS, mask=_mask(given))["final"],
     "out": _filled,
@@ -62,7 +66,7 @@ CALLS: dict[str, Call] = {
     "fit": lambda r, array, given: (
         vkbloom.fit(given, given, SETTINGS, "intensity", renderer=r, max_calls=3).loss
     ),
-    "grid": lambda r, array, given: r.grid(given, SETTINGS, {"intensity": [0.5]})[
+    "grid": lambda r, array, given: vkbloom.grid(given, SETTINGS, {"intensity": [0.5]}, renderer=r)[
         "final"
     ].to_numpy(),
     "write": lambda r, array, given: _written(given),

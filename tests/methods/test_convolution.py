@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import some
 from vkbloom import Convolution, Renderer, Settings, psf, reference
-from vkbloom.reference.convolution import convolve, prefiltered
+from vkbloom.reference._convolution import convolve, prefiltered
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
 
@@ -220,7 +220,7 @@ def test_batches(renderer: Renderer) -> None:
     """Each request has its own kernel."""
     image = image_of(24, 17)
     sequence = [Convolution(psf.gaussian(sigma), kernel_size=(9, 9)) for sigma in (0.5, 1, 2)]
-    for frames, settings in zip(renderer.apply_many(image, sequence), sequence, strict=True):
+    for frames, settings in zip(renderer.sweep(image, sequence), sequence, strict=True):
         expected = reference.apply(image, settings)
         np.testing.assert_allclose(frames["bloom"], expected["bloom"], atol=1e-5 * 10)
         np.testing.assert_allclose(frames["kernel"], expected["kernel"], atol=1e-7)

@@ -13,7 +13,7 @@ from tests.exhaustive import by_turns
 from tests.methods.cases import METHODS, presets_of_low_levels
 from tests.methods.reference_cases import random_image
 from vkbloom import reference
-from vkbloom.reference.derivatives import DISCRETE, differentiable
+from vkbloom.reference._derivatives import DISCRETE, differentiable
 
 # Odd sides, and sides of one pixel.
 SIZES = ((17, 11), (8, 6), (1, 9), (13, 1), (1, 1))

@@ -16,8 +16,8 @@ from tests.framebuffers import read
 from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, UnrealBloom, reference
-from vkbloom.cli.program import program
-from vkbloom.scene.textures import Texture
+from vkbloom._cli.program import program
+from vkbloom._scene.textures import Texture
 
 Array = NDArray[Any]
 
@@ -30,7 +30,7 @@ def flat(size: tuple[int, int], level: int) -> NDArray[np.uint8]:
 
 
 def final(renderer: Renderer, image: Array, settings: Settings) -> Array:
-    return renderer.apply(image, settings, attachments=("final",))["final"]
+    return renderer.apply(image, settings, framebuffers=("final",))["final"]
 
 
 def mixed(place: int, row: int, seed: int) -> list[int]:
@@ -210,7 +210,7 @@ def test_the_reference_dithers_alike(renderer: Renderer, settings: Settings, cha
 
 def test_the_command_line_dithers(tmp_path: Any) -> None:
     words = ["render", "--size", "64x36", "--shading", "deferred"]
-    words += ["--attachments", "final"]
+    words += ["--framebuffers", "final"]
     for name, more in (("plain", []), ("a", ["--dither"]), ("b", ["--dither-seed", "5"])):
         extra = [*more, "--dither"] if name == "b" else more
         result = CliRunner().invoke(program, [*words, *extra, "-o", str(tmp_path / f"{name}.png")])

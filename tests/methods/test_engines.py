@@ -26,8 +26,8 @@ from vkbloom import (
     UrpBloom,
     reference,
 )
-from vkbloom.reference import bevy
-from vkbloom.reference.image import BlurInput, Storage
+from vkbloom.reference import _bevy as bevy
+from vkbloom.reference._image import BlurInput, Storage
 
 Array = NDArray[Any]
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.images import hdr_picture, picture
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
@@ -192,8 +193,8 @@ def test_variants(monkeypatch: pytest.MonkeyPatch, settings: Settings) -> None:
     for form in ("fragment", "cpu", "gpu"):
         monkeypatch.setenv("VKBLOOM_VARIANT", form)
         with Renderer("software", validation=True) as own:
-            alone = own.apply(image, settings, attachments="final")["final"]
-            own.apply(image[::-1], settings, attachments="final")
+            alone = own.apply(image, settings, framebuffers="final")["final"]
+            own.apply(image[::-1], settings, framebuffers="final")
             found[form] = dict(own.apply(image, settings))
         np.testing.assert_array_equal(alone, found[form]["final"])
     for name, array in found["fragment"].items():
@@ -296,7 +297,7 @@ def test_change_of_dirt_runs_only_dependent_passes(new_renderer: Callable[[], Re
     weak = own.apply(image, settings.replace(**{"glare.0.strength": 0.5}))
     assert list(weak.timings) == ["dirty_light", "final"]
     sequence = [settings.replace(**{"glare.0.image": DIRT * share}) for share in (1, 0.5, 0.25)]
-    for frames, one in zip(own.apply_many(image, sequence), sequence, strict=True):
+    for frames, one in zip(own.sweep(image, sequence), sequence, strict=True):
         np.testing.assert_allclose(
             frames["final"], reference.apply(image, one)["final"], atol=1e-4, rtol=1e-4
         )
@@ -317,7 +318,7 @@ def test_grid(renderer: Renderer) -> None:
     image = hdr_picture(32, 24, 3, "float32")
     settings = Pyramid(levels=2, glare=(SHORT, Halo()))
     axes = {"glare.0.intensity": [0.5, 2.0], "glare.1.radius": [0.1, 0.3]}
-    found = renderer.grid(image, settings, axes=axes, attachments="final")
+    found = vkbloom.grid(image, settings, axes=axes, framebuffers="final", renderer=renderer)
     assert found["final"].dims[:2] == tuple(axes)
     assert found["glare.0.intensity"].attrs["description"].startswith("Factor of the stage")
     for place in ((0, 0), (1, 1)):
@@ -325,7 +326,7 @@ def test_grid(renderer: Renderer) -> None:
         expected = renderer.apply(image, settings.replace(**at))["final"]
         np.testing.assert_array_equal(found["final"].values[place], expected)
     with pytest.raises(ValueError, match="is not a field of a stage"):
-        renderer.grid(image, settings, axes={"glare.2.radius": [1]})
+        vkbloom.grid(image, settings, axes={"glare.2.radius": [1]}, renderer=renderer)
 
 
 def test_the_picture_of_dirt() -> None:

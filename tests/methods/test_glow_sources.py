@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.exhaustive import by_turns
 from tests.images import hdr_picture, picture
 from tests.tolerance import assert_matches_reference
@@ -32,7 +33,7 @@ from vkbloom import (
     UrpBloom,
     reference,
 )
-from vkbloom.explorer.viewer import Viewer
+from vkbloom._explorer.viewer import Viewer
 
 Image = NDArray[Any]
 
@@ -134,8 +135,8 @@ def test_against_the_reference(varied: Renderer, name: str) -> None:
     frames = varied.apply(image, case.settings, **given)
     assert_matches_reference(frames, image, case.settings, **given)
     # A fused pass may replace several.
-    varied.apply(image[::-1], case.settings, attachments=("glow",), **given)
-    alone = varied.apply(image, case.settings, attachments=("final",), **given)
+    varied.apply(image[::-1], case.settings, framebuffers=("glow",), **given)
+    alone = varied.apply(image, case.settings, framebuffers=("final",), **given)
     assert_array_equal(alone["final"], frames["final"])
 
 
@@ -346,7 +347,9 @@ def test_a_grid_of_a_handle(renderer: Renderer) -> None:
     mask = np.random.default_rng(6).random((12, 16), dtype=np.float32)
     axes: dict[str, list[Any]] = {"intensity": [0.5, 1.0], "composite": ["add", "mix"]}
     handle = renderer.upload(image, mask=mask)
-    final = renderer.grid(handle, Pyramid(levels=2), axes, progress=False)["final"]
+    final = vkbloom.grid(handle, Pyramid(levels=2), axes, progress=False, renderer=renderer)[
+        "final"
+    ]
     for intensity in axes["intensity"]:
         for composite in axes["composite"]:
             settings = Pyramid(levels=2, intensity=intensity, composite=composite)

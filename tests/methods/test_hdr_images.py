@@ -76,7 +76,7 @@ def test_reference_tone_mapped(renderer: Renderer, photo: Image, tonemap: Any) -
         threshold=1.0, composite="mix", intensity=0.2, tonemap=tonemap, encoding="srgb"
     )
     image = crop(photo, 4)
-    frames = renderer.apply(image, settings, attachments=("bloom", "final"))
+    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
     expected = reference.composite(image, frames["bloom"], settings)
     assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
 

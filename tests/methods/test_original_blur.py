@@ -35,7 +35,7 @@ SETTINGS = Separable(blur_scale=1.0, blur_strength=1.5)
 
 
 def blurred(renderer: Renderer, glow: NDArray[Any], settings: Separable) -> NDArray[Any]:
-    frames = renderer.apply(glow, settings, attachments="blur_vertical")
+    frames = renderer.apply(glow, settings, framebuffers="blur_vertical")
     return frames["blur_vertical"][REACH:-REACH, :, :3].astype(int)
 
 

@@ -31,7 +31,10 @@ from vkbloom import (
     psf,
     reference,
 )
-from vkbloom.reference import bevy, kino, unreal, urp
+from vkbloom.reference import _bevy as bevy
+from vkbloom.reference import _kino as kino
+from vkbloom.reference import _unreal as unreal
+from vkbloom.reference import _urp as urp
 
 Array = NDArray[Any]
 
@@ -377,7 +380,7 @@ def test_filament_of_a_flat_image(renderer: Renderer) -> None:
 def test_levels_of_very_wide_frames(renderer: Renderer, settings: Settings) -> None:
     """Of a row of pixels, the first level would be wider than an image of a device can be."""
     row = lights((1200, 2), "float32")[:1]
-    frames = renderer.apply(row, settings, attachments=("down_0",))
+    frames = renderer.apply(row, settings, framebuffers=("down_0",))
     assert frames["down_0"].shape[:2] == (16, 16384)
     check(renderer, row, settings)
 
@@ -456,7 +459,7 @@ def test_hdrps_cubic_filter_is_for_larger_frames(renderer: Renderer, size: tuple
     settings = HdrpBloom(format="rgba32float")
     # The reference of one channel takes a third of the time.
     image = lights(size, "float32")[..., :1]
-    last = renderer.apply(image.repeat(3, axis=2), settings, attachments="up_0")["up_0"][..., :1]
+    last = renderer.apply(image.repeat(3, axis=2), settings, framebuffers="up_0")["up_0"][..., :1]
     smooth, linear = (
         reference.passes(image, settings.replace(high_quality_filtering=high))["up_0"]
         for high in (True, False)
@@ -478,7 +481,7 @@ def test_the_cubic_filter_is_the_b_spline() -> None:
     image[4] = 1
     t = np.abs((np.arange(27) + 0.5) / 3 - 4.5)
     expected = np.where(t < 1, 2 / 3 - t**2 + t**3 / 2, np.maximum(2 - t, 0) ** 3 / 6)
-    enlarged = reference.upsampling.cubic(image, (1, 27))[:, 0, 0]
+    enlarged = reference._upsampling.cubic(image, (1, 27))[:, 0, 0]
     assert_allclose(enlarged, expected, atol=1e-12)
 
 

@@ -15,7 +15,7 @@ from tests.exhaustive import by_turns, examples
 from tests.tolerance import tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference, testing
 from vkbloom.testing import Probe
-from vkbloom.testing.probe import Bloom
+from vkbloom.testing._probe import Bloom
 
 Image = NDArray[Any]
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def bloom_of(renderer: Renderer, image: Image, settings: Settings) -> Array:
     if image.dtype == np.float64:
         bloom: Array = reference.apply(image, settings)["bloom"]
     else:
-        bloom = renderer.apply(image, settings, attachments="bloom")["bloom"].astype(np.float64)
+        bloom = renderer.apply(image, settings, framebuffers="bloom")["bloom"].astype(np.float64)
     return bloom[..., :3]
 
 
@@ -171,7 +171,7 @@ def test_channels_do_not_mix(renderer: Renderer, image: Image, channel: int) -> 
         assert not np.delete(part, channel, axis=-1).any()
 
 
-# --- Place and energy ---
+# --- Destination and energy ---
 
 
 def centroid(bloom: Array) -> Array:
@@ -377,8 +377,8 @@ def test_firefly_loses_its_energy(
     """
     size = (2 * cells[0], 2 * cells[1])
     image = point(size, place) * np.float32(brightness)
-    filtered = renderer.apply(image, Pyramid(firefly_filter=True), attachments="down_0")
-    plain = renderer.apply(image, Pyramid(), attachments="down_0")
+    filtered = renderer.apply(image, Pyramid(firefly_filter=True), framebuffers="down_0")
+    plain = renderer.apply(image, Pyramid(), framebuffers="down_0")
     assert_allclose(plain["down_0"][..., 0].sum(dtype=np.float64), brightness / 4, rtol=1e-5)
     total = filtered["down_0"][..., 0].sum(dtype=np.float64)
     assert brightness / 16 <= total * (1 + 1e-5)
@@ -417,9 +417,9 @@ def test_higher_threshold_lets_less_through(
     image = in_dtype(picture, dtype)
     low, high = sorted(thresholds)
     names = ("glow", "bloom")
-    more = renderer.apply(image, Separable(threshold=low, knee=knee), attachments=names)
-    less = renderer.apply(image, Separable(threshold=high, knee=knee), attachments=names)
-    whole = renderer.apply(image, Separable(), attachments=names)
+    more = renderer.apply(image, Separable(threshold=low, knee=knee), framebuffers=names)
+    less = renderer.apply(image, Separable(threshold=high, knee=knee), framebuffers=names)
+    whole = renderer.apply(image, Separable(), framebuffers=names)
     for name in names:
         # Rounding to 8 bits and to half keeps the order; only the formula's own rounding counts.
         slack = 0 if dtype == "uint8" else 1e-5
@@ -434,7 +434,7 @@ def test_hard_threshold_keeps_or_drops(renderer: Renderer, image: Image, thresho
     # Which side of the threshold rounding puts a pixel on is open within a rounding of it.
     hypothesis.assume(np.abs(luminance - threshold).min() > 1e-6)
     settings = Separable(threshold=threshold)
-    glow = renderer.apply(image, settings, attachments="glow")["glow"][..., :3]
+    glow = renderer.apply(image, settings, framebuffers="glow")["glow"][..., :3]
     passes = (luminance > threshold)[..., np.newaxis]
     assert_array_equal(glow, np.where(passes, image, np.float32(0)))
 
@@ -445,7 +445,7 @@ def test_knee_keeps_the_hue(
     renderer: Renderer, image: Image, threshold: float, knee: float
 ) -> None:
     settings = Separable(threshold=threshold, knee=knee)
-    glow = renderer.apply(image, settings, attachments="glow")["glow"][..., :3]
+    glow = renderer.apply(image, settings, framebuffers="glow")["glow"][..., :3]
     scale = glow.max(axis=-1, keepdims=True) / image.max(axis=-1, keepdims=True)
     assert (scale <= 1 + 1e-5).all()
     assert_allclose(glow, image * scale, rtol=0, atol=1e-6)
@@ -469,10 +469,10 @@ def test_knee_keeps_the_hue(
 def test_order_of_calls_does_not_matter(
     renderer: Renderer, steps: list[tuple[int, str, Any]]
 ) -> None:
-    for index, method, attachments in steps:
+    for index, method, framebuffers in steps:
         # Four sizes, two pictures of the first one, two dtypes.
         image = in_dtype(noise(9 + index % 4, 12 - index % 4, index), FLOATS[index % 2])
-        frames = renderer.apply(image, ALL[method], attachments=attachments)
+        frames = renderer.apply(image, ALL[method], framebuffers=framebuffers)
         expected = reference.apply(image, ALL[method])
         for name, array in frames.items():
             limit = tolerance(array.dtype, expected[name])

@@ -22,7 +22,7 @@ from vkbloom import (
     Settings,
     reference,
 )
-from vkbloom.reference.image import storage
+from vkbloom.reference._image import storage
 
 Array = NDArray[Any]
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from vkbloom import DualKawase, PygfxBloom, Pyramid, Renderer, Scene, Separable, Settings, reference
-from vkbloom.reference.image import storage
+from vkbloom.reference._image import storage
 
 Array = NDArray[Any]
 FORMAT: Final = "rgba8unorm-srgb"

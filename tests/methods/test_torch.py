@@ -17,7 +17,7 @@ from vkbloom import Renderer
 torch = pytest.importorskip("torch", reason="PyTorch is not installed")
 
 from vkbloom import torch as vkbloom_torch  # noqa: E402
-from vkbloom.gradients import operators  # noqa: E402
+from vkbloom._gradients import operators  # noqa: E402
 
 #: Tensors are on the GPU where the tests run on one.
 DEVICE = "cuda" if ADAPTER == "hardware" and torch.cuda.is_available() else "cpu"
@@ -55,7 +55,7 @@ def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:
     (module(image) * cotangent).sum().backward()
     totals = {"intensity": 0.0, "threshold": 0.0}
     for index in range(2):
-        _, pullback = renderer.vjp(image[index].detach().cpu().numpy(), SETTINGS)
+        _, pullback = vkbloom.vjp(image[index].detach().cpu().numpy(), SETTINGS, renderer=renderer)
         found = pullback({"final": cotangent[index].cpu().numpy()})
         assert np.allclose(image.grad[index].cpu().numpy(), found["image"], rtol=0, atol=1e-6)
         totals = {name: total + float(found[name]) for name, total in totals.items()}

@@ -146,7 +146,7 @@ def test_presets_whose_variants_round_differently(varied: Renderer, name: str) -
     assert_matches_reference(frames, image, settings)
     # Another image in between, so that no result of the first call is cached.
     varied.apply(image[::-1], settings)
-    alone = varied.apply(image, settings, attachments=("final",))
+    alone = varied.apply(image, settings, framebuffers=("final",))
     np.testing.assert_array_equal(alone["final"], frames["final"])
 
 
@@ -168,7 +168,7 @@ def test_final_alone_is_the_final_of_all(
     all_at_once = varied.apply(image, settings)
     # Another image in between, so that no result of the first call is cached.
     varied.apply(image[::-1], settings)
-    alone = varied.apply(image, settings, attachments=("final",))
+    alone = varied.apply(image, settings, framebuffers=("final",))
     assert list(alone) == ["final"]
     np.testing.assert_array_equal(alone["final"], all_at_once["final"])
     if not settings.dither:
@@ -190,7 +190,7 @@ def test_every_variant_gives_the_same_bits(
     size, dtype = other
     image = hdr_picture(*size, 4, dtype)
     expected = unfused.apply(image, BIT_EQUAL[name])
-    alone = varied.apply(image, BIT_EQUAL[name], attachments=("final",))
+    alone = varied.apply(image, BIT_EQUAL[name], framebuffers=("final",))
     np.testing.assert_array_equal(alone["final"], expected["final"])
     varied.apply(image[::-1], BIT_EQUAL[name])
     frames = varied.apply(image, BIT_EQUAL[name])
@@ -209,7 +209,7 @@ def test_presets_have_the_same_bits_in_every_variant(
     dtype, width, height = shape
     image = hdr_picture(width, height, 4, dtype)
     expected = unfused.apply(image, settings)
-    alone = varied.apply(image, settings, attachments=("final",))
+    alone = varied.apply(image, settings, framebuffers=("final",))
     np.testing.assert_array_equal(alone["final"], expected["final"])
     varied.apply(image[::-1], settings)
     frames = varied.apply(image, settings)
@@ -233,7 +233,7 @@ def test_three_channels_have_the_bits_of_four(
     image[..., 3] = 255 if dtype == "uint8" else 1
     expected = unfused.apply(image, BIT_EQUAL[name])
     image = np.ascontiguousarray(image[..., :3])
-    alone = varied.apply(image, BIT_EQUAL[name], attachments=("final",))
+    alone = varied.apply(image, BIT_EQUAL[name], framebuffers=("final",))
     np.testing.assert_array_equal(alone["final"], expected["final"][..., :3])
     varied.apply(image[::-1], BIT_EQUAL[name])
     frames = varied.apply(image, BIT_EQUAL[name])
@@ -246,7 +246,7 @@ def test_three_channels_have_the_bits_of_four(
 def test_levels_of_another_format_than_the_frame(varied: Renderer, scene: Scene, name: str) -> None:
     """Half floats, where a deferred frame has 8 bits: the fused last pass is for one format."""
     alone = varied.render(
-        scene, presets[name], (128, 96), shading="deferred", attachments=("final",)
+        scene, presets[name], (128, 96), shading="deferred", framebuffers=("final",)
     )
     frames = varied.render(scene, presets[name], (128, 96), shading="deferred", time=0.5)
     frames = varied.render(scene, presets[name], (128, 96), shading="deferred")
@@ -265,8 +265,8 @@ def test_values_that_are_not_finite(varied: Renderer, dtype: str) -> None:
     for settings in every if EXHAUSTIVE else every[dtype == "float16" :: 2]:
         frames = varied.apply(image, settings)
         # Another image in between, so that no result of the first call is cached.
-        varied.apply(image[::-1], settings, attachments=("final",))
-        alone = varied.apply(image, settings, attachments=("final",))
+        varied.apply(image[::-1], settings, framebuffers=("final",))
+        alone = varied.apply(image, settings, framebuffers=("final",))
         np.testing.assert_array_equal(alone["final"], frames["final"])
         np.testing.assert_array_equal(np.isfinite(alone["final"]), np.isfinite(image))
         if not settings.dither and settings.tonemap == "none" and settings.encoding == "none":
@@ -277,7 +277,7 @@ def test_values_that_are_not_finite(varied: Renderer, dtype: str) -> None:
 def test_the_largest_halves_stay_finite(varied: Renderer, threshold: float | None) -> None:
     image = np.full((20, 30, 4), 65504, np.float16)
     for settings in (Separable(threshold=threshold), Pyramid(levels=2, threshold=threshold)):
-        alone = varied.apply(image, settings, attachments=("final",))["final"]
+        alone = varied.apply(image, settings, framebuffers=("final",))["final"]
         np.testing.assert_array_equal(alone, image)
 
 
@@ -286,8 +286,8 @@ def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Render
     monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
     image = hdr_picture(257, 1028, 4, "uint8")
     with Renderer(validation=True) as renderer:
-        frames = renderer.apply(image, Separable(), attachments=("blur_vertical", "bloom"))
-    expected = unfused.apply(image, Separable(), attachments=("blur_vertical", "bloom"))
+        frames = renderer.apply(image, Separable(), framebuffers=("blur_vertical", "bloom"))
+    expected = unfused.apply(image, Separable(), framebuffers=("blur_vertical", "bloom"))
     for framebuffer in expected:
         np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
 
@@ -300,7 +300,7 @@ def test_large_images_in_the_variant_of_gpus(
     image = hdr_picture(1028, 772, 4, "uint8")
     settings = Pyramid(levels=2)
     with Renderer(validation=True) as renderer:
-        alone = renderer.apply(image, settings, attachments=("final",))
+        alone = renderer.apply(image, settings, framebuffers=("final",))
         renderer.apply(image[::-1], settings)
         frames = renderer.apply(image, settings)
     np.testing.assert_array_equal(alone["final"], frames["final"])
@@ -318,12 +318,12 @@ def is_fused(variant: str, renderer: Renderer) -> bool:
 
 def test_one_pass_stands_for_all_of_a_final(variant: str, varied: Renderer) -> None:
     image = hdr_picture(33, 44, 4, "float32", seed=5)
-    ran = list(varied.apply(image, Separable(), attachments=("final",)).timings)
+    ran = list(varied.apply(image, Separable(), framebuffers=("final",)).timings)
     assert ran == (
         ["final"] if is_fused(variant, varied) else ["glow", "blur_vertical", "bloom", "final"]
     )
     # The same again: nothing.
-    again = varied.apply(image, Separable(), attachments=("final",))
+    again = varied.apply(image, Separable(), framebuffers=("final",))
     assert list(again.timings) == []
 
 
@@ -331,10 +331,10 @@ def test_cached_framebuffers_run_no_pass(varied: Renderer) -> None:
     image = hdr_picture(33, 44, 4, "float32", seed=6)
     frames = varied.apply(image, Separable())
     # Everything is cached, so a part of it runs nothing, and a change runs only the composite.
-    alone = varied.apply(image, Separable(), attachments=("final",))
+    alone = varied.apply(image, Separable(), framebuffers=("final",))
     assert list(alone.timings) == []
     np.testing.assert_array_equal(alone["final"], frames["final"])
-    darker = varied.apply(image, Separable(exposure=-1.0), attachments=("final",))
+    darker = varied.apply(image, Separable(exposure=-1.0), framebuffers=("final",))
     assert list(darker.timings) == ["final"]
 
 
@@ -349,14 +349,14 @@ def test_sequence_runs_shared_passes_once(variant: str, varied: Renderer) -> Non
     exposures = [Separable(exposure=exposure) for exposure in (0.0, 1.0, 2.0, 3.0)]
     # The first frame is planned without the next one.
     rest = whole if is_fused(variant, varied) else ["final"]
-    frames = list(varied.apply_many(image, exposures, attachments=("final",)))
+    frames = list(varied.sweep(image, exposures, framebuffers=("final",)))
     assert ran(frames) == [alone, rest, ["final"], ["final"]]
     for settings, one in zip(exposures, frames, strict=True):
         expected = reference_apply(image, settings)["final"]
         assert np.abs(one["final"] - expected).max() <= tolerance(image.dtype, expected)
     # Single calls are planned without later ones.
     image = image[::-1]
-    singly = [varied.apply(image, settings, attachments=("final",)) for settings in exposures]
+    singly = [varied.apply(image, settings, framebuffers=("final",)) for settings in exposures]
     assert ran(singly) == [alone, rest, ["final"], ["final"]]
 
 
@@ -365,12 +365,12 @@ def test_sequence_runs_no_pass_of_other_settings(variant: str, varied: Renderer)
     fused = is_fused(variant, varied)
     alone = ["final"] if fused else ["blur_vertical", "bloom", "final"]
     strengths = [Separable(blur_strength=strength) for strength in (1.0, 2.0, 2.0, 0.5, 0.25)]
-    frames = varied.apply_many(image, strengths, attachments=("final",))
+    frames = varied.sweep(image, strengths, framebuffers=("final",))
     assert ran(frames)[1:] == [alone, [], alone, alone]
     # Another image has another bloom, whatever the exposure was before.
     settings = [Separable(exposure=exposure) for exposure in (1.0, 2.0)]
     for turn, changed in enumerate(settings):
-        one = varied.apply(image[turn + 1 :], changed, attachments=("final",))
+        one = varied.apply(image[turn + 1 :], changed, framebuffers=("final",))
         assert ran([one]) == [alone if fused else ["glow", *alone]]
 
 
@@ -387,12 +387,12 @@ def test_a_pass_has_one_time_in_every_variant(varied: Renderer, scene: Scene) ->
 # Scenes
 
 
-@pytest.mark.parametrize("attachments", ["all", ("final",)], ids=["all", "final"])
+@pytest.mark.parametrize("framebuffers", ["all", ("final",)], ids=["all", "final"])
 def test_the_forward_frame(
-    varied: Renderer, unfused: Renderer, attachments: str | tuple[str, ...]
+    varied: Renderer, unfused: Renderer, framebuffers: str | tuple[str, ...]
 ) -> None:
     drawn = unfused.render(Scene.ufo(), None, (640, 360), time=0.2)
-    frames = varied.render(Scene.ufo(), None, (640, 360), time=0.2, attachments=attachments)
+    frames = varied.render(Scene.ufo(), None, (640, 360), time=0.2, framebuffers=framebuffers)
     assert drawn["bloom"].max() > 100, "there is no bloom to compare"
     for name, array in frames.items():
         off = np.abs(array.astype(np.float64) - drawn[name])
@@ -417,20 +417,10 @@ def test_blurs_into_other_sizes(varied: Renderer, settings: Settings) -> None:
     image = hdr_picture(150, 110, 4, "float32")
     assert_matches_reference(varied.apply(image, settings), image, settings)
     uint8 = hdr_picture(150, 110, 4, "uint8")
-    alone = varied.apply(uint8, settings, attachments=("final",))["final"]
+    alone = varied.apply(uint8, settings, framebuffers=("final",))["final"]
     expected = reference_apply(uint8, settings)["final"]
     limit = tolerance(np.uint8, expected, stages_of_8_bits=2)
     assert np.abs(real(alone) - expected).max() <= limit
-
-
-def test_old_name_of_the_variable_works_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("VKBLOOM_VARIANT", raising=False)
-    monkeypatch.setenv("VKBLOOM_FORM", "quick")
-    with (
-        pytest.warns(FutureWarning, match="set VKBLOOM_VARIANT instead"),
-        pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto"),
-    ):
-        Renderer()
 
 
 def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

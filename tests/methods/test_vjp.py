@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from vkbloom import Renderer, reference
 
 
 def check_against_reference(renderer: Renderer, settings: Any, image: Any, **given: Any) -> None:
-    frames, pullback = renderer.vjp(image, settings, **given)
+    frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
     expected_frames, expected_pullback = reference.vjp(image, settings, **given)
     random = np.random.default_rng(7)
     cotangents = {
@@ -62,15 +63,15 @@ def test_arrays_may_change_before_the_pullback(renderer: Renderer) -> None:
     image = random_image(6, 8, seed=1).astype(np.float32)
     settings = vkbloom.Separable(threshold=0.5)
     cotangents = {"bloom": np.ones((6, 8, 4), np.float32)}
-    expected = renderer.vjp(image.copy(), settings)[1](cotangents)["image"]
-    _, pullback = renderer.vjp(image, settings)
+    expected = vkbloom.vjp(image.copy(), settings, renderer=renderer)[1](cotangents)["image"]
+    _, pullback = vkbloom.vjp(image, settings, renderer=renderer)
     image[:] = 0
     assert np.array_equal(pullback(cotangents)["image"], expected)
 
 
 def test_what_has_no_derivative_is_named(renderer: Renderer) -> None:
     image = np.ones((4, 4, 3), np.float32)
-    _, pullback = renderer.vjp(image, vkbloom.Pyramid(levels=2))
+    _, pullback = vkbloom.vjp(image, vkbloom.Pyramid(levels=2), renderer=renderer)
     with pytest.raises(ValueError, match="gradients: 'levels' has no derivative; available: image"):
         pullback({"final": image})["levels"]
 
@@ -89,12 +90,12 @@ def test_uploaded_images_have_the_derivatives_of_their_arrays(
     given: Any = {name: {"mask": mask, "emission": emission}[name] for name in names}
     settings = vkbloom.Pyramid(levels=2, threshold=0.3, knee=0.5)
     cotangents = {"final": np.ones((7, 6, 4), np.float32)}
-    frames, pullback = renderer.vjp(image, settings, **given)
+    frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
     expected = dict(pullback(cotangents).items())
     uploaded = renderer.upload(image, **given)
     for part in (image, emission, mask):
         part[:] = 0
-    found_frames, pullback = renderer.vjp(uploaded, settings)
+    found_frames, pullback = vkbloom.vjp(uploaded, settings, renderer=renderer)
     found = pullback(cotangents)
     assert np.array_equal(found_frames["final"], frames["final"], equal_nan=True)
     assert [*found] == [*expected]
@@ -107,10 +108,10 @@ def test_uploaded_images_are_refused_as_in_apply(renderer: Renderer) -> None:
     for name, given in (("mask", image[..., 0]), ("emission", image)):
         wrong: Any = {name: given}
         with pytest.raises(ValueError, match=f"{name}: the image was uploaded already"):
-            renderer.vjp(uploaded, vkbloom.Pyramid(), **wrong)
+            vkbloom.vjp(uploaded, vkbloom.Pyramid(), **wrong, renderer=renderer)
     with Renderer(renderer.info.name) as other:
         messages = []
-        for call in (other.apply, other.vjp):
+        for call in (other.apply, functools.partial(vkbloom.vjp, renderer=other)):
             use: Any = call
             with pytest.raises(ValueError) as raised:  # noqa: PT011  the same as of apply
                 use(uploaded, vkbloom.Pyramid())
@@ -121,7 +122,7 @@ def test_uploaded_images_are_refused_as_in_apply(renderer: Renderer) -> None:
 def test_a_field_has_the_same_bits_however_it_is_read(renderer: Renderer) -> None:
     image = random_image(9, 8, seed=1).astype(np.float32)
     settings = vkbloom.Separable(threshold=0.2, knee=0.5, intensity=0.7, exposure=0.3)
-    _, pullback = renderer.vjp(image, settings)
+    _, pullback = vkbloom.vjp(image, settings, renderer=renderer)
     cotangents = {"final": random_image(9, 8, seed=2).astype(np.float32)}
     readings: tuple[Any, ...] = (
         lambda found: dict(found.items()),
@@ -150,7 +151,8 @@ def test_wrong_cotangent_is_refused_by_name(
     renderer: Renderer, cotangents: Any, message: str
 ) -> None:
     image = np.ones((4, 4, 3), np.float32)
-    for vjp in (renderer.vjp, reference.vjp):
+    of_device: Any = functools.partial(vkbloom.vjp, renderer=renderer)
+    for vjp in (of_device, reference.vjp):
         pullback: Any = vjp(image, vkbloom.Separable())[1]
         with pytest.raises((TypeError, ValueError), match=message):
             pullback(cotangents)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import reductions
-from vkbloom.views.comparison import compare, flip_map
+from vkbloom._views.comparison import compare, flip_map
 
 A = np.random.default_rng(0).random((24, 32, 3), np.float32)
 B = A + np.float32(0.1) * np.random.default_rng(1).random(A.shape, np.float32)

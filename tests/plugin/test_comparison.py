@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.images import changed, noise_image
-from vkbloom.cli.compare import tolerances_of
-from vkbloom.io.srgb import decode_srgb
-from vkbloom.views.comparison import Comparison, compare, difference, flip_map
-from vkbloom.views.tolerances import Tolerances, failures
+from vkbloom._cli.compare import tolerances_of
+from vkbloom._io.srgb import decode_srgb
+from vkbloom._views.comparison import Comparison, compare, difference, flip_map
+from vkbloom._views.tolerances import Tolerances, failures
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")

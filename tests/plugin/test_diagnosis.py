@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import Separable, reference, write
-from vkbloom.cli.program import program
-from vkbloom.io.srgb import encode_srgb
+from vkbloom._cli.program import program
+from vkbloom._io.srgb import encode_srgb
+from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import FrameRegression, diagnose
-from vkbloom.testing.judging import judge
-from vkbloom.testing.regression import Mode
-from vkbloom.testing.report_parts import figures
-from vkbloom.views.tolerances import Tolerances
+from vkbloom.testing._judging import judge
+from vkbloom.testing._regression import Mode
+from vkbloom.testing._report_parts import figures
 
 Image = NDArray[Any]
 

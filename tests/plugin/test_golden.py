@@ -51,7 +51,7 @@ def test_of_an_image(
     dtype: str,
 ) -> None:
     # Only the scene, since variants of a bloom may round differently.
-    picture = renderer.render(scene, size=SIZE, attachments=("scene",))["scene"]
+    picture = renderer.render(scene, size=SIZE, framebuffers=("scene",))["scene"]
     if dtype == "float16":
         # Brighter than 1, as a picture before its tone map is.
         picture = (4 * (picture / np.float32(255)) ** 2).astype(np.float16)

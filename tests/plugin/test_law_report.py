@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from vkbloom import DualKawase, Renderer, Separable, reference, testing
 from vkbloom.testing import LawReport, LawRow, Probe
-from vkbloom.testing.law_table import LAWS
+from vkbloom.testing._law_table import LAWS
 
 Image = NDArray[Any]
 Bloom = Callable[[Image], Image]

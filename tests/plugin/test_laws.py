@@ -103,7 +103,7 @@ def test_separable_on_the_device(renderer: Renderer, dtype: str, format: Any) ->
 
 
 def bloom_of(renderer: Renderer, settings: Any, name: str = "bloom") -> Bloom:
-    return lambda image: renderer.apply(image, settings, attachments=(name,))[name]
+    return lambda image: renderer.apply(image, settings, framebuffers=(name,))[name]
 
 
 @pytest.mark.parametrize("settings", [Pyramid(levels=3), DualKawase(levels=3)])
@@ -372,7 +372,7 @@ class TestMeasurements:
             settings = Separable(
                 weights=gaussian_weights(1.5, 6), blur_strength=1.0, blur_scale=blur_scale
             )
-            return renderer.apply(image, settings, attachments=("bloom",))["bloom"]
+            return renderer.apply(image, settings, framebuffers=("bloom",))["bloom"]
 
         found = testing.response(bloom, "blur_scale", [1.0, 2.0], SMALL)
         np.testing.assert_allclose(found.sigma, [[1.5, 1.5], [3.0, 3.0]], rtol=1e-3)

@@ -222,7 +222,7 @@ class TestOptions:
 import vkbloom
 def test_render(bloom_renderer, frame_regression):
     image = vkbloom.Scene.ufo()
-    frames = bloom_renderer.render(image, size=(32, 18), attachments=("final",))
+    frames = bloom_renderer.render(image, size=(32, 18), framebuffers=("final",))
     frame_regression.check(frames)
 def test_again(bloom_renderer):
     assert not bloom_renderer.closed

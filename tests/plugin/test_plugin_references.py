@@ -9,8 +9,8 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.plugin.projects import ONE, PROJECT, edit, references, run, run_workers, write
-from vkbloom.testing.references import cpu_vendor
-from vkbloom.testing.regression import name_of_test
+from vkbloom.testing._references import cpu_vendor
+from vkbloom.testing._regression import name_of_test
 
 pytest.importorskip("xdist")
 

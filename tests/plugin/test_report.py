@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom.testing.records import Record
-from vkbloom.testing.regression import FrameRegression, Mode
-from vkbloom.testing.report_page import write_report
+from vkbloom.testing._records import Record
+from vkbloom.testing._regression import FrameRegression, Mode
+from vkbloom.testing._report_page import write_report
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

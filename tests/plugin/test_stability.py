@@ -188,7 +188,7 @@ class TestStability:
 
     def test_on_the_device(self, renderer: Renderer) -> None:
         def bloom(settings: Any) -> Callable[[Image], Image]:
-            return lambda image: renderer.apply(image, settings, attachments="bloom")["bloom"]
+            return lambda image: renderer.apply(image, settings, framebuffers="bloom")["bloom"]
 
         testing.assert_stable(bloom(Pyramid(levels=3)), steps=1)
         # Its reduction moves the light to the middle of a texel.
@@ -310,12 +310,12 @@ class TestResolution:
         def bloom(image: Image) -> Image:
             levels = int(np.log2(image.shape[0])) - 3
             settings = Pyramid(levels=levels, level_weights=(*[0.0] * (levels - 1), 1.0))
-            return renderer.apply(image, settings, attachments="bloom")["bloom"]
+            return renderer.apply(image, settings, framebuffers="bloom")["bloom"]
 
         # The coarsest level alone is an eighth of the height at each size.
         testing.assert_resolution_independent(bloom, (1, 2))
         fails(
             testing.assert_resolution_independent,
-            lambda image: renderer.apply(image, Pyramid(), attachments="bloom")["bloom"],
+            lambda image: renderer.apply(image, Pyramid(), framebuffers="bloom")["bloom"],
             (1, 2),
         )

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom import psf
-from vkbloom.psf.bessel import bessel
-from vkbloom.psf.eye import cie_general, cie_total
-from vkbloom.psf.resampling import box_resample
+from vkbloom.psf._bessel import bessel
+from vkbloom.psf._eye import cie_general, cie_total
+from vkbloom.psf._resampling import box_resample
 
 KERNEL = np.pad(np.full((3, 5), 0.125, np.float32), 2)
 KERNEL[3, 4] = 4.0

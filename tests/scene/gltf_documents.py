@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from vkbloom.scene import Mesh
-from vkbloom.scene.gltf import load_mesh
+from vkbloom._scene import Mesh
+from vkbloom._scene.gltf import load_mesh
 
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 DTYPES = {FLOAT: "<f4", BYTE: "<u1", SHORT: "<u2", INT: "<u4"}

@@ -22,7 +22,7 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.exhaustive import witness
-from vkbloom.scene import Scene
+from vkbloom._scene import Scene
 
 Array = npt.NDArray[Any]
 

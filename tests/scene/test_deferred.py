@@ -28,7 +28,7 @@ from vkbloom import (
     presets,
     reference,
 )
-from vkbloom.scene import Mesh
+from vkbloom._scene import Mesh
 
 Array = NDArray[Any]
 

@@ -65,7 +65,7 @@ def test_passes_of_unrequested_framebuffers_do_not_run(
     new_renderer: Callable[[], Renderer], scene: Scene
 ) -> None:
     renderer = new_renderer()
-    some = deferred(renderer, scene, attachments=("brightness",))
+    some = deferred(renderer, scene, framebuffers=("brightness",))
     assert list(some) == ["brightness"]
     assert list(some.timings) == ["glow", "albedo"]
 

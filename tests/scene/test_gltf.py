@@ -34,8 +34,8 @@ from tests.scene.gltf_documents import (
     refusals,
     triangle,
 )
-from vkbloom.scene import Mesh, gltf_file
-from vkbloom.scene.gltf import load_mesh
+from vkbloom._scene import Mesh, gltf_file
+from vkbloom._scene.gltf import load_mesh
 
 SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -639,7 +639,7 @@ def test_a_small_file_cannot_ask_for_any_amount_of_memory(
     document.json["nodes"] = [{"mesh": 0} for _ in range(40)]
     document.json["scenes"] = [{"nodes": list(range(40))}]
     assert len(document.load(tmp_path).vertices) == 120
-    monkeypatch.setattr("vkbloom.scene.gltf.MAX_VERTICES", 119)
+    monkeypatch.setattr("vkbloom._scene.gltf.MAX_VERTICES", 119)
     with pytest.raises(ValueError, match=r"mesh\.gltf: too large"):
         document.load(tmp_path)
     accessor = document.json["accessors"][1]

@@ -31,10 +31,10 @@ from tests.scene.gltf_documents import (
 )
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene
-from vkbloom.io.srgb import decode_srgb
-from vkbloom.scene import Mesh, gltf_textures
-from vkbloom.scene.gltf import load_mesh
-from vkbloom.scene.textures import WHITE, Texture
+from vkbloom._io.srgb import decode_srgb
+from vkbloom._scene import Mesh, gltf_textures
+from vkbloom._scene.gltf import load_mesh
+from vkbloom._scene.textures import WHITE, Texture
 
 Array = NDArray[Any]
 HALF = 2.0**-11  # half of the last bit of a half float, relative
@@ -497,7 +497,7 @@ def test_huge_images_are_refused_by_their_header(tmp_path: Path, size: tuple[int
 
 
 def test_an_image_file_that_is_too_long(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vkbloom.scene.gltf_file._MAX_IMAGE_BYTES", 10)
+    monkeypatch.setattr("vkbloom._scene.gltf_file._MAX_IMAGE_BYTES", 10)
     with pytest.raises(ValueError, match=r"mesh\.gltf.*images\[0\].*too many"):
         load(textured())
 

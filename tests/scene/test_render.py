@@ -18,8 +18,8 @@ import vkbloom
 from tests.exhaustive import by_turns
 from tests.screens import noise, screen
 from vkbloom import Camera, Renderer, Scene, Separable, reference
-from vkbloom.scene import Mesh
-from vkbloom.scene.skybox import Cubemap
+from vkbloom._scene import Mesh
+from vkbloom._scene.skybox import Cubemap
 
 SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
@@ -225,10 +225,10 @@ def test_the_body_does_not_hide_the_glow(renderer: Renderer, scene: Scene) -> No
     near = Camera(position=(0, 1, -10.25), rotation=(0, 0, 0))
     hidden = Scene(body=wall.glow, glow=scene.glow, camera=near)
     shown = Scene(body=scene.body, glow=scene.glow, camera=near)
-    glow = renderer.render(hidden, None, SIZE, attachments="glow")["glow"]
+    glow = renderer.render(hidden, None, SIZE, framebuffers="glow")["glow"]
     assert rgb(glow).any()
     np.testing.assert_array_equal(
-        glow, renderer.render(shown, None, SIZE, attachments="glow")["glow"]
+        glow, renderer.render(shown, None, SIZE, framebuffers="glow")["glow"]
     )
 
 
@@ -367,17 +367,17 @@ def test_tone_maps_without_bloom(renderer: Renderer, scene: Scene) -> None:
     assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
 
 
-# Attachments, arrays to fill, what else comes back
+# Framebuffers, arrays to fill, what else comes back
 
 
-def test_attachments_are_what_was_wanted(renderer: Renderer, scene: Scene) -> None:
+def test_framebuffers_are_what_was_wanted(renderer: Renderer, scene: Scene) -> None:
     everything = renderer.render(scene, None, SIZE)
-    some = renderer.render(scene, None, SIZE, attachments=("final", "glow"))
+    some = renderer.render(scene, None, SIZE, framebuffers=("final", "glow"))
     assert list(some) == ["glow", "final"]
     for name, array in some.items():
         np.testing.assert_array_equal(array, everything[name])
-    assert list(renderer.render(scene, None, SIZE, attachments="depth")) == ["depth"]
-    assert list(renderer.render(scene, None, SIZE, attachments=())) == []
+    assert list(renderer.render(scene, None, SIZE, framebuffers="depth")) == ["depth"]
+    assert list(renderer.render(scene, None, SIZE, framebuffers=())) == []
 
 
 def test_arrays_are_filled_in_place(renderer: Renderer, scene: Scene) -> None:

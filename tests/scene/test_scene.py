@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vkbloom.scene import Camera, Mesh, Scene
-from vkbloom.scene.skybox import Cubemap
+from vkbloom._scene import Camera, Mesh, Scene
+from vkbloom._scene.skybox import Cubemap
 
 SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

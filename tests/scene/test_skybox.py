@@ -18,8 +18,8 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from tests.scene.changed_bytes import CHANGES, many
-from vkbloom.scene import ktx, skybox
-from vkbloom.scene.skybox import Cubemap
+from vkbloom._scene import ktx, skybox
+from vkbloom._scene.skybox import Cubemap
 
 SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 

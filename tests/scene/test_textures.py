@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from tests.scene.deferred_frames import rgb
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
-from vkbloom.requests import new_arrays
-from vkbloom.scene import Mesh
-from vkbloom.scene.textures import WHITE, Surface, Texture, mip_levels
+from vkbloom._renderer.requests import new_arrays
+from vkbloom._scene import Mesh
+from vkbloom._scene.textures import WHITE, Surface, Texture, mip_levels
 
 Array = NDArray[Any]
 

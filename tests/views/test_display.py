@@ -15,7 +15,7 @@ import pytest
 
 from tests.framebuffers import decode
 from vkbloom import Renderer, Scene, Separable, Settings, presets
-from vkbloom.scene.skybox import Cubemap
+from vkbloom._scene.skybox import Cubemap
 
 VOID = {"img", "br"}
 

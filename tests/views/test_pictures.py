@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.framebuffers import decode, make, mixed, noise
 from vkbloom import Separable
-from vkbloom.frames import Frames
-from vkbloom.views.pictures import contact_sheet_png, picture
+from vkbloom._renderer.frames import Frames
+from vkbloom._views.pictures import contact_sheet_png, picture
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -292,6 +292,6 @@ def test_the_sheet_says_where_glow_is_not_thresholded(
     settings = vkbloom.presets[name]
     with contextlib.suppress(ValueError):  # two methods have no threshold
         settings = settings.replace(threshold=1.0)
-    frames = renderer.apply(image, settings, attachments=["glow"])
+    frames = renderer.apply(image, settings, framebuffers=["glow"])
     is_frame = settings.threshold is not None and bool(frames["glow"].min(initial=1.0) > 0.2)
     assert ("the frame before its threshold" in frames._repr_html_()) == is_frame

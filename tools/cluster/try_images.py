@@ -1,4 +1,4 @@
-"""Try images_on_ray.py beside `apply_each`, on images in the current folder."""
+"""Try images_on_ray.py beside `map`, on images in the current folder."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def main() -> None:
     with vkbloom.Renderer() as renderer:
         images = map(vkbloom.read, paths)
         begun = time.perf_counter()
-        local = [f["final"] for f in renderer.apply_each(images, attachments="final")]
+        local = [f["final"] for f in renderer.map(images, framebuffers="final")]
         seconds = time.perf_counter() - begun
-        print(f"images: apply_each, {COUNT} of {WIDTH} x {HEIGHT}: {seconds:.2f} s")
+        print(f"images: map, {COUNT} of {WIDTH} x {HEIGHT}: {seconds:.2f} s")
 
     for actors in (1, 2):
         begun = time.perf_counter()

@@ -17,6 +17,6 @@ CHUNKS = {"intensity": 10}
 def render(client: Any, store: str, part: tuple[int, int] | None = None) -> None:
     """Render the grid, or a part of it."""
     settings = vkbloom.Pyramid(threshold=1)
-    vkbloom.grid_to_zarr(
-        IMAGE, settings, AXES, store, client=client, part=part, chunks=CHUNKS, progress=False
+    vkbloom.grid(
+        IMAGE, settings, AXES, store=store, client=client, part=part, chunks=CHUNKS, progress=False
     )

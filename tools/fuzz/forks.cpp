@@ -86,7 +86,7 @@ int compile(const std::string &stage, const std::string &text, const char *targe
     return 0;
 }
 
-// The limits of vkbloom/own/compiler.py.
+// The limits of vkbloom/_custom/compiler.py.
 void limit()
 {
     const rlimit processor = {20, 20}, memory = {rlim_t(2) << 30, rlim_t(2) << 30},

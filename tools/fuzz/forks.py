@@ -9,7 +9,7 @@ import subprocess
 import threading
 from pathlib import Path
 
-from vkbloom.own import compiler
+from vkbloom._custom import compiler
 
 SOURCE = Path(__file__).with_suffix(".cpp")
 LIBRARIES = (
@@ -27,7 +27,7 @@ def built(folder: Path) -> Path:
 
 
 class Forks:
-    """The process; in place of ``vkbloom.own.compiler.run_limited``."""
+    """The process; in place of ``vkbloom._custom.compiler.run_limited``."""
 
     def __init__(self, program: Path) -> None:
         self.process = subprocess.Popen(

@@ -10,7 +10,8 @@ an input that takes more than two minutes. The input is then written to the fold
 ``finding-TARGET-SEED``.
 
 ``python tools/fuzz/run.py own --plain --jobs 0 --executions 1000000 --forks`` tries a million
-sources of own methods on all cores. The compiler of --forks is built from ``forks.cpp``, or given.
+sources of custom methods on all cores. The compiler of --forks is built from ``forks.cpp``, or
+given.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ def main() -> int:
     if options.forks:
         import forks
 
-        from vkbloom.own import compiler
+        from vkbloom._custom import compiler
 
         compiler.run_limited = forks.Forks(Path(options.forks)).run_limited
 

@@ -23,13 +23,16 @@ import google_crc32c
 import numpy as np
 from numcodecs.zstd import Zstd
 
-from vkbloom import check_grid, grid_to_zarr, presets
-from vkbloom.grid import keys, store, zarr_grid
-from vkbloom.grid.filling import Tally
-from vkbloom.grid.image_folder import GridFiles
-from vkbloom.grid.layout import Grid, Layout, Variable, ask
-from vkbloom.grid.running import empty_arrays
-from vkbloom.grid.store import GridStore
+import vkbloom
+from vkbloom import check_grid, presets
+from vkbloom._cli.grid import prepare
+from vkbloom._grid import grid as zarr_grid
+from vkbloom._grid import keys, store
+from vkbloom._grid.filling import Tally
+from vkbloom._grid.identity import identity
+from vkbloom._grid.layout import Grid, Layout, Variable, ask
+from vkbloom._grid.running import empty_arrays
+from vkbloom._grid.store import GridStore
 
 SETTINGS = presets["bevy_natural"]
 AXES = {"exposure": [0.0, 1.0, 2.0], "threshold": [None, 0.5]}
@@ -70,8 +73,10 @@ def _laid_out(grid: Grid) -> Layout:
     )
 
 
-def _rendered(grid: Grid, prepared: Callable[[Layout], GridStore], **_: object) -> Tally:
-    """Replace `vkbloom.grid.rendering.render_grid`, without a device."""
+def _rendered(
+    grid: Grid, prepared: Callable[[Layout], GridStore], *_: object, **__: object
+) -> Tally:
+    """Replace `vkbloom._grid.rendering.render_grid`, without a device."""
     layout = _laid_out(grid)
     kept = prepared(layout)
     for block in list(kept.missing()):
@@ -92,7 +97,7 @@ def _value(name: str, shape: tuple[int, ...]) -> np.ndarray[Any, np.dtype[np.flo
 
 def _made(path: Path, **arguments: Any) -> Any:
     with mock.patch.object(zarr_grid, "render_grid", _rendered):
-        return grid_to_zarr(IMAGE, SETTINGS, AXES, path, **arguments)
+        return vkbloom.grid(IMAGE, SETTINGS, AXES, store=path, **arguments)
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
@@ -121,7 +126,7 @@ def _asked() -> Grid:
         size=None,
         shading="forward",
         time=0.0,
-        attachments="final",
+        framebuffers="final",
         reduce=None,
     )
 
@@ -334,8 +339,8 @@ class Folders:
     def __init__(self, folder: Path) -> None:
         self._folder = folder / "images"
         grid = _asked()
-        self._files = GridFiles(self._folder, ".png", grid, _laid_out(grid))
-        self._files.prepare(resume=False)
+        self._identity = {**identity(grid, _laid_out(grid), ()), "suffix": ".png"}
+        prepare(self._folder, self._identity, resume=False)
         self._index = self._folder / "grid.json"
 
     def seeds(self) -> list[bytes]:
@@ -346,6 +351,6 @@ class Folders:
         """Continue the folder."""
         self._index.write_bytes(data)
         try:
-            self._files.prepare(resume=True)
+            prepare(self._folder, self._identity, resume=True)
         finally:
             assert self._index.read_bytes() == data, "what was there was changed"

@@ -1,7 +1,7 @@
 """The readers of the package, as functions of bytes; each may raise only documented exceptions.
 
 A target writes the bytes to the file of its reader and calls it. Files that do not load may raise
-OSError and ValueError, own methods also ShaderError; any other exception is a finding.
+OSError and ValueError, custom methods also ShaderError; any other exception is a finding.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import OpenImageIO
-import options
 import stores
 
 import vkbloom
-from vkbloom.io import pipeline_cache
-from vkbloom.scene import ktx, skybox
-from vkbloom.scene.gltf import load_mesh
+from vkbloom._io import pipeline_cache
+from vkbloom._scene import ktx, skybox
+from vkbloom._scene.gltf import load_mesh
 
 FOLDER = Path(tempfile.mkdtemp(prefix="vkbloom-fuzz-"))
 PROMISED = (OSError, ValueError, vkbloom.ShaderError)
@@ -234,7 +233,7 @@ def _own(data: bytes) -> None:
 def _own_seeds() -> list[bytes]:
     # Not the user's cache. Passes that a mutation leaves alone are not compiled again.
     os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "own")
-    examples = Path(__file__).parents[2] / "examples" / "own_methods"
+    examples = Path(__file__).parents[2] / "examples" / "custom_methods"
     return [_BLOCKS, *(file.read_bytes() for file in sorted(examples.glob("*.hook")))]
 
 
@@ -248,11 +247,6 @@ def _folders() -> stores.Folders:
     return stores.Folders(FOLDER)
 
 
-@functools.cache
-def _options(suffix: str) -> options.Options:
-    return options.Options(FOLDER / f"options{suffix}")
-
-
 TARGETS = {
     "gltf": Target(_gltf, _gltf_seeds),
     "ktx": Target(_ktx, _ktx_seeds),
@@ -262,8 +256,6 @@ TARGETS = {
     "own": Target(_own, _own_seeds),
     "zarr": Target(lambda data: _stores().run(data), lambda: _stores().seeds()),
     "images": Target(lambda data: _folders().run(data), lambda: _folders().seeds()),
-    "toml": Target(lambda data: _options(".toml").run(data), lambda: _options(".toml").seeds()),
-    "yaml": Target(lambda data: _options(".yaml").run(data), lambda: _options(".yaml").seeds()),
 }
 
 

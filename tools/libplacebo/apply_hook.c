@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FORMAT_BITS = 32, CHANNELS = 4, MOST_TEXTURES = 4096, STAGES = 9 };
+enum { FORMAT_BITS = 32, CHANNELS = 4, MAX_TEXTURES = 4096, STAGES = 9 };
 
 static const enum pl_hook_stage stages[STAGES] = {
     PL_HOOK_RGB_INPUT,   PL_HOOK_NATIVE, PL_HOOK_RGB,        PL_HOOK_LINEAR, PL_HOOK_PRE_KERNEL,
@@ -26,7 +26,7 @@ struct machine {
     pl_dispatch dispatch;
     pl_fmt format;
     // All textures live until the end.
-    pl_tex textures[MOST_TEXTURES];
+    pl_tex textures[MAX_TEXTURES];
     int count;
 };
 
@@ -39,7 +39,7 @@ static void fail(const char *what)
 static pl_tex get_texture(void *priv, int width, int height)
 {
     struct machine *machine = priv;
-    if (machine->count == MOST_TEXTURES)
+    if (machine->count == MAX_TEXTURES)
         return NULL;
     struct pl_tex_params params = {.w = width,
                                    .h = height,

@@ -1,4 +1,4 @@
-"""Compare own methods with libplacebo: python tools/libplacebo/compare.py APPLY FOLDER.
+"""Compare custom methods with libplacebo: python tools/libplacebo/compare.py APPLY FOLDER.
 
 APPLY is the program that build.sh makes. FOLDER has user shaders. Each file that libplacebo runs is
 loaded and run by vkbloom under validation; the table says the largest difference over the largest
@@ -100,7 +100,7 @@ def compared(apply: str, folder: Path, file: Path, renderer: vkbloom.Renderer) -
     start = time.perf_counter()
     try:
         settings = vkbloom.load_method(file, name="compared")(format="rgba32float")
-        *_, last = renderer.apply_each([image] * FRAMES, settings, attachments="final")
+        *_, last = renderer.map([image] * FRAMES, settings, framebuffers="final")
         got = last["final"].astype(np.float64)
         ours = "drawn"
     except (ValueError, vkbloom.Error) as error:

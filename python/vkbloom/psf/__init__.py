@@ -8,13 +8,13 @@ an image with any of them.
 
 from __future__ import annotations
 
-from .aperture import aperture, iris
-from .base import PSF
-from .eye import cie_general, cie_total, spencer
-from .lens import airy, gaussian, harvey_shack
-from .measuring import measured
-from .renderers import fog_glow, unreal
-from .sampled import samples
+from ._aperture import aperture, iris
+from ._base import PSF
+from ._eye import cie_general, cie_total, spencer
+from ._lens import airy, gaussian, harvey_shack
+from ._measuring import measured
+from ._renderers import fog_glow, unreal
+from ._sampled import samples
 
 __all__ = [
     "PSF",

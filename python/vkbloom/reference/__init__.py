@@ -9,9 +9,9 @@ deferred system, and `vjp` the framebuffers with their derivatives.
 
 from __future__ import annotations
 
-from .compositing import composite
-from .derivatives import vjp
-from .framebuffers import apply, blur, gain, passes
-from .shading import shade
+from ._compositing import composite
+from ._derivatives import vjp
+from ._framebuffers import apply, blur, gain, passes
+from ._shading import shade
 
 __all__ = ["apply", "blur", "composite", "gain", "passes", "shade", "vjp"]

@@ -6,9 +6,11 @@ The laws need no reference picture. They take any callable that maps an image to
 
 from __future__ import annotations
 
-from vkbloom.testing.frame_files import read_frame
-from vkbloom.testing.law_report import LawReport, LawRow, report
-from vkbloom.testing.laws import (
+from vkbloom._views.diagnosis import Diagnosis, diagnose
+from vkbloom._views.tolerances import Tolerances
+from vkbloom.testing._frame_files import read_frame
+from vkbloom.testing._law_report import LawReport, LawRow, report
+from vkbloom.testing._laws import (
     assert_additive,
     assert_bounded_fireflies,
     assert_gain,
@@ -16,8 +18,8 @@ from vkbloom.testing.laws import (
     assert_superposition,
     assert_symmetric,
 )
-from vkbloom.testing.moving_light import Stability, assert_stable, stability
-from vkbloom.testing.point_spread import (
+from vkbloom.testing._moving_light import Stability, assert_stable, stability
+from vkbloom.testing._point_spread import (
     Response,
     assert_centroid_kept,
     assert_separable,
@@ -25,17 +27,15 @@ from vkbloom.testing.point_spread import (
     point_spread,
     response,
 )
-from vkbloom.testing.probe import Probe
-from vkbloom.testing.programs import command
-from vkbloom.testing.regression import FrameDifferenceWarning, FrameRegression
-from vkbloom.testing.scaled_scene import (
+from vkbloom.testing._probe import Probe
+from vkbloom.testing._programs import command
+from vkbloom.testing._regression import FrameDifferenceWarning, FrameRegression
+from vkbloom.testing._scaled_scene import (
     ResolutionResponse,
     assert_resolution_independent,
     resolution_response,
 )
-from vkbloom.testing.veiling_glare import veiling_glare_index
-from vkbloom.views.diagnosis import Diagnosis, diagnose
-from vkbloom.views.tolerances import Tolerances
+from vkbloom.testing._veiling_glare import veiling_glare_index
 
 __all__ = [
     "Diagnosis",

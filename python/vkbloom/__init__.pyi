@@ -1,0 +1,110 @@
+# The public names of the package; lazy_loader reads them, and imports what is asked for.
+from . import psf, reference, testing
+from ._capture import capture
+from ._core import (
+    AdapterNotFoundError,
+    DeviceLostError,
+    Error,
+    OutOfMemoryError,
+    ShaderError,
+    ValidationError,
+)
+from ._custom.method import load_method
+from ._explorer import explore
+from ._fit import FitResult, fit, fit_pyramid, translate
+from ._glare.dirt import Dirt
+from ._glare.flares import Ghosts, Halo
+from ._glare.streaks import Streaks
+from ._gradients import vjp
+from ._grid import reductions
+from ._grid.checking import GridReport, check_grid
+from ._grid.curves import response_curves
+from ._grid.grid import grid
+from ._grid.sheet import contact_sheet
+from ._io.array_files import read, write
+from ._methods.bevy import BevyBloom
+from ._methods.blender import BlenderGlare
+from ._methods.convolution import Convolution
+from ._methods.filament import FilamentBloom
+from ._methods.godot import GodotBloom
+from ._methods.kino import KinoBloom
+from ._methods.mip_chain import DualKawase, Pyramid
+from ._methods.pygfx import PygfxBloom
+from ._methods.separable import Separable, gaussian_weights
+from ._methods.unity import HdrpBloom, UrpBloom
+from ._methods.unreal import UnrealBloom
+from ._renderer.adapter import AdapterInfo, adapters
+from ._renderer.default import apply, default_renderer, render
+from ._renderer.device_arrays import DeviceArray
+from ._renderer.frames import Frames
+from ._renderer.image import Image
+from ._renderer.plans import Plan
+from ._renderer.renderer import Renderer
+from ._scene import Camera, Scene
+from ._settings.glare import Glare
+from ._settings.registry import glares, presets
+from ._settings.settings import Settings
+
+__all__ = [
+    "AdapterInfo",
+    "AdapterNotFoundError",
+    "BevyBloom",
+    "BlenderGlare",
+    "Camera",
+    "Convolution",
+    "DeviceArray",
+    "DeviceLostError",
+    "Dirt",
+    "DualKawase",
+    "Error",
+    "FilamentBloom",
+    "FitResult",
+    "Frames",
+    "Ghosts",
+    "Glare",
+    "GodotBloom",
+    "GridReport",
+    "Halo",
+    "HdrpBloom",
+    "Image",
+    "KinoBloom",
+    "OutOfMemoryError",
+    "Plan",
+    "PygfxBloom",
+    "Pyramid",
+    "Renderer",
+    "Scene",
+    "Separable",
+    "Settings",
+    "ShaderError",
+    "Streaks",
+    "UnrealBloom",
+    "UrpBloom",
+    "ValidationError",
+    "adapters",
+    "apply",
+    "capture",
+    "check_grid",
+    "contact_sheet",
+    "default_renderer",
+    "explore",
+    "fit",
+    "fit_pyramid",
+    "gaussian_weights",
+    "glares",
+    "grid",
+    "load_method",
+    "presets",
+    "psf",
+    "read",
+    "reductions",
+    "reference",
+    "render",
+    "response_curves",
+    "testing",
+    "translate",
+    "vjp",
+    "write",
+]
+
+__version__: str

@@ -1,0 +1,89 @@
+"""Keeps arrays that take long to make: bounded by bytes, and only while a renderer is open."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Any, Final, Protocol, TypeVar, cast
+
+__all__ = ["ArrayCache", "kept", "shared"]
+
+#: The bound while a renderer is open, as that of the core's images. The last array that was made
+#: stays whatever its size, since a plan holds it anyway.
+OPEN_BYTES: Final = 256 << 20
+#: The bound of small arrays that stay in the process, such as masks of apertures.
+CLOSED_BYTES: Final = 16 << 20
+
+
+class _Sized(Protocol):
+    @property
+    def nbytes(self) -> int: ...
+
+
+_Made = TypeVar("_Made", bound=_Sized)
+
+
+class ArrayCache:
+    """Arrays by the arguments of the function that made them, the oldest of which are dropped.
+
+    - `most`: The bound in bytes.
+    - `last`: How many arrays stay even if they are larger.
+    """
+
+    def __init__(self, most: int, last: int) -> None:
+        self._most, self._last = most, last
+        self._arrays: OrderedDict[Hashable, _Sized] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of all arrays."""
+        return sum(array.nbytes for array in self._arrays.values())
+
+    def find(self, key: Hashable) -> _Sized | None:
+        """Return an array, which becomes the newest one."""
+        with self._lock:
+            found = self._arrays.pop(key, None)
+            if found is not None:
+                self._arrays[key] = found
+            return found
+
+    def add(self, key: Hashable, array: _Sized) -> None:
+        """Add the newest array."""
+        with self._lock:
+            self._arrays[key] = array
+            while len(self._arrays) > self._last and self.nbytes > self._most:
+                self._arrays.popitem(last=False)
+
+
+_IN_PROCESS: Final = ArrayCache(CLOSED_BYTES, 0)
+_of_renderers: Callable[[], ArrayCache | None] = lambda: None  # noqa: E731  a dead reference
+
+
+def shared() -> ArrayCache:
+    """Return the arrays of the open renderers, each of which holds them until it is closed."""
+    global _of_renderers  # noqa: PLW0603  a weak reference: the renderers are the owners
+    arrays = _of_renderers()
+    if arrays is None:
+        arrays = ArrayCache(OPEN_BYTES, 1)
+        _of_renderers = weakref.ref(arrays)
+    return arrays
+
+
+def kept(make: Callable[..., _Made]) -> Callable[..., _Made]:
+    """Keep the results of a function of hashable arguments."""
+
+    @functools.wraps(make)
+    def find_or_make(*arguments: Any) -> _Made:
+        arrays = _of_renderers() or _IN_PROCESS
+        key = make, arguments
+        found = arrays.find(key)
+        if found is None:
+            found = make(*arguments)
+            arrays.add(key, found)
+        return cast("_Made", found)
+
+    return find_or_make

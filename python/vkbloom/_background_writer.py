@@ -1,0 +1,43 @@
+"""Results that a thread writes while the next one is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+__all__ = ["written_in_background"]
+
+Result = TypeVar("Result")
+
+
+def written_in_background(
+    made: Iterable[tuple[Result, Callable[[], object]]],
+) -> Iterator[Result]:
+    """Yield each result when its function, which a thread calls, has written it.
+
+    An exception of `made` is raised after the results before it are written and yielded.
+    """
+    with ThreadPoolExecutor(1, "vkbloom-write") as pool:
+        behind: tuple[Result, Future[object]] | None = None
+        failure: Exception | None = None
+        following = iter(made)
+        while True:
+            try:
+                result, write = next(following)
+            except StopIteration:
+                break
+            except Exception as error:
+                failure = error
+                break
+            if behind is not None:
+                behind[1].result()
+                yield behind[0]
+            behind = result, pool.submit(write)
+            # The thread has the only references to what it writes.
+            del write
+        if behind is not None:
+            behind[1].result()
+            yield behind[0]
+    if failure is not None:
+        raise failure

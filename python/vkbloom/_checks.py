@@ -1,0 +1,332 @@
+"""Check arguments: numbers, sizes, times, images, and the optional packages they need.
+
+Each function returns the value to use, or raises an error that names the argument, its value and
+the accepted values.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "FLT_MAX",
+    "as_float",
+    "check_above",
+    "check_emission",
+    "check_floats",
+    "check_framebuffers",
+    "check_image",
+    "check_index",
+    "check_integer",
+    "check_mask",
+    "check_number",
+    "check_size",
+    "check_time",
+    "import_extra",
+    "native_order",
+    "on_another_device",
+]
+
+#: The largest 32-bit float; the device computes in 32-bit floats.
+FLT_MAX = (2 - 2**-23) * 2.0**127
+
+# Fast path for native byte order.
+_DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
+
+_DTYPE_CURES = {
+    "uint16": "; convert it: (image / 65535).astype(np.float32)",
+    "bool": "; convert it: image.astype(np.float32)",
+    np.dtype(np.longdouble).name: "; convert it: image.astype(np.float32)",
+}
+# The device type kDLCPU of DLPack.
+_DLPACK_CPU = 1
+#: Modes of PIL whose arrays are not red, green and blue, and the mode to convert them to.
+_MODE_CURES = {
+    **dict.fromkeys(("1", "L", "P", "CMYK", "YCbCr", "HSV", "RGBX"), "RGB"),
+    **dict.fromkeys(("LA", "La", "PA", "RGBa"), "RGBA"),
+}
+
+
+def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
+    """Import a package that one of vkbloom's extras installs."""
+    try:
+        return importlib.import_module(package)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"{purpose} needs {package}: pip install vkbloom[{extra}]", name=error.name
+        ) from error
+
+
+def as_float(name: str, value: Any) -> float:
+    """Convert a real number to float, or raise TypeError. Too large a number becomes infinity."""
+    try:
+        # float() would accept these types, with a warning for arrays and complex numbers.
+        is_other = isinstance(value, str | bytes | np.complexfloating)
+        if is_other or getattr(value, "ndim", 0) != 0:
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: {value!r} is not a number") from None
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def check_number(name: str, value: float, low: float, high: float) -> float:
+    """Return the value as a float if ``low <= value <= high``.
+
+    Otherwise raise ValueError, naming the field and its range, or TypeError if it is not a number.
+    """
+    number = as_float(name, value)
+    if not low <= number <= high:
+        raise ValueError(f"{name}: {value!r} is out of range, {low:g} to {high:g}")
+    return number
+
+
+def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
+    """Return the values as floats within the 32-bit range, or raise TypeError or ValueError."""
+    try:
+        if isinstance(values, str):
+            raise TypeError
+        numbers = tuple(as_float(name, value) for value in values)
+    except TypeError:
+        raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
+    for number in numbers:
+        # Negated, so that NaN fails too.
+        if not abs(number) <= FLT_MAX:
+            raise ValueError(f"{name}: {number!r} is out of range, {-FLT_MAX:g} to {FLT_MAX:g}")
+    return numbers
+
+
+def check_integer(name: str, value: Any, low: float, high: float) -> int:
+    """Return a number that is an integer as an int, or raise TypeError or ValueError."""
+    integer = int(check_number(name, value, low, high))
+    if integer != value:
+        raise ValueError(f"{name}: {value!r} is not an integer")
+    return integer
+
+
+def check_above(name: str, value: Any, low: float = 0.0) -> float:
+    """Return a finite number above `low` as a float, or raise TypeError or ValueError."""
+    number = as_float(name, value)
+    if not low < number < math.inf:
+        raise ValueError(f"{name}: {value!r} is out of range, above {low:g}")
+    return number
+
+
+def check_size(name: str, size: Any) -> tuple[int, int]:
+    """Return (width, height) as two ints of at least 1, or raise TypeError or ValueError."""
+    try:
+        width, height = size
+        integers = (int(width), int(height))
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{name}: {size!r} is not a pair (width, height)") from None
+    if integers != (width, height) or min(integers) < 1 or max(integers) >= 2**31:
+        raise ValueError(f"{name}: {size!r} is out of range, integers of at least 1")
+    return integers
+
+
+def check_time(time: Any) -> float:
+    """Return the time of a scene as a float, or raise TypeError or ValueError."""
+    turns = as_float("time", time)
+    if not math.isfinite(turns):
+        raise ValueError(f"time: {time!r} is out of range, finite numbers")
+    return turns
+
+
+def check_index(field: str, value: int, low: int, high: int) -> int:
+    """Return an integer, or raise TypeError or ValueError that names the field."""
+    try:
+        index = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{field}: {value!r} is not an integer") from None
+    if not low <= index <= high:
+        raise ValueError(f"{field}: {index} is outside {low} to {high}")
+    return index
+
+
+def check_image(image: object, name: str = "image") -> NDArray[Any]:
+    """Return the image, in this machine's byte order, if the core can take it.
+
+    Errors start with `name`.
+
+    Anything that NumPy can view is an image: arrays, ``__array__``, the buffer protocol, DLPack on
+    the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
+    becomes float32.
+    """
+    mode = _pil_mode(image)
+    if mode in _MODE_CURES:
+        raise ValueError(
+            f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
+            f'{name}.convert("{_MODE_CURES[mode]}")'
+        )
+    array = image if isinstance(image, np.ndarray) else _viewed(image, name)
+    if type(array) is not np.ndarray and np.ma.is_masked(array):
+        raise ValueError(
+            f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
+        )
+    if array.dtype.name == "float64":  # in any byte order
+        array = array.astype(np.float32)
+    if array.dtype not in _DTYPES:
+        if array.dtype.name not in ("uint8", "float16", "float32"):
+            cure = _DTYPE_CURES.get(array.dtype.name, "")
+            raise TypeError(
+                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
+            )
+        array = native_order(array)
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
+        raise ValueError(
+            f"{name}: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            + _shape_cure(array.shape)
+        )
+    return array
+
+
+def native_order(array: NDArray[Any]) -> NDArray[Any]:
+    """Return the values with a dtype that names no byte order, as a view where that is possible.
+
+    Libraries that compare the format strings of the buffer protocol take "f", and not "<f".
+    """
+    native = array.dtype.newbyteorder("=")
+    # `astype` alone keeps the dtype of an array whose order is this machine's.
+    return array.astype(native, copy=False).view(native)
+
+
+def check_emission(emission: object, image: NDArray[Any]) -> NDArray[Any]:
+    """Return the emission if it fits an image that `check_image` returned."""
+    array = check_image(emission, "emission")
+    if array.shape != image.shape:
+        raise ValueError(f"emission: shape {array.shape} is not the image's, {image.shape}")
+    if array.dtype != image.dtype:
+        raise ValueError(f"emission: dtype {array.dtype} is not the image's, {image.dtype}")
+    return array
+
+
+def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
+    if _pil_mode(mask) == "P":
+        raise ValueError('mask: the mode P is a palette; convert it: mask.convert("L")')
+    array = mask if isinstance(mask, np.ndarray) else _viewed(mask, "mask", ("y", "x"))
+    if type(array) is not np.ndarray and np.ma.is_masked(array):
+        raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
+    if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
+        cure = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
+        raise TypeError(
+            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{cure}"
+        )
+    if array.shape != size:
+        cure = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
+        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{cure}")
+    values = array.astype(np.float32, copy=False)
+    if array.dtype.name == "uint8":
+        return values / np.float32(255)
+    # Not the other way round, so that NaN fails too.
+    if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
+        raise ValueError(
+            f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)"
+        )
+    return values
+
+
+def _outside(array: NDArray[Any]) -> float:
+    """Return the first value outside of 0 to 1."""
+    return float(array[~((array >= 0) & (array <= 1))][0])
+
+
+def _viewed(
+    image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
+) -> NDArray[Any]:
+    """Return an array view of an object, or raise TypeError."""
+    dims = getattr(image, "dims", None)
+    if isinstance(dims, tuple) and hasattr(image, "transpose"):
+        # A grid's channels are named after their framebuffer, such as "final_channel".
+        order = [_dimension(dims, one) for one in dimensions]
+        if len(dims) != len(order) or None in order:
+            others = [dim for dim, one in zip(dims, order, strict=False) if dim not in order]
+            cure = (
+                f"select one value of the others first, such as {name}.isel({others[0]}=0)"
+                if len(dims) > len(order) and others
+                else f"rename them: {name}.rename(...)"
+            )
+            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {cure}")
+        return np.asarray(image.transpose(*order))
+    is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
+    try:
+        if hasattr(image, "__dlpack__") and not is_viewed:
+            return np.from_dlpack(image)
+        if is_viewed:
+            return np.asarray(image)
+        return np.asarray(memoryview(image))  # type: ignore[arg-type]
+    except (TypeError, ValueError, RuntimeError, BufferError) as error:
+        if _is_on_device(image):
+            raise TypeError(on_another_device(image, name)) from None
+        raise TypeError(
+            f"{name}: an array is needed, not {type(image).__name__}"
+            + (f"; NumPy: {error}" if is_viewed else "")
+        ) from None
+
+
+def on_another_device(image: object, name: str) -> str:
+    """Return the message for an array that the renderer cannot read."""
+    return (
+        f"{name}: {type(image).__name__} is on another device; copy it to the CPU: "
+        f"{name}.cpu() for PyTorch, {name}.get() for CuPy"
+    )
+
+
+def _is_on_device(image: object) -> bool:
+    """Return whether an array that NumPy cannot view is in the memory of another device."""
+    if hasattr(image, "__cuda_array_interface__"):
+        return True
+    try:
+        kind, _ = image.__dlpack_device__()  # type: ignore[attr-defined]
+    except Exception:  # whatever a foreign object raises
+        return False
+    return bool(kind != _DLPACK_CPU)
+
+
+def _pil_mode(image: object) -> str:
+    """Return the mode of an image of PIL; "" for other objects."""
+    return str(getattr(image, "mode", "")) if type(image).__module__.startswith("PIL.") else ""
+
+
+def _dimension(dims: tuple[Any, ...], name: str) -> Any:
+    """Return the dimension with this name, or the one that ends with an underscore and the name."""
+    if name in dims:
+        return name
+    ending = [dim for dim in dims if str(dim).endswith(f"_{name}")]
+    return ending[0] if len(ending) == 1 else None
+
+
+def _shape_cure(shape: tuple[int, ...]) -> str:
+    """Return a hint how to convert an array of this shape to an image; "" if there is none."""
+    if len(shape) == 2:
+        return "; convert grey to RGB: np.repeat(image[..., None], 3, axis=2)"
+    if len(shape) == 3 and shape[2] == 1:
+        return "; convert grey to RGB: np.repeat(image, 3, axis=2)"
+    if len(shape) == 3 and shape[0] in (3, 4) and shape[2] not in (0, 3, 4):
+        return "; move the channels last: np.moveaxis(image, 0, -1)"
+    if len(shape) == 4 and shape[1] in (3, 4) and shape[3] not in (0, 3, 4):
+        return "; move the channels last: np.moveaxis(images, 1, -1)"
+    return ""
+
+
+def check_framebuffers(framebuffers: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Return the names of the requested framebuffers; None for all."""
+    if isinstance(framebuffers, str):
+        return None if framebuffers == "all" else (framebuffers,)
+    try:
+        names = tuple(framebuffers)
+    except TypeError:
+        raise TypeError(f"framebuffers: {framebuffers!r} is not a sequence of names") from None
+    for name in names:
+        if not isinstance(name, str):
+            raise TypeError(f"framebuffers: {name!r} is not a name")
+    return names

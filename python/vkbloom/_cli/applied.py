@@ -1,0 +1,336 @@
+"""What ``vkbloom apply`` does with its files, one after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import itertools
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import click
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+import vkbloom
+from vkbloom._background_writer import written_in_background
+from vkbloom._cli import no_bloom
+from vkbloom._cli.glow_options import accompanying, uploaded
+from vkbloom._cli.image_files import read_picture
+from vkbloom._cli.large_files import apply_file, finished, is_large
+from vkbloom._cli.overlapped import read_ahead, rendered
+from vkbloom._cli.program import given as was_given
+from vkbloom._cli.streams import PIPE, is_stream
+from vkbloom._cli.terminal import detail, hides_progress, note, say
+from vkbloom._io import image_writing
+from vkbloom._io.array_files import premultiplied
+from vkbloom._io.displayed import Saved
+from vkbloom._io.images import Colour, Picture, SavedColour
+from vkbloom._renderer.frame_files import settings_facts
+
+__all__ = ["Begun", "Options", "Pair", "Run", "of_format"]
+
+#: A file to read, and the file to write.
+Pair: TypeAlias = tuple[str, str]
+#: The settings of a file, and what its highlights are expanded up to.
+Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
+
+# Errors of one file, after which a batch goes on. A lost device fails for all of them.
+_FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
+# Errors about what a picture has, by the argument at their beginning; others hold for all pictures.
+_OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of the command by their names."""
+
+    quality: int | None
+    pipe_format: str
+    framebuffers: str
+    input_colour: Colour | None
+    output_colour: SavedColour | None
+    primaries: str
+    view: str | None
+    raw: bool
+    half: bool | None
+    bits: int | None
+    overwrite: bool
+    skip_existing: bool
+    expand: float | None
+    subimage: int
+    layer: str | None
+    mask: str | None
+    emission: str | None
+    settings: Callable[[str], Begun]
+
+    @property
+    def names(self) -> str | list[str]:
+        """The framebuffers to write."""
+        return "all" if self.framebuffers == "all" else ["final", *self.framebuffers.split(",")]
+
+    @property
+    def saved(self) -> Saved:
+        """What the colours of OUT are to be."""
+        return Saved(self.output_colour, self.primaries, self.view)
+
+
+def of_format(target: str, pipe_format: str) -> str:
+    """Return a file name with the extension of the format of OUT, which may be a stream."""
+    is_nameless = target == PIPE or (is_stream(target) and not Path(target).suffix)
+    return f"image.{pipe_format}" if is_nameless else target
+
+
+class Run:
+    """The files of one call; `failures` has the errors of a batch by the file that was read."""
+
+    def __init__(
+        self,
+        options: Options,
+        out: str,
+        folder: Path,
+        renderer: Callable[[], vkbloom.Renderer],
+        *,
+        several: bool,
+    ) -> None:
+        self._options = options
+        self._out = out
+        self._folder = folder
+        self._renderer = renderer
+        self._several = several
+        self._hidden = hides_progress()
+        # The files are read once.
+        self._glow_of = functools.cache(self._read_glow)
+        self.failures: dict[str, Exception] = {}
+
+    def kind(self, pair: Pair) -> tuple[bool, Begun]:
+        """Return whether a file is read and written in bands of rows, and its settings."""
+        options, name = self._options, pair[0]
+        is_alone = (
+            options.framebuffers == "final" and not is_stream(name) and not is_stream(pair[1])
+        )
+        is_by_rows = is_alone and is_large(name, options.subimage, options.layer)
+        return is_by_rows, options.settings(name)
+
+    @contextlib.contextmanager
+    def _of_file(self, pair: Pair) -> Iterator[None]:
+        """Keep an error of one of several files, so that the others are done."""
+        try:
+            yield
+        except _FAILURES as error:
+            if not self._several:
+                raise
+            self.failures[pair[0]] = error
+
+    def large_file(self, pair: Pair, settings: vkbloom.Settings, expand: float | None) -> None:
+        """Add bloom to one file in bands of rows."""
+        options, (name, target) = self._options, pair
+        with (
+            self._of_file(pair),
+            tqdm(unit="row", leave=False, disable=self._hidden) as bar,
+            _wrong_use_of("mask", "emission", "raw"),
+        ):
+
+            def show(done: int, total: int) -> None:
+                bar.total = total
+                bar.update(done - bar.n)
+
+            self._make_folder(target)
+            notes = apply_file(
+                name,
+                target,
+                settings,
+                renderer=self._renderer(),
+                mask=options.mask,
+                emission=options.emission,
+                layer=options.layer,
+                subimage=options.subimage if was_given("subimage") else None,
+                input_colour=options.input_colour,
+                output_colour=options.output_colour,
+                primaries=options.primaries,
+                view=options.view,
+                raw=options.raw,
+                half=options.half,
+                bits=options.bits,
+                expand=expand,
+                quality=options.quality,
+                progress=show,
+            )
+            for text in notes:
+                note(text)
+            if not self._several:
+                say(f"wrote {target}")
+
+    def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
+        """Add bloom to files one after the other; read and write others meanwhile."""
+        is_blended = settings.alpha != "keep"
+        wanted = no_bloom.with_bloom(self._options.names, settings)
+        glow_of = self._glow_of(is_blended)
+
+        def prepared(found: tuple[Pair, Picture]) -> Any:
+            """Return a picture's image with its mask and emission."""
+            pixels = found[1].pixels
+            return uploaded(self._renderer(), pixels, glow_of(pixels))
+
+        def read(pair: Pair) -> tuple[Pair, Picture] | None:
+            with self._of_file(pair):
+                return pair, self._read(pair[0], expand, is_blended=is_blended)
+            return None
+
+        rest = iter(files)
+        # Read before the device is opened, so that a wrong file fails at once.
+        first = next(filter(None, map(read, rest)), None)
+        if first is None:
+            return
+        renderer = self._renderer()
+        with self._wrong_use_of_all():
+            renderer.plan(prepared(first), settings, framebuffers=wanted)
+        pictures = filter(None, itertools.chain([first], read_ahead(read, rest)))
+        del first
+        results = rendered(renderer, pictures, settings, wanted, prepared)
+        hidden = self._hidden if self._several else True
+        bar = tqdm(results, total=len(files), unit="image", leave=False, disable=hidden)
+        with contextlib.closing(results):
+            for _ in written_in_background(self._made(bar, expand)):
+                pass
+
+    @contextlib.contextmanager
+    def _wrong_use_of_all(self) -> Iterator[None]:
+        """Convert an error of an option to click.UsageError; pass over what fails for one image."""
+        try:
+            yield
+        except (TypeError, ValueError, MemoryError) as error:
+            if self._several and str(error).startswith(_OF_PICTURES):
+                return
+            if isinstance(error, MemoryError):
+                raise
+            raise click.UsageError(str(error)) from error
+
+    def _made(
+        self, results: Iterable[Any], expand: float | None
+    ) -> Iterator[tuple[str, Callable[[], object]]]:
+        """Yield the name of each file, and the function that writes it."""
+        for (pair, picture), frames in results:
+            name, target = pair
+            with self._of_file(pair):
+                if isinstance(frames, Exception):
+                    raise frames
+                texts = [*no_bloom.notes(frames, picture.pixels)]
+                if not no_bloom.is_without(frames) and self._is_straight(picture, target):
+                    texts.append(no_bloom.hidden(frames["final"], frames.settings))
+                for text in filter(None, texts):
+                    note(f"{name}: {text}" if self._several else text)
+                seconds = sum(frames.timings.values())
+                detail(f"{name}: {1e3 * seconds:.2f} ms on the device")
+                kept = no_bloom.only(frames, self._options.names)
+                yield target, functools.partial(self._write, pair, picture, kept, expand)
+
+    def _is_straight(self, picture: Picture, target: str) -> bool:
+        file = of_format(target, self._options.pipe_format)
+        return image_writing.is_straight(file, is_associated=picture.stored.associated)
+
+    def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
+        options = self._options
+        picture = read_picture(
+            source,
+            options.subimage,
+            options.input_colour,
+            layer=options.layer,
+            raw=options.raw,
+            expand=expand,
+            is_blended=is_blended,
+        )
+        return premultiplied(picture) if is_blended else picture
+
+    def _read_glow(self, is_blended: bool) -> Callable[[NDArray[Any]], Any]:
+        """Return a function that gives mask and emission for an image."""
+        options = self._options
+        return accompanying(
+            options.mask,
+            options.emission,
+            options.input_colour,
+            raw=options.raw,
+            is_blended=is_blended,
+        )
+
+    def _make_folder(self, target: str) -> None:
+        """Make the folder of one of several files."""
+        if target != self._out:
+            Path(target).parent.mkdir(exist_ok=True)
+
+    def _write(
+        self, pair: Pair, picture: Picture, frames: vkbloom.Frames, expand: float | None
+    ) -> None:
+        target = pair[1]
+        with self._of_file(pair):
+            self._make_folder(target)
+            file = Path(target)
+            if is_stream(target):
+                suffix = Path(of_format(target, self._options.pipe_format)).suffix
+                file = self._folder / f"output{suffix}"
+            written = _written(picture, frames, file, self._options, expand)
+            if is_stream(target):
+                _send(file, target)
+            elif not self._several:
+                for path in written:
+                    say(f"wrote {path}")
+
+
+def _send(file: Path, target: str) -> None:
+    """Write a file's content to a stream."""
+    with contextlib.ExitStack() as stack:
+        content = stack.enter_context(file.open("rb"))
+        if target == PIPE:
+            shutil.copyfileobj(content, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        else:
+            shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
+
+
+@contextlib.contextmanager
+def _wrong_use_of(*names: str) -> Iterator[None]:
+    """Convert a ValueError that names one of these arguments to click.UsageError."""
+    try:
+        yield
+    except ValueError as error:
+        if str(error).startswith(tuple(f"{name}:" for name in names)):
+            raise click.UsageError(str(error)) from error
+        raise
+
+
+def _written(
+    picture: Picture,
+    frames: vkbloom.Frames,
+    target: Path,
+    options: Options,
+    expand: float | None,
+) -> list[Path]:
+    """Write `final` and the other framebuffers, and return the files."""
+    written = _save_others(frames, target)
+    notes = image_writing.save(
+        finished(picture, frames["final"], frames.settings),
+        target,
+        options.saved,
+        settings_facts(frames.settings, expand),
+        options.quality,
+        bits=options.bits,
+    )
+    for text in notes:
+        note(text)
+    return [target, *written]
+
+
+def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
+    """Write each framebuffer except `final` to its own file."""
+    written: list[Path] = []
+    for name, array in frames.items():
+        if name != "final":
+            alone = vkbloom.Frames(
+                {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
+            )
+            written += alone.save(target.with_name(f"{target.stem}_{name}{target.suffix}"))
+    return written

@@ -1,0 +1,222 @@
+"""``vkbloom check``: measure a bloom by every law."""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import shlex
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+import vkbloom
+from vkbloom._cli.device_options import device_options
+from vkbloom._cli.fields import SIZE, Command
+from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.settings_options import settings_options
+from vkbloom._cli.terminal import detail_device, is_quiet, note, say
+from vkbloom._custom.method import CustomMethod
+from vkbloom._io import safe_writing
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom.testing import _measuring as measuring
+from vkbloom.testing import _showing as showing
+from vkbloom.testing._law_table import law_name
+from vkbloom.testing._programs import Program
+
+
+class CheckCommand(Command):
+    """A command whose argument is a file of a custom method, which adds options."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Load the file before the options are parsed, so that its parameters are options."""
+        taking = {
+            name
+            for one in self.get_params(ctx)
+            if isinstance(one, click.Option) and not one.is_flag
+            for name in one.opts
+        }
+        words = list(args)
+        for place, word in enumerate(words):
+            if word.startswith("-") or (place and words[place - 1] in taking):
+                continue
+            if os.path.isfile(word):
+                words[place : place + 1] = ["--method", vkbloom.load_method(word).method]
+                break
+        return super().parse_args(ctx, words)
+
+
+def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
+    try:
+        return tuple(dict.fromkeys(law_name(name) for name in text.split(",") if name.strip()))
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+@click.command(cls=CheckCommand)
+@click.argument("file", required=False, metavar="[FILE]")
+@click.option(
+    "--command",
+    "program",
+    metavar="'PROGRAM {input} {output}'",
+    help="Measure a program, which reads one image file and writes another.",
+)
+@click.option(
+    "--suffix", default=".exr", show_default=True, help="The type of the program's image files."
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="Seconds that one run of the program may take.",
+)
+@click.option(
+    "--less-input",
+    is_flag=True,
+    help="Measure what the program writes less its input: the bloom alone.",
+)
+@click.option(
+    "--reference",
+    "twin",
+    metavar="FILE.py:FUNCTION",
+    help="Compare each framebuffer with a twin in NumPy.",
+)
+@click.option(
+    "--gain",
+    type=click.FloatRange(0),
+    help="The gain that flat images should have [default: 1 for programs and for files that save "
+    "BLOOM; otherwise what is measured]",
+)
+@click.option(
+    "--measure-size",
+    "measured",
+    type=SIZE,
+    default="256x256",
+    show_default=True,
+    help="Size of the test images; a wide bloom needs a large one.",
+)
+@click.option("--size", type=SIZE, default="1280x720", show_default=True, help="Size of the times.")
+@click.option(
+    "--require",
+    metavar="LAW,...",
+    default="",
+    callback=_laws,
+    help="Exit status 1 if one of these laws is not held.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one object.")
+@click.option(
+    "--html", "page", metavar="FILE", type=click.Path(), help="Write a page with pictures."
+)
+@device_options
+@settings_options
+def command(
+    *,
+    file: str | None,
+    program: str | None,
+    suffix: str,
+    timeout: float,
+    less_input: bool,
+    twin: str | None,
+    gain: float | None,
+    measured: tuple[int, int],
+    size: tuple[int, int],
+    require: tuple[str, ...],
+    as_json: bool,
+    page: str | None,
+    adapter: str,
+    validation: bool,
+    settings: vkbloom.Settings,
+) -> int:
+    """Measure what a bloom is worth.
+
+    FILE is a custom method; its parameters are options. Or give --preset, --method, or --command.
+    Prints the passes and their times; each law, held or by how much it is not; energy, point
+    spread, stability of a moving light, response to the resolution, veiling glare index, the
+    differences from the twin, and the nearest preset. Laws are measured with buffers of 32-bit
+    floats, unless --format is given.
+
+    The exit status is 1 if a law of --require is not held, or was not tested.
+    """
+    _check_choice(file, program, twin)
+    console = Console(stderr=True, quiet=is_quiet())
+    with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
+        detail_device(renderer)
+        if program is None:
+            name = click.get_current_context().params["preset"] or settings.method
+            if twin is not None:
+                _add_twin(settings, twin)
+            subject = measuring.of_settings(renderer, settings, measured, gain)
+            passes, device = measuring.pass_times(renderer, settings, size), renderer.info.summary
+        else:
+            name = program
+            with as_wrong_use():
+                run = Program(shlex.split(program), suffix, timeout)
+            with _notes():
+                subject = measuring.of_program(run, measured, gain, less_input=less_input)
+            passes, device = measuring.run_time(run, size), "this machine"
+        try:
+            found = measuring.measured(
+                subject,
+                renderer,
+                name=name,
+                device=device,
+                settings=measuring.exact(settings) if program is None else None,
+                passes=passes,
+                frame=size,
+                required=require,
+                progress=lambda text: bar.update(f"{name}: {text}"),
+            )
+        except AssertionError as error:
+            raise click.ClickException(f"{name}: {error}") from error
+        if page is not None:
+            safe_writing.write_file(Path(page), showing.as_page(found).encode())
+    if as_json:
+        click.echo(json.dumps(showing.as_values(found), indent=2))
+    else:
+        click.echo(showing.as_text(found))
+    if page is not None:
+        say(f"wrote {page}", err=as_json)
+    for row in showing.broken(found.report):
+        note(f"{name}: required law {row.name}: {row.words}")
+    return 1 if showing.broken(found.report) else 0
+
+
+def _check_choice(file: str | None, program: str | None, twin: str | None) -> None:
+    if file is not None:
+        raise click.UsageError(f"{file}: there is no such file")
+    chosen = [name for name in ("preset", "method") if given(name)]
+    if program is not None and chosen:
+        raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
+    if program is not None and twin is not None:
+        raise click.UsageError("--reference needs FILE; a program has one framebuffer")
+    if program is None and not chosen:
+        raise click.UsageError("give FILE, --preset NAME, --method NAME or --command PROGRAM")
+
+
+@contextmanager
+def _notes() -> Iterator[None]:
+    """Print warnings as notes, without their advice for tests."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        yield
+    for warning in caught:
+        note(str(warning.message).partition("; ")[0])
+
+
+def _add_twin(settings: vkbloom.Settings, place: str) -> None:
+    """Give a custom method its twin, FILE.py:FUNCTION."""
+    path, _, function = place.rpartition(":")
+    if not isinstance(settings, CustomMethod):
+        raise click.UsageError("--reference needs FILE; presets have the package's own reference")
+    if not path or not os.path.isfile(path):
+        raise click.UsageError(f"--reference: {place!r} is not FILE.py:FUNCTION of a file")
+    twin: Callable[..., Any] | None = runpy.run_path(path).get(function)
+    if not callable(twin):
+        raise click.UsageError(f"--reference: {path} has no function {function!r}")
+    type(settings).twin = staticmethod(twin)

@@ -1,0 +1,274 @@
+"""``vkbloom compare``: measure the differences of two image files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import click
+from rich.console import Console
+
+from vkbloom._checks import check_number
+from vkbloom._cli import fields
+from vkbloom._cli.image_files import check_part_is_given, read, subimage_option
+from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.terminal import is_quiet, note, say
+from vkbloom._io import image_writing
+from vkbloom._io.images import Picture, StoredImage
+from vkbloom._views.comparison import ALL_METRICS, USUAL_METRICS, Comparison, compare, difference
+from vkbloom._views.diagnosis import Diagnosis, diagnose
+from vkbloom._views.tolerances import Tolerances, failures
+
+
+def _limit(name: str, text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make the option of a limit: a number, or none."""
+    return click.option(
+        f"--{name.replace('_', '-')}",
+        type=fields.or_none(click.FLOAT),
+        help=f"{text} [default none]",
+    )
+
+
+def tolerances_of(
+    *,
+    max_error: float | None = None,
+    min_ssim: float | None = None,
+    min_psnr: float | None = None,
+    max_flip: float | None = None,
+    fail_percent: float | None = None,
+) -> Tolerances:
+    """Make `Tolerances` from the command line's limits; without a limit, values must be equal."""
+    if max_error is not None:
+        check_number("max_error", max_error, 0.0, math.inf)
+    if fail_percent is not None:
+        # With `fail_percent`, `max_error` is the difference above which a pixel counts as failed.
+        atol, hard_fail = max_error or 0.0, None
+    else:
+        atol, hard_fail = 0.0, max_error
+        has_none = (max_error, min_ssim, min_psnr, max_flip) == (None, None, None, None)
+        fail_percent = 0.0 if has_none else 100.0
+    return Tolerances(
+        atol=atol,
+        fail_percent=fail_percent,
+        hard_fail=hard_fail,
+        ssim=min_ssim,
+        psnr=min_psnr,
+        flip=max_flip,
+    )
+
+
+@click.command()
+@click.argument("first", metavar="A", type=click.Path())
+@click.argument("second", metavar="B", type=click.Path())
+@click.option(
+    "--diff",
+    metavar="OUT",
+    type=click.Path(),
+    help="Write a picture of the absolute differences. Differences in alpha are white; pixels "
+    "that are NaN or infinite in only one image are magenta.",
+)
+@click.option(
+    "--diff-scale",
+    metavar="X",
+    type=click.FLOAT,
+    help="Factor of the differences in that picture [default: makes the largest 1]",
+)
+@click.option(
+    "--allow-nan",
+    is_flag=True,
+    help="Accept NaN, and infinity of the same sign, at pixels where both images have it.",
+)
+@click.option(
+    "--data-range",
+    metavar="X",
+    type=click.FLOAT,
+    help="Data range for SSIM and PSNR [default 1 for integers; for floats the range of the "
+    "values, 0 and 1]",
+)
+@click.option(
+    "--pixels-per-degree",
+    metavar="X",
+    type=click.FLOAT,
+    help="Pixels that one degree of the observer's view spans, for FLIP [default 67]",
+)
+@click.option(
+    "--nits-per-unit",
+    metavar="X",
+    type=click.FLOAT,
+    help="Luminance of a linear value of 1 in cd/m2; with --pixels-per-degree, ColorVideoVDP is "
+    "computed, where its package is installed.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one object.")
+@subimage_option
+@_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
+@_limit("min_ssim", "Smallest allowed structural similarity, -1 to 1")
+@_limit("min_psnr", "Smallest allowed peak signal-to-noise ratio, in dB")
+@_limit("max_flip", "Largest allowed mean FLIP, 0 to 1")
+@_limit(
+    "fail_percent",
+    "Percentage of pixels that may differ by more than --max-error (default 0), 0 to 100",
+)
+def command(
+    *,
+    first: str,
+    second: str,
+    diff: str | None,
+    diff_scale: float | None,
+    allow_nan: bool,
+    data_range: float | None,
+    pixels_per_degree: float | None,
+    nits_per_unit: float | None,
+    as_json: bool,
+    subimage: int,
+    **limits: float | None,
+) -> int:
+    """Compare the image files A (the reference) and B.
+
+    Prints the largest error and its position, the mean error, the percentage of pixels that
+    differ, PSNR and SSIM (scikit-image, over all channels) and the mean FLIP (OpenImageIO, of the
+    colours without alpha: LDR-FLIP of integers as sRGB, HDR-FLIP of floats as linear). It names the
+    cause if a single one explains the difference: a gain, shift, gamma, clamp, flip, another order
+    of channels, premultiplied alpha, NaN or rounding; with the residual that remains. Integers
+    are scaled to 0..1. Stored values are compared without decoding. For files with several parts,
+    as vkbloom render writes them, --subimage chooses the part to compare.
+
+    The exit status is 1 if a limit is exceeded. Without a limit it is 1 if any value differs, as
+    with cmp. It is always 1 if the images differ in size, number of channels or type (integers
+    against floats), if one has NaN or infinity where the other has not, and, without --allow-nan,
+    if both have it. It is also 1 if a figure with a limit cannot be computed, such as the SSIM of
+    an image smaller than 7 pixels.
+    """
+    with as_wrong_use():
+        tolerances = tolerances_of(**limits)
+        if diff is not None:
+            image_writing.check_writable(diff)
+    if diff is None and diff_scale is not None:
+        raise click.UsageError("--diff-scale needs --diff")
+    a, b = read(first, subimage), read(second, subimage)
+    check_part_is_given(first, a)
+    check_part_is_given(second, b)
+    # FLIP of a large picture of floats takes half a minute.
+    with as_wrong_use(), Console(stderr=True, quiet=is_quiet()).status("Comparing"):
+        found = compare(
+            a.pixels,
+            b.pixels,
+            threshold=tolerances.atol or 0.0,
+            allow_nan=allow_nan,
+            data_range=data_range,
+            metrics=USUAL_METRICS if nits_per_unit is None else ALL_METRICS,
+            nits_per_unit=nits_per_unit,
+            pixels_per_degree=pixels_per_degree,
+        )
+        cause = diagnose(a.pixels, b.pixels)
+    found = _with_windows(found, a, b)
+    failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
+    scale = None
+    if diff is not None and found.max_error is None:
+        note(f"{diff} is not written: the images have no values to compare")
+    elif diff is not None:
+        scale = _write_difference(a, b, diff, diff_scale)
+    if as_json:
+        shown = _object((first, second), found, failed, scale, cause)
+        click.echo(json.dumps(shown, indent=2))
+    else:
+        for line in _lines((first, second), a, found, failed, cause):
+            click.echo(line)
+        if scale is not None:
+            say(f"wrote {diff}, differences times {scale:.6g}")
+    return 1 if failed else 0
+
+
+def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
+    """Add a mismatch if images of one size have different data or display windows."""
+    windows = [(*image.origin, *image.display) for image in (a, b)]
+    if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
+        return found
+    places = " against ".join(
+        f"data at {x},{y} and display {width} x {height} at {left},{top}"
+        for x, y, left, top, width, height in windows
+    )
+    reason = f"the windows differ, {places}"
+    return dataclasses.replace(found, mismatches=(*found.mismatches, reason))
+
+
+def _write_difference(a: StoredImage, b: StoredImage, path: str, scale: float | None) -> float:
+    """Write the difference picture and return its scale."""
+    with as_wrong_use():
+        picture, used = difference(a.pixels, b.pixels, scale)
+    for text in image_writing.save(Picture.of_values(picture), path):
+        note(text)
+    return used
+
+
+def _object(
+    files: tuple[str, str],
+    found: Comparison,
+    failed: tuple[str, ...],
+    scale: float | None,
+    cause: Diagnosis,
+) -> dict[str, Any]:
+    """Return the object that --json prints. JSON has no infinity, so it becomes None."""
+    figures = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in dataclasses.asdict(found).items()
+    }
+    return {
+        "a": files[0],
+        "b": files[1],
+        "passed": not failed,
+        "failures": failed,
+        "identical": found.identical,
+        "diagnosis": dataclasses.asdict(cause),
+        **figures,
+        "diff_scale": scale,
+    }
+
+
+def _lines(
+    files: tuple[str, str],
+    a: StoredImage,
+    found: Comparison,
+    failed: tuple[str, ...],
+    cause: Diagnosis,
+) -> list[str]:
+    """Return the lines of the text report."""
+    height, width = a.pixels.shape[:2]
+    lines = [" and ".join(files)]
+    lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
+    if found.percent_over is not None:
+        lines += _figures(found, a.channels)
+    lines.append(f"  cause      {cause.summary}")
+    for reason in failed:
+        lines.append(f"FAILED: {reason}")
+    if not failed:
+        lines.append("identical" if found.identical else "passed")
+    return lines
+
+
+def _figures(found: Comparison, channels: tuple[str, ...]) -> list[str]:
+    largest = _shown(found.max_error)
+    if found.max_error_at is not None and found.max_error_values is not None:
+        x, y, channel = found.max_error_at
+        values = " against ".join(f"{value:.6g}" for value in found.max_error_values)
+        largest += f" at x {x}, y {y}, channel {channels[channel]}: {values}"
+    over = f" by more than {found.threshold:g}" if found.threshold else ""
+    rows = {
+        "max error": largest,
+        "mean error": _shown(found.mean_error),
+        "pixels": f"{_shown(found.percent_over)} % differ{over}",
+        "PSNR": f"{_shown(found.psnr)} dB" if found.psnr is not None else "",
+        "SSIM": _shown(found.ssim),
+        "FLIP": _shown(found.flip),
+    }
+    if found.cvvdp is not None:
+        rows["CVVDP"] = f"{_shown(found.cvvdp)} JOD"
+    for name, reason in found.not_computed.items():
+        rows[name.upper()] = f"not computed: {reason}"
+    return [f"  {label:<11}{text}" for label, text in rows.items()]
+
+
+def _shown(value: float | None) -> str:
+    return "no values to compare" if value is None else f"{value:.6g}"

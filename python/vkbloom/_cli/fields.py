@@ -1,0 +1,405 @@
+"""Make options from the descriptions of fields, so that a new field needs no code here."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+from click.shell_completion import CompletionItem
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom import psf
+from vkbloom._cli.image_files import silenced
+from vkbloom._cli.program import given
+from vkbloom._cli.streams import as_file
+from vkbloom._settings.fields import FieldInfo, Kind, fields_of
+from vkbloom._settings.glare import Glare
+from vkbloom._settings.registry import METHODS, STAGES, glares
+from vkbloom._suggestions import did_you_mean, nearest, unknown
+from vkbloom.psf._base import PSF, functions
+
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Any]
+else:
+    # Only later versions of click make it generic.
+    _ParamType = click.ParamType
+
+
+class _Word(_ParamType):
+    """The type of an option whose value is one word, such as 256x256.
+
+    An error says that the word does not have the form, or with `explains` the reader's reason.
+    """
+
+    def __init__(self, form: str, read: Callable[[str], Any], *, explains: bool = False) -> None:
+        self.name = form
+        self._read = read
+        self._explains = explains
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """Return the placeholder of the value in the help."""
+        return self.name
+
+    def convert(
+        self, value: str, param: click.Parameter | None, ctx: click.Context | None
+    ) -> object:
+        """Parse the word."""
+        try:
+            return self._read(value)
+        except (TypeError, ValueError, click.BadParameter) as error:
+            reason = f": {error}" if self._explains else f" is not {self.name}"
+            self.fail(f"{value!r}{reason}", param, ctx)
+
+
+def _read_size(word: str) -> tuple[int, int]:
+    width, height = word.lower().split("x")
+    return int(width), int(height)
+
+
+def _read_numbers(word: str, separator: str = ",") -> tuple[float, ...]:
+    return tuple(float(number) for number in word.split(separator))
+
+
+def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
+    return tuple(_read_numbers(pair, ":") for pair in word.split(","))
+
+
+def _read_psf(word: str) -> PSF:
+    """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
+    name, _, rest = word.partition(":")
+    if name.lower() in functions():
+        return PSF.from_dict({"psf": name.lower()} | _read_fields(rest))
+    if not os.path.exists(word):
+        near = did_you_mean(name, functions())
+        raise ValueError(f"is neither a file nor one of {', '.join(functions())}{near}")
+    return psf.samples(read_colours(word))
+
+
+def read_colours(path: str) -> NDArray[Any]:
+    """Read the colours of an image file, (H, W, 3), or raise OSError or click.ClickException."""
+    try:
+        with silenced(), as_file(path) as file:
+            return vkbloom.read(file)[..., :3]
+    except ValueError as error:
+        # The file is at fault, and not the use of the option.
+        raise click.ClickException(str(error)) from error
+
+
+def _read_fields(text: str) -> dict[str, object]:
+    """Parse A=1,B=[2,3]: values by name. Lists are written as in JSON."""
+    fields: dict[str, object] = {}
+    for part in re.split(r",(?=[^=\[\]]*(?:=|$))", text) if text else ():
+        name, sign, value = part.partition("=")
+        if not sign:
+            raise ValueError(f"{part!r} is not NAME=VALUE")
+        fields[name.strip()] = _plain(value)
+    return fields
+
+
+def _plain(text: str) -> object:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+#: The type of an option for (width, height).
+SIZE: Final = _Word("WxH", _read_size)
+
+
+def _read_glare(word: str) -> tuple[Glare, ...]:
+    """Parse names of glares and stages with fields, as streaks:directions=4,angle=45+halo."""
+    if word.lower() in ("", "none"):
+        return ()
+    found: list[Glare] = []
+    for one in word.split("+"):
+        name, sign, rest = one.partition(":")
+        name = name.lower()
+        if name in glares:
+            if sign:
+                raise ValueError(f"{name} is a published glare, which takes no fields")
+            found += glares[name]
+            continue
+        if name not in STAGES:
+            known = [*STAGES, *glares]
+            raise ValueError(
+                f"{name!r} is not one of {', '.join(known)}{did_you_mean(name, known)}"
+            )
+        found.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
+    return tuple(found)
+
+
+_OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
+    "psf": _Word("NAME[:A=1,...]|FILE", _read_psf, explains=True),
+    "glare": _Word("NAME[:A=1,...]+...", _read_glare, explains=True),
+    "flag": click.BOOL,
+    "number": click.FLOAT,
+    "integer": click.INT,
+    "size": SIZE,
+    "numbers": _Word("A,B,...", _read_numbers),
+    "vector": _Word("X,Y,Z", _read_numbers),
+    "pairs": _Word("A:B,C:D,...", _read_pairs),
+}
+
+
+def option_type(info: FieldInfo) -> _ParamType:
+    """Return the option type of a field, or raise TypeError if its kind has none."""
+    if info.kind == "choice":
+        kind: _ParamType = click.Choice(info.choices, case_sensitive=False)
+    elif info.kind in _OPTION_TYPES:
+        kind = _OPTION_TYPES[info.kind]
+    else:
+        raise TypeError(f"{info.name}: a field of this type has no option")
+    return or_none(kind) if info.optional else kind
+
+
+def or_none(kind: _ParamType) -> _ParamType:
+    """Return a type that also takes the word none."""
+
+    def read(word: str) -> object:
+        return None if word.lower() == "none" else kind.convert(word, None, None)
+
+    choices = kind.choices if isinstance(kind, click.Choice) else [kind.name]
+    return _Word("|".join([*choices, "none"]), read)
+
+
+def _spelled(value: object, separator: str = ",") -> str:
+    """Write a default value in the syntax of its option."""
+    match value:
+        case bool():
+            return "on" if value else "off"
+        case float():
+            return f"{value:.12g}"
+        case PSF():
+            return type(value).__name__
+        case ():
+            return "none"
+        case tuple():
+            return separator.join(_spelled(part, ":") for part in value)
+        case _:
+            return str(value).lower()
+
+
+class FieldOption(click.Option):
+    """An option of a field, whose value `FieldOptions` collects.
+
+    `Command` lists it under the labels of the classes that have it; None: with its own options.
+    """
+
+    def __init__(self, infos: Mapping[str, FieldInfo], into: str, prefix: str) -> None:
+        first = next(iter(infos.values()))
+        kinds = {(info.kind, info.choices) for info in infos.values()}
+        if len(kinds) > 1:
+            raise TypeError(f"{first.name} is {' as well as '.join(one for one, _ in kinds)}")
+        # The option accepts none if one of the classes does.
+        widest = next((info for info in infos.values() if info.optional), first)
+        option = f"{prefix}{first.option}".replace("_", "-")
+        is_flag = first.kind == "flag"
+        super().__init__(
+            [
+                f"--{option}/--no-{option}" if is_flag else f"--{option}",
+                option.replace("-", "_"),
+            ],
+            default=None,
+            type=None if is_flag else option_type(widest),
+            help=" ".join(_help(label, info) for label, info in infos.items()),
+            expose_value=False,
+        )
+        self.field = first.name
+        self.into = into
+        self.labels = None if prefix else tuple(filter(None, infos))
+
+    def handle_parse_result(
+        self, ctx: click.Context, opts: Mapping[str, Any], args: list[str]
+    ) -> tuple[Any, list[str]]:
+        """Add a value that the user gave to those of the other fields."""
+        value, args = super().handle_parse_result(ctx, opts, args)
+        if self.name is not None and given(self.name, ctx):
+            ctx.params[self.into][self.field] = value
+        return value, args
+
+
+def _help(label: str, info: FieldInfo) -> str:
+    default = f"{label and label + ', '}default {_spelled(info.default)}"
+    return f"{info.help} [{default}]".strip()
+
+
+class FieldOptions(click.Option):
+    """The place of the options of some classes' fields, which `Command` makes when it is called.
+
+    - `param_decls`: The command's keyword argument that receives the values of the call: a dict of
+      field name to value.
+    - `kinds`: Dataclasses by their label in the help; "" for no label. A field that several
+      dataclasses have is one option, whose help has the text of each. A registry is read at each
+      call.
+    - `base`: A dataclass whose fields get no options.
+    - `prefix`: Of the options' names, as in "camera-".
+    """
+
+    def __init__(
+        self,
+        param_decls: Sequence[str],
+        kinds: Mapping[str, type[Any]],
+        base: type[Any] | None = None,
+        prefix: str = "",
+    ) -> None:
+        (self.into,) = param_decls
+        super().__init__([f"--{self.into}-fields", self.into], hidden=True, expose_value=False)
+        self._kinds, self._base, self._prefix = kinds, base, prefix
+        self._made: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
+
+    def options(self) -> list[FieldOption]:
+        """Return the options of the classes that there are now."""
+        kinds = dict(self._kinds)
+        if kinds != self._made[0]:
+            inherited = fields_of(self._base) if self._base else {}
+            fields: dict[str, dict[str, FieldInfo]] = {}
+            for label, kind in kinds.items():
+                for name, info in fields_of(kind).items():
+                    if name in inherited:
+                        continue
+                    if METHODS.is_added(label) and any(
+                        (one.kind, one.choices) != (info.kind, info.choices)
+                        for one in fields.get(name, {}).values()
+                    ):
+                        # A custom method was loaded for this call: its field has the option.
+                        del fields[name]
+                    fields.setdefault(name, {})[label] = info
+            made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
+            self._made = kinds, made
+        return self._made[1]
+
+
+# Where a call keeps the method that its help is about.
+_METHOD: Final = "vkbloom.method"
+# Width of the options' names in the help of a method, which fits on a screen of 50 lines.
+_NARROW: Final = 24
+
+
+class Command(click.Command):
+    """A command with options of fields; its help lists those of a method that the call names."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the parameters, with the options of fields in the place of each `FieldOptions`."""
+        found: list[click.Parameter] = []
+        for one in super().get_params(ctx):
+            found += one.options() if isinstance(one, FieldOptions) else [one]
+        return found
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Begin with no values of fields."""
+        ctx.meta[_METHOD] = _method_of(args)
+        places = (one for one in self.params if isinstance(one, FieldOptions))
+        ctx.params.update({place.into: {} for place in places})
+        return super().parse_args(ctx, args)
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the description; with a method only its first paragraph."""
+        if ctx.meta.get(_METHOD):
+            formatter.write_paragraph()
+            with formatter.indentation():
+                formatter.write_text(inspect.cleandoc(self.help or "").partition("\n\n")[0])
+        else:
+            super().format_help_text(ctx, formatter)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the command's own options and the settings of every method.
+
+        With --method or --preset the former by their names only, and the method's settings.
+        """
+        general: list[click.Option] = []
+        shared: list[click.Option] = []
+        for one in self.get_params(ctx):
+            if isinstance(one, FieldOption) and one.labels is not None:
+                shared += [] if one.labels else [one]
+            elif isinstance(one, click.Option):
+                general.append(one)
+        method = ctx.meta.get(_METHOD)
+        if method:
+            with formatter.section(f"Options ({ctx.command_path} --help describes them)"):
+                formatter.write_text(" ".join(max(one.opts, key=len) for one in general))
+            with formatter.section(f"Settings of the method {method}"):
+                formatter.write_dl(_records(ctx, _options_of(method)), col_max=_NARROW)
+            return
+        with formatter.section("Options"):
+            formatter.write_dl(_records(ctx, general))
+        if shared:
+            with formatter.section("Settings of every method"):
+                formatter.write_dl(_records(ctx, shared))
+        if any(one.type.name == "method" for one in general):
+            call = f"{ctx.command_path} --method NAME --help"
+            with formatter.section(f"{call} lists the settings of"):
+                formatter.write_text(", ".join(METHODS))
+
+
+def _method_of(args: Sequence[str]) -> str | None:
+    """Return the method that the words of a call name, by --method or --preset."""
+    for word, after in itertools.zip_longest(args, args[1:], fillvalue=""):
+        option, sign, value = word.partition("=")
+        value = value if sign else after
+        if option == "--method" and (name := nearest(value, METHODS)):
+            return name
+        if option == "--preset" and (name := nearest(value, vkbloom.presets)):
+            return vkbloom.presets[name].method
+    return None
+
+
+def _options_of(method: str) -> list[click.Option]:
+    """Return options of what a method has, with its own defaults; those of all methods last."""
+    fields = fields_of(METHODS[method]).values()
+    # A field with one value is none to choose.
+    infos = [info for info in fields if not info.fixed and len(info.choices) != 1]
+    infos.sort(key=lambda info: info.name in fields_of(vkbloom.Settings))
+    return [FieldOption({"": info}, "", "") for info in infos]
+
+
+def _records(ctx: click.Context, options: Iterable[click.Option]) -> list[tuple[str, str]]:
+    return [record for one in options if (record := one.get_help_record(ctx)) is not None]
+
+
+def options(
+    kinds: Mapping[str, type[Any]], into: str, *, base: type[Any] | None = None, prefix: str = ""
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that adds `FieldOptions` to a `Command`."""
+    return click.option(into, cls=FieldOptions, kinds=kinds, base=base, prefix=prefix)
+
+
+class NameOf(_ParamType):
+    """The type of an option whose value is a published name; upper case makes no difference.
+
+    - `kind`: What has the name, such as "preset".
+    - `known`: The names, or what has them as keys. Registries are read at each call.
+    """
+
+    def __init__(self, kind: str, *known: Iterable[str]) -> None:
+        self.name = kind
+        self._known = known
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        """Return the placeholder of the value in the help."""
+        return "NAME"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name as it was published."""
+        names = {one.lower(): one for names in self._known for one in names}
+        if value.lower() not in names:
+            self.fail(unknown(f"unknown {self.name}", value, names.values()), param, ctx)
+        return names[value.lower()]
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return the names that begin with some letters."""
+        return [
+            CompletionItem(one)
+            for names in self._known
+            for one in names
+            if one.startswith(incomplete.lower())
+        ]

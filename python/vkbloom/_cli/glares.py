@@ -1,0 +1,42 @@
+"""``vkbloom glares``: list the stages and published names of glare, or draw a picture with each."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Sequence
+
+from vkbloom._cli.listing import Entry, listing_command
+from vkbloom._presets.named_glares import GLARES
+from vkbloom._settings.glare import Glare, GlareLight
+from vkbloom._settings.registry import STAGES
+from vkbloom._settings.settings import Settings
+
+
+def entries() -> Iterator[Entry]:
+    """Yield the stages with their defaults, then the published glares."""
+    for name, kind in STAGES.items():
+        what = (inspect.getdoc(kind) or "").partition(".")[0]
+        yield _entry(name, what[:1].lower() + what[1:], "a stage with its defaults", (kind(),))
+    for name, one in GLARES.items():
+        yield _entry(name, one.what, one.whose, one.stages)
+
+
+def _entry(name: str, what: str, whose: str, stages: Sequence[Glare]) -> Entry:
+    lights = [stage for stage in stages if isinstance(stage, GlareLight)]
+    composite = "add" if lights else "multiply"
+    needs_hdr = bool(lights) and min(stage.threshold for stage in lights) >= 1
+    values = {"glare": [stage.to_dict() for stage in stages]}
+    return Entry(name, what, whose, composite, needs_hdr, values)
+
+
+def _shown(entry: Entry, base: Settings) -> Settings:
+    stages = GLARES[entry.name].stages if entry.name in GLARES else (STAGES[entry.name](),)
+    return base.replace(glare=stages)
+
+
+command = listing_command(
+    "List what --glare takes: stages and published glares, whose they are, and whether they need "
+    "values above 1. Stages add their light to the bloom, dirt multiplies it.",
+    entries,
+    _shown,
+)

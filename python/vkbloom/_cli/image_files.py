@@ -1,0 +1,212 @@
+"""Read the image files of a command, and print notes about them."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, suppress
+from typing import Any, Final
+
+import click
+import numpy as np
+
+from vkbloom._cli.program import given
+from vkbloom._cli.streams import as_file, shown
+from vkbloom._cli.terminal import detail, note
+from vkbloom._io import image_reading
+from vkbloom._io.alpha import hidden_notes
+from vkbloom._io.colour import check_space
+from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._io.images import Colour, Picture, StoredImage
+
+#: Encodings of a written file.
+COLOURS: Final = ("linear", "srgb")
+
+_STANDARD_ERROR = 2
+
+
+def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--subimage``, the argument of `vkbloom._io.image_reading.load`."""
+    return click.option(
+        "--subimage",
+        metavar="N",
+        type=click.IntRange(min=0),
+        default=0,
+        show_default=True,
+        help="Index of the part to read from a file with several parts.",
+    )(command)
+
+
+def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--layer``, the argument of `vkbloom.read`."""
+    return click.option(
+        "--layer",
+        metavar="NAME",
+        help="The layer to read from an OpenEXR file with several layers, such as "
+        "ViewLayer.Combined.",
+    )(command)
+
+
+def expand_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--expand``, the argument of `vkbloom.read`."""
+    return click.option(
+        "--expand",
+        metavar="X",
+        type=click.FloatRange(1, 1024),
+        help="What the highlights of a file of integers are expanded up to, so that they can glow; "
+        f"1: they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
+    )(command)
+
+
+def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--input-colour``, the argument `colour` of `vkbloom._io.image_reading.decode`."""
+    return click.option(
+        "--input-colour",
+        metavar="linear|srgb|SPACE",
+        help="Colour space of the file; SPACE is one of OpenColorIO's built-in configuration, such "
+        "as ACEScg or 'Linear Rec.2020' [default linear for floats; for integers that of the file, "
+        "or srgb if it names none]",
+    )(command)
+
+
+def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
+    """Read an image file; libraries print no messages of their own."""
+    with silenced(), as_file(path) as file:
+        return image_reading.load(file, subimage, layer)
+
+
+def check_part_is_given(path: str, stored: StoredImage) -> None:
+    """Raise click.UsageError if a file has several parts and --subimage is not given."""
+    if len(stored.parts) > 1 and not given("subimage"):
+        parts = image_reading.listed_parts(stored)
+        raise click.UsageError(f"{path}: has several parts; choose one with --subimage: {parts}")
+
+
+def check_input_colour(colour: Colour | None) -> None:
+    """Raise click.UsageError for a colour space that is not known."""
+    if colour in (None, *COLOURS):
+        return
+    try:
+        check_space(str(colour))
+    except ValueError as error:
+        raise click.UsageError(f"--input-colour: {error}") from error
+
+
+def read_picture(
+    source: str,
+    subimage: int,
+    colour: Colour | None,
+    *,
+    layer: str | None = None,
+    raw: bool = False,
+    expand: float | None = None,
+    is_blended: bool = True,
+) -> Picture:
+    """Read an image file, decode it for a renderer, and print notes about its contents.
+
+    `is_blended`: Whether its colours are multiplied by alpha afterwards.
+    """
+    check_input_colour(colour)
+    stored = read(source, subimage, layer)
+    source = shown(source)
+    if raw and stored.pixels.dtype != np.uint8:
+        raise not_of_bytes(source, stored.numbers[0])
+    picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
+    note_parts(source, stored, layer)
+    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    if (text := image_reading.specials_note(*counts)) is not None:
+        note(f"{source} {text}")
+    height, width = picture.pixels.shape[:2]
+    detail(f"{source}: {width} x {height}, {picture.numbers}")
+    hidden = 0.0 if is_blended else picture.hidden
+    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
+        note(f"{source}: {text}")
+    return picture
+
+
+def is_photograph(source: str) -> bool:
+    """Whether a file holds integers for SDR.
+
+    False for what cannot be read: the error comes from the command that reads it.
+    """
+    with (
+        suppress(OSError, ValueError),
+        silenced(),
+        as_file(source) as file,
+        image_reading.opened(file, "Reading images") as reader,
+    ):
+        return image_reading.is_photograph(reader)
+    return False
+
+
+def not_of_bytes(source: str, numbers: str) -> click.UsageError:
+    """Return the error for --raw with a file that does not have 8-bit integers."""
+    return click.UsageError(f"--raw: {source} has {numbers}, not 8-bit integers; leave out --raw")
+
+
+def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
+    """Print a note if the first of several parts was read without --subimage."""
+    if len(stored.parts) > 1 and layer is None and not given("subimage"):
+        parts = image_reading.listed_parts(stored)
+        note(f"{source}: read the first of its {parts}; --subimage reads another")
+
+
+_quiet = threading.Lock()
+
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Suppress what C libraries print on standard error.
+
+    libpng prints messages about damaged files, instead of passing them to OpenImageIO. The output
+    of this program still goes to standard error. A nested call does nothing.
+    """
+    # Standard error was closed when this process began, so descriptor 2 may be another file.
+    if sys.stderr is None or not _quiet.acquire(blocking=False):
+        yield
+        return
+    try:
+        with _redirected():
+            yield
+    finally:
+        _quiet.release()
+
+
+@contextmanager
+def _redirected() -> Iterator[None]:
+    sys.stderr.flush()
+    try:
+        kept = os.dup(_STANDARD_ERROR)
+    except OSError:
+        # Descriptor 2 is closed, so nothing can be printed.
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, _STANDARD_ERROR)
+        with _elsewhere(kept):
+            yield
+    finally:
+        os.dup2(kept, _STANDARD_ERROR)
+        os.close(nowhere)
+        os.close(kept)
+
+
+@contextmanager
+def _elsewhere(descriptor: int) -> Iterator[None]:
+    """Redirect Python's standard error to a descriptor, if it is that of the process."""
+    stream = sys.stderr
+    try:
+        is_own = stream.fileno() == _STANDARD_ERROR
+    except (OSError, ValueError, AttributeError):
+        is_own = False
+    if not is_own:
+        yield
+        return
+    own = os.fdopen(
+        descriptor, "w", 1, encoding=stream.encoding, errors=stream.errors, closefd=False
+    )
+    with own, redirect_stderr(own):
+        yield

@@ -1,0 +1,128 @@
+"""The state of a window with live controls, and how keys and the mouse change it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import vkbloom
+from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import Settings, Shading
+
+__all__ = ["HELP", "Live"]
+
+HELP: Final = """\
+B              bloom on, off
+Up, Down       scale of the blur, 0.1 to 2
+Left, Right    strength
+1 ... 9        the framebuffer that is shown
+M, P           the next method, the next preset
+Space          pauses the animation
+drag, wheel    turn the scene, zoom
+S              writes all framebuffers to files
+Q, Escape      close\
+"""
+
+# A key changes the first of these fields that the settings have.
+_SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
+_STRENGTHS: Final = ("blur_strength", "intensity")
+_STEP: Final = 0.1
+_TURN_SECONDS: Final = 8.0
+_DEGREES: Final = 0.4  # rotation per pixel of mouse movement
+_ZOOM: Final = 0.9  # factor of the distance per step of the wheel
+
+
+def _after(value: object, values: Mapping[str, Any]) -> Any:
+    """Return the value after another one; the first one if there is none."""
+    found = list(values.values())
+    return found[(found.index(value) + 1) % len(found) if value in found else 0]
+
+
+@dataclasses.dataclass
+class Live:
+    """The state of a window.
+
+    - `shading`: Of a scene.
+    - `framebuffer`: Name of the framebuffer that is shown.
+    - `time`: Time of the animation, in periods.
+    - `screenshot`: Whether to write a screenshot after the next frame.
+    """
+
+    settings: Settings
+    source: Any
+    shading: Shading = "forward"
+    framebuffer: str = "final"
+    time: float = 0.0
+    paused: bool = False
+    closed: bool = False
+    screenshot: bool = False
+
+    def press(self, key: str, names: list[str]) -> None:
+        """Do what a key stands for; `names` are the framebuffers that there are."""
+        if key in "bmp":
+            # The next settings may lack the framebuffer.
+            self.framebuffer = "final"
+        if key == "b":
+            self.settings = self.settings.replace(bloom=not self.settings.bloom)
+        elif key in ("up", "down"):
+            self._step(_SCALES, _STEP if key == "up" else -_STEP, 0.1, 2.0)
+        elif key in ("right", "left"):
+            self._step(_STRENGTHS, _STEP if key == "right" else -_STEP, 0.0, math.inf)
+        elif key in "123456789" and int(key) <= len(names):
+            self.framebuffer = names[int(key) - 1]
+        elif key == "m":
+            shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
+            self.settings = _after(type(self.settings), METHODS)(**shown)
+        elif key == "p":
+            self.settings = _after(self.settings, vkbloom.presets)
+        elif key == "space":
+            self.paused = not self.paused
+        elif key == "s":
+            self.screenshot = True
+        elif key in ("q", "escape"):
+            self.closed = True
+
+    def _step(self, names: tuple[str, ...], step: float, low: float, high: float) -> None:
+        """Change the value of the first of the names, no further than these."""
+        for name in self._of(names):
+            value = min(max(round(getattr(self.settings, name) + step, 4), low), high)
+            # The settings refuse what is beyond their range.
+            with contextlib.suppress(ValueError):
+                self.settings = self.settings.replace(**{name: value})
+
+    def _of(self, names: tuple[str, ...]) -> list[str]:
+        return [name for name in names if hasattr(self.settings, name)][:1]
+
+    def drag(self, x: float, y: float) -> None:
+        """Turn the scene by pixels of the mouse."""
+        about_x, about_y, about_z = self.source.camera.rotation
+        self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
+
+    def scroll(self, steps: float) -> None:
+        """Move the camera towards the scene, or away from it."""
+        x, y, z = self.source.camera.position
+        self._see(position=(x, y, z * _ZOOM**steps))
+
+    def _see(self, **changes: Any) -> None:
+        camera = dataclasses.replace(self.source.camera, **changes)
+        self.source = dataclasses.replace(self.source, camera=camera)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if not self.paused:
+            self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
+
+    def title(self, seconds: float) -> str:
+        """Return the text of the title; `seconds` is the time of a frame."""
+        names = [*self._of(_SCALES), *self._of(_STRENGTHS)] if self.settings.bloom else []
+        parts = [
+            f"{self.framebuffer}: {self.settings.method}",
+            *(f"{name} {getattr(self.settings, name):g}" for name in names),
+            *(["no bloom"] if not names else []),
+            *(["paused"] if self.paused else []),
+            f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
+        ]
+        return " | ".join(parts)

@@ -1,0 +1,32 @@
+"""``vkbloom presets``: list the presets, or draw a picture with each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vkbloom._cli.listing import Entry, listing_command
+from vkbloom._cli.settings_options import PRESET_OF_PHOTOS
+from vkbloom._presets.named_settings import PRESETS
+from vkbloom._settings.settings import Settings
+
+
+def entries() -> Iterator[Entry]:
+    """Yield the presets."""
+    for name, one in PRESETS.items():
+        settings = one.make()
+        # The command line expands the highlights of a photograph for the preset photo.
+        needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
+        values = {"intensity": settings.intensity, "settings": settings.to_dict()}
+        yield Entry(name, one.what, one.whose, settings.composite, needs_hdr, values)
+
+
+def _shown(entry: Entry, _: Settings) -> Settings:
+    return PRESETS[entry.name].make()
+
+
+command = listing_command(
+    "List the presets: what they look like, whose they are, whether they mix or add, and whether "
+    "they need values above 1.",
+    entries,
+    _shown,
+)

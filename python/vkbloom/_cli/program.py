@@ -1,0 +1,239 @@
+"""The program: its commands, and the conversion of errors to one line and an exit status."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import Any, Final, NoReturn
+
+import click
+from click.core import ParameterSource
+from click.shell_completion import CompletionItem
+
+import vkbloom
+from vkbloom._cli import terminal
+from vkbloom._cli.interrupts import INTERRUPTED, raise_interrupts
+from vkbloom._free_memory import ADVICE, memory_left
+from vkbloom._settings.registry import METHODS
+from vkbloom._suggestions import did_you_mean
+
+#: Names of the modules of this package that have a click command called `command`.
+COMMANDS: Final = (
+    "render",
+    "apply",
+    "view",
+    "explore",
+    "grid",
+    "fit",
+    "translate",
+    "check",
+    "compare",
+    "presets",
+    "glares",
+    "psfs",
+    "adapters",
+    "doctor",
+    "warm",
+)
+
+_FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
+
+
+# How Python and OpenImageIO report that there is no memory for a thread's stack, and the dynamic
+# linker that there is none for a library.
+_NO_THREAD: Final = ("start new thread", "Resource temporarily unavailable")
+_NO_LIBRARY: Final = ("failed to map segment", "cannot allocate memory")
+
+
+class Program(click.Group):
+    """A group that imports a command when it is called, and prints an error as one line.
+
+    A command's return value is the exit status; None is 0.
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands, in the order of the help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return a command; None if there is no such command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"vkbloom._cli.{cmd_name}").command
+        raise_interrupts()
+        if terminal.PRINTING_OPTIONS[0] not in command.params:
+            command.params += terminal.PRINTING_OPTIONS
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that a call names, or say which one was meant."""
+        if args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            if os.path.exists(args[0]):
+                ctx.fail(f"{args[0]} is a file, not a command; did you mean {ctx.info_name} apply?")
+            ctx.fail(f"No such command {args[0]!r}{did_you_mean(args[0], COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what the commands do, without an import of them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, _summary(name)) for name in COMMANDS])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin with some letters, without an import of them."""
+        found = [
+            CompletionItem(name, help=_summary(name))
+            for name in COMMANDS
+            if name.startswith(incomplete)
+        ]
+        # Not the group's own: it would list the commands again.
+        return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
+    ) -> click.Context:
+        """Parse the words of a call; Ctrl-C is click.Abort, before click prints an empty line."""
+        try:
+            return super().make_context(info_name, args, *rest, **extra)
+        except KeyboardInterrupt:
+            raise click.Abort from None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; Ctrl-C is click.Abort."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise click.Abort from None
+
+    def main(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, prog_name: str | None = None, **options: Any
+    ) -> NoReturn:
+        """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
+        options["standalone_mode"] = False
+        terminal.print_as_usual()
+        begun = time.perf_counter()
+        try:
+            words = with_methods(sys.argv[1:] if args is None else args)
+            status = super().main(words, prog_name, **options)
+        except click.NoSuchOption as error:
+            near = did_you_mean(error.option_name, error.possibilities or ())
+            where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+            _exit(2, f"No such option {error.option_name!r}{near}{where}")
+        except click.UsageError as error:
+            where = f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+            _exit(2, error.format_message() + where)
+        except click.ClickException as error:
+            _exit(1, error.format_message())
+        except click.Abort:
+            if sys.stderr is not None and sys.stderr.isatty():
+                # It ends the line on which a terminal shows ^C.
+                click.echo(err=True)
+            _exit(INTERRUPTED, "interrupted")
+        except Exception as error:
+            if _is_from_interrupt(error):
+                _exit(INTERRUPTED, "interrupted")
+            no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
+            if any(one in str(error) for one in no_memory):
+                _exit(1, described(MemoryError(str(error))))
+            if isinstance(error, _FAILURES):
+                _exit(1, described(error))
+            raise
+        terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
+        sys.exit(status)
+
+
+def _summary(name: str) -> str:
+    """Return what a command does: the first line of its module."""
+    spec = find_spec(f"vkbloom._cli.{name}")
+    # A loader of source files has the text; others leave the summary out.
+    read = getattr(spec and spec.loader, "get_source", None)
+    first = ((read and read(f"vkbloom._cli.{name}")) or "").partition("\n")[0]
+    text = first.partition("``: ")[2].rstrip('".')
+    return text[:1].upper() + text[1:]
+
+
+def with_methods(words: Sequence[str]) -> list[str]:
+    """Load the files of custom methods after --method or --to; put the names there."""
+    changed = list(words)
+    for place, word in enumerate(changed):
+        option, _, value = word.partition("=")
+        if option not in ("--method", "--to"):
+            continue
+        joined = bool(value)
+        if not joined and place + 1 < len(changed):
+            value = changed[place + 1]
+        if value in METHODS or not os.path.isfile(value):
+            continue
+        name = vkbloom.load_method(value).method
+        if joined:
+            changed[place] = f"{option}={name}"
+        else:
+            changed[place + 1] = name
+    return changed
+
+
+def _is_from_interrupt(error: BaseException | None) -> bool:
+    """Return whether Ctrl-C caused an error, as when it ends a cluster that is starting."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
+
+
+def described(error: BaseException) -> str:
+    """Return an error in one sentence, with the name of its file."""
+    if isinstance(error, click.ClickException):
+        return error.format_message()
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        folder = os.path.dirname(os.fsdecode(error.filename))
+        if error.errno == errno.ENOENT and folder and not os.path.lexists(folder):
+            while (above := os.path.dirname(folder)) and not os.path.lexists(above):
+                folder = above
+            return f"{error.filename}: there is no folder {folder}"
+        return f"{error.filename}: {error.strerror}"
+    text = str(error) or type(error).__name__
+    if isinstance(error, MemoryError) and "memory is short" not in text:
+        left = memory_left()
+        free = "" if left is None else f" ({left >> 20} MiB are free)"
+        return f"memory is short{free}: {text}; {ADVICE}"
+    return text
+
+
+def _exit(status: int, message: str) -> NoReturn:
+    terminal.complain(message)
+    sys.exit(status)
+
+
+@contextmanager
+def as_wrong_use() -> Iterator[None]:
+    """Convert a TypeError or ValueError of an argument to click.UsageError, exit status 2."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise click.UsageError(str(error)) from error
+
+
+def given(name: str, context: click.Context | None = None) -> bool:
+    """Return whether the user set a parameter of the running command, or of another context's."""
+    source = (context or click.get_current_context()).get_parameter_source(name)
+    return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
+
+
+@click.group(
+    cls=Program,
+    # A call without a command prints one line instead of the help text.
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    params=[*terminal.PRINTING_OPTIONS],
+)
+@click.version_option(
+    None, "-V", "--version", package_name="vkbloom", message="%(prog)s %(version)s"
+)
+def program() -> None:
+    """Render bloom and inspect each of its framebuffers."""

@@ -1,0 +1,189 @@
+"""The options of a search for settings, and how its results are printed."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final, get_args
+
+import click
+from rich.console import Console
+
+import vkbloom
+from vkbloom._cli.terminal import is_quiet, note, say
+from vkbloom._explorer.controls import as_code
+from vkbloom._fit.losses import LossName
+from vkbloom._io import safe_writing
+
+__all__ = ["search_options"]
+
+
+def search_options(
+    *, vary: str | None, loss: LossName, max_calls: int
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add the options of a search; the arguments are their defaults.
+
+    The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
+    `told`, a function that prints results and returns the exit status.
+    """
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def run(
+            *,
+            vary: str | None,
+            bounds: tuple[str, ...],
+            max_loss: float | None,
+            out: str | None,
+            as_json: bool,
+            **rest: Any,
+        ) -> Any:
+            search: dict[str, Any] = {
+                "loss": rest.pop("loss"),
+                "bounds": _bounds(bounds),
+                "max_calls": rest.pop("max_calls"),
+                "progress": Console(stderr=True).is_terminal and not is_quiet(),
+            }
+            if vary is not None:
+                names = (name.strip().replace("-", "_") for name in vary.split(","))
+                search["vary"] = [name for name in names if name]
+            told = functools.partial(_tell, max_loss=max_loss, out=out, as_json=as_json)
+            return command(search=search, told=told, **rest)
+
+        for option in reversed((*_of_search(vary, loss, max_calls), *_OF_RESULTS)):
+            run = option(run)
+        return run
+
+    return add
+
+
+def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, ...]:
+    """Return the options of what is searched and how, with these defaults."""
+    return (
+        click.option(
+            "--vary",
+            metavar="NAME,...",
+            default=vary,
+            show_default=True,
+            help="The settings to find: numbers, switches and choices"
+            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
+        ),
+        click.option(
+            "--bounds",
+            metavar="NAME=LOW:HIGH",
+            multiple=True,
+            help="A narrower range for one of these settings; may be repeated.",
+        ),
+        click.option(
+            "--loss",
+            type=click.Choice(get_args(LossName)),
+            default=loss,
+            show_default=True,
+            help="The figure to minimize. relative: norm of the difference divided by the norm of "
+            "the target; l2: root mean square of the difference; log: the same for logarithms; "
+            "flip: mean FLIP.",
+        ),
+        click.option(
+            "--max-calls",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=max_calls,
+            show_default=True,
+            help="Limit of the renders of each search.",
+        ),
+    )
+
+
+_OF_RESULTS: Final = (
+    click.option(
+        "--max-loss",
+        metavar="X",
+        type=click.FloatRange(min=0),
+        help="Exit status 1 if the smallest loss is larger [default: any loss is status 0]",
+    ),
+    click.option(
+        "-o",
+        "--out",
+        metavar="REPORT",
+        type=click.Path(),
+        help="Write the pictures, radial profiles and losses as an HTML file.",
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
+)
+
+
+def _bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
+    """Parse each ``NAME=LOW:HIGH``, or ``NAME=A,B`` for choices, into the bounds of a fit."""
+    found: dict[str, Sequence[Any]] = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        low, colon, high = text.partition(":")
+        try:
+            values: Sequence[Any] = (float(low), float(high)) if colon else text.split(",")
+        except ValueError:
+            sign = ""
+        if not sign or not text:
+            raise click.UsageError(f"--bounds: {word!r} is not NAME=LOW:HIGH or NAME=A,B,...")
+        found[name.strip().replace("-", "_")] = values
+    return found
+
+
+def _tell(
+    found: Sequence[vkbloom.FitResult], *, max_loss: float | None, out: str | None, as_json: bool
+) -> int:
+    """Print results, the best one first, and return the exit status."""
+    if as_json:
+        click.echo(json.dumps([_object(one) for one in found], indent=2))
+    else:
+        for one in found:
+            click.echo(
+                f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
+                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s{_begun(one)}"
+            )
+            click.echo(f"  {as_code(one.settings)}")
+            click.echo(f"  {one.words}")
+    if out is not None:
+        _write(found, Path(out))
+        say(f"wrote {out}", err=as_json)
+    if max_loss is not None and found[0].loss > max_loss:
+        note(f"the smallest loss, {found[0].loss:.4g}, is over --max-loss {max_loss:g}")
+        return 1
+    return 0
+
+
+def _begun(found: vkbloom.FitResult) -> str:
+    """Return the preset that a search started from, as words; "" if none has the other fields."""
+    for name, preset in vkbloom.presets.items():
+        if preset.method == found.settings.method:
+            values = {field: getattr(preset, field) for field in found.vary}
+            if found.settings.replace(**values) == preset:
+                return f", from the preset {name}"
+    return ""
+
+
+def _object(found: vkbloom.FitResult) -> dict[str, Any]:
+    """Return the object of one result that --json prints."""
+    return {
+        "settings": found.settings.to_dict(),
+        "varied": {name: getattr(found.settings, name) for name in found.vary},
+        "loss": found.loss,
+        "start_loss": found.start_loss,
+        "loss_name": found.loss_name,
+        "explained": found.explained,
+        "verdict": found.verdict,
+        "cause": found.cause,
+        "calls": found.calls,
+        "seconds": found.seconds,
+    }
+
+
+def _write(found: Sequence[vkbloom.FitResult], path: Path) -> None:
+    """Write the reports of all results as one page."""
+    reports = "<hr>".join(one._repr_html_() for one in found)
+    page = (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom fit</title>'
+        f'<body style="font-family:sans-serif">{reports}</body></html>'
+    )
+    safe_writing.write_file(path, page.encode())

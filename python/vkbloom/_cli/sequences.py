@@ -1,0 +1,166 @@
+"""The files that a command reads and writes: single files, sequences, globs, folders, pipes."""
+
+from __future__ import annotations
+
+import errno
+import glob
+import os
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import click
+
+from vkbloom._cli.streams import PIPE, is_stream
+from vkbloom._cli.terminal import note
+from vkbloom._io.image_reading import readable_extensions
+
+__all__ = ["check_drawing", "check_targets", "is_terminal", "pairs"]
+
+#: The most names in a note.
+_MAX_NAMES: Final = 5
+
+_NUMBER: Final = re.compile(r"%(0?)(\d*)d")
+# Digits of a number as OpenImageIO and Houdini write them: f.####.exr.
+_HASHES: Final = re.compile(r"#{2,}|(?<=[._])#(?=\.)")
+
+
+def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
+    """Return the files to read, each with the file to write."""
+    target = _with_number(target)
+    found = [pair for source in sources for pair in _expanded(source)]
+    is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
+    is_pattern = _NUMBER.search(os.path.basename(target)) is not None
+    is_single = len(sources) == 1 and found == [(sources[0], None)]
+    if is_folder or (not is_single and not is_pattern and not Path(target).suffix):
+        written = [os.path.join(target, os.path.basename(name)) for name, _ in found]
+    elif is_pattern:
+        numbers = [number for _, number in found]
+        counted = range(len(found)) if None in numbers else numbers
+        written = [os.path.join(os.path.dirname(target), _filled(target, n)) for n in counted]
+    elif len(found) == 1:
+        written = [target]
+    else:
+        raise click.UsageError(
+            f"{target}: one file cannot hold {len(found)} images; name a folder or a pattern such "
+            "as f.%04d.png"
+        )
+    if PIPE in (name for name, _ in found) and written != [target]:
+        raise click.UsageError("standard input needs one file, or standard output, as OUT")
+    if is_stream(target) and len(found) > 1:
+        raise click.UsageError(f"{target}: one pipe cannot hold {len(found)} images")
+    if len(set(written)) < len(written):
+        raise click.UsageError(f"{target}: two images have the same name; use a pattern")
+    return [(name, file) for (name, _), file in zip(found, written, strict=True)]
+
+
+def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
+    """Raise an error for files of `pairs` that cannot be written, or that are also read.
+
+    - `out`: The target that the files were made of.
+    """
+    read = [source for source, _ in work if os.path.isfile(source)]
+    for _, target in work:
+        if target == PIPE and sys.stdout is None:
+            raise OSError(errno.EBADF, "is closed", "standard output")
+        if target == PIPE and is_terminal():
+            raise click.UsageError(
+                "standard output is a terminal; redirect it to a file or a program"
+            )
+        if is_stream(target):
+            continue
+        _check_folder(target, makes=target != out)
+        for source in read if os.path.exists(target) and not overwrite else ():
+            if os.path.samefile(source, target):
+                raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")
+
+
+def is_terminal() -> bool:
+    """Return whether standard output is a terminal."""
+    return sys.stdout is not None and sys.stdout.isatty()
+
+
+def _check_folder(target: str, *, makes: bool) -> None:
+    folder = os.path.dirname(target) or "."
+    # A missing folder is made with its first file.
+    existing = folder if os.path.lexists(folder) or not makes else os.path.dirname(folder) or "."
+    if not os.path.isdir(existing):
+        is_there = os.path.lexists(existing)
+        code, name = (errno.ENOTDIR, existing) if is_there else (errno.ENOENT, target)
+        raise OSError(code, os.strerror(code), name)
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
+
+
+def _with_number(name: str) -> str:
+    """Return a name with %0Nd instead of N hashes, unless a file has the name."""
+    if os.path.exists(name):
+        return name
+    folder, base = os.path.split(name)
+    return os.path.join(folder, _HASHES.sub(lambda run: f"%0{len(run[0])}d", base, count=1))
+
+
+def _expanded(source: str) -> list[tuple[str, int | None]]:
+    """Return the files of a word, with their numbers if the word is a pattern."""
+    # The name of an existing file may look like a pattern.
+    if source == PIPE or os.path.isfile(source):
+        return [(source, None)]
+    source = _with_number(source)
+    folder, name = os.path.split(source)
+    found: list[tuple[str, int | None]] = []
+    if os.path.isdir(source):
+        found = [(path, None) for path in _images_of(source)]
+    elif (number := _NUMBER.search(name)) is not None:
+        digits = rf"(\d{{{number[2] or 1},}})"
+        form = re.compile(
+            re.escape(name[: number.start()]) + digits + re.escape(name[number.end() :])
+        )
+        numbered = [
+            (int(fits[1]), entry.path)
+            for entry in os.scandir(folder or ".")
+            if (fits := form.fullmatch(entry.name)) is not None
+        ]
+        found = [(os.path.join(folder, os.path.basename(path)), n) for n, path in sorted(numbered)]
+    elif glob.has_magic(source):
+        found = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
+    else:
+        return [(source, None)]
+    if not found:
+        raise FileNotFoundError(f"{source}: no file was found")
+    return found
+
+
+def _images_of(folder: str) -> list[str]:
+    """Return the image files of a folder, and print a note about the other files."""
+    files = sorted(
+        file.path for file in os.scandir(folder) if file.is_file() and not file.name.startswith(".")
+    )
+    known = readable_extensions()
+    others = [file for file in files if Path(file).suffix.lower() not in known]
+    if others:
+        names = ", ".join(map(os.path.basename, others[:_MAX_NAMES]))
+        more = ", ..." * (len(others) > _MAX_NAMES)
+        note(f"{folder}: left out what is no image: {names}{more}")
+    return [file for file in files if file not in others]
+
+
+def _filled(pattern: str, number: int | None) -> str:
+    """Return the file name of a pattern with this number."""
+    return _NUMBER.sub(
+        lambda form: f"{number:{form[1]}{form[2]}d}", os.path.basename(pattern), count=1
+    )
+
+
+def check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
+    """Check that a drawing can be written, before what it shows is rendered."""
+    if file is None:
+        return
+    path = Path(file)
+    if path.suffix.lower() not in suffixes:
+        raise click.UsageError(f"{option}: {file} does not end in {', '.join(suffixes)}")
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
+    if not path.absolute().parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)

@@ -1,0 +1,240 @@
+"""The options of the settings: ``--method``, ``--preset``, and one for each field."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+import vkbloom
+from vkbloom._cli import fields
+from vkbloom._cli.image_files import is_photograph, silenced
+from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.streams import as_file
+from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._renderer.frame_files import facts_of
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS
+
+#: The preset for images if there is no --preset and no --method.
+PRESET_OF_IMAGES: Final = "bevy_natural"
+#: The preset for image files of integers, where a command can expand their highlights.
+PRESET_OF_PHOTOS: Final = "photo"
+_PRESET_OF_SCENES: Final = "tutorial"
+#: The presets that a call without --preset and --method may start from.
+DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
+#: Parameters that say what a call starts from.
+STARTS: Final = ("preset", "method", "stored")
+# Names of the commands' arguments for image files; explore and grid may be called without one.
+_IMAGES: Final = ("source", "sources", "images")
+
+
+def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of the settings to a command; its argument `settings` has the result."""
+    return _settings_options(command, by_file=False)
+
+
+def settings_options_by_file(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of the settings to a command; its argument `settings` is `Start.of`."""
+    return _settings_options(command, by_file=True)
+
+
+def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable[..., Any]:
+
+    @click.option(
+        "--preset",
+        type=fields.NameOf("preset", vkbloom.presets),
+        help="Published settings to start from; vkbloom presets lists them "
+        f"[default {PRESET_OF_IMAGES} for images, {PRESET_OF_PHOTOS} for files of integers, "
+        f"{_PRESET_OF_SCENES} for scenes]",
+    )
+    @click.option(
+        "--method",
+        type=fields.NameOf("method", METHODS),
+        help="The method of the blur, with its defaults, or a file of a custom method "
+        "[default the preset's]",
+    )
+    @_glare_options
+    @fields.options({"": vkbloom.Settings}, "shared")
+    @fields.options(METHODS, "own", base=vkbloom.Settings)
+    @click.option(
+        "--settings",
+        "stored",
+        metavar="FILE",
+        type=click.Path(),
+        help="A file of settings to start from: JSON, as the explorer saves it, or a picture that "
+        "holds settings, such as a PNG or an OpenEXR file of vkbloom apply. JSON expands the "
+        "highlights of files of integers, as the explorer does.",
+    )
+    @functools.wraps(command)
+    def run(
+        *,
+        preset: str | None,
+        method: str | None,
+        stored: str | None,
+        added: tuple[vkbloom.Glare, ...],
+        shared: dict[str, Any],
+        own: dict[str, Any],
+        **rest: object,
+    ) -> object:
+        if stored is not None and preset is not None:
+            raise click.UsageError("--settings and --preset exclude each other; leave one out")
+        start = Start(
+            preset=preset,
+            method=method,
+            stored=None if stored is None else read_settings(stored),
+            added=added,
+            changes={**shared, **own},
+            expands="expand" in rest and not rest.get("raw"),
+            expand=rest.get("expand"),  # type: ignore[arg-type]
+        )
+        if by_file:
+            return command(settings=start.of, **rest)
+        images = _images_of(rest)
+        # An axis of presets gives every image the same settings.
+        axes: Any = rest.get("axis_words", ())
+        has_presets = any(str(word).startswith("preset=") for word in axes)
+        settings, expand = start.of_all(images[:1] if has_presets else images)
+        if "expand" in rest:
+            rest["expand"] = expand
+        return command(settings=settings, **rest)
+
+    return run
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Start:
+    """What the settings of a call start from, and how its options change them.
+
+    - `stored`: Settings of a file, and what its picture was expanded up to.
+    - `added`: Stages that are added to the glare.
+    - `expands`: Whether the highlights of files of integers can be expanded.
+    - `expand`: What they are expanded up to, if the call says it.
+    """
+
+    preset: str | None
+    method: str | None
+    stored: tuple[vkbloom.Settings, float | None] | None
+    added: tuple[vkbloom.Glare, ...]
+    changes: dict[str, Any]
+    expands: bool
+    expand: float | None
+
+    def of(self, image: str) -> tuple[vkbloom.Settings, float | None]:
+        """Return the settings for an image file, "" for a scene, and the value for --expand."""
+        begun, expand = self._begun(image)
+        changes = self.changes
+        if self.added:
+            changes = {**changes, "glare": (*changes.get("glare", begun.glare), *self.added)}
+        return _changed(begun, changes), expand if self.expand is None else self.expand
+
+    def of_all(self, images: Sequence[str]) -> tuple[vkbloom.Settings, float | None]:
+        """Return the settings for image files that have the same, and the value for --expand."""
+        found = list(dict.fromkeys(self.of(image) for image in images or ("",)))
+        if len(found) > 1:
+            raise click.UsageError(
+                f"files of integers start from the preset {PRESET_OF_PHOTOS}, files of floats from "
+                f"{PRESET_OF_IMAGES}, and here are both; give --preset NAME for all"
+            )
+        return found[0]
+
+    def _begun(self, image: str) -> tuple[vkbloom.Settings, float | None]:
+        if self.stored is not None:
+            begun, expand = self.stored
+        elif self.preset is None and self.method is not None:
+            begun, expand = METHODS[self.method](), None
+        else:
+            preset = self.preset or _preset_of(image, expands=self.expands)
+            begun = vkbloom.presets[preset]
+            expand = PHOTO_EXPANSION if preset == PRESET_OF_PHOTOS else None
+        if self.method not in (None, begun.method):
+            given = "--settings" if self.stored else f"--preset {self.preset}"
+            raise click.UsageError(f"{given} is of the method {begun.method}, not {self.method}")
+        return begun, expand
+
+
+def _preset_of(image: str, *, expands: bool) -> str:
+    """Return the preset that an image file, or a scene (""), starts from."""
+    if not image:
+        return _PRESET_OF_SCENES
+    return PRESET_OF_PHOTOS if expands and is_photograph(image) else PRESET_OF_IMAGES
+
+
+def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add options for stages; the command's argument `added` has the stages."""
+
+    @click.option("--streaks", type=click.IntRange(1, 16), help="Add this many streaks to --glare")
+    @click.option("--ghosts", is_flag=True, help="Add ghosts to --glare")
+    @click.option("--halo", is_flag=True, help="Add a halo to --glare")
+    @click.option(
+        "--dirt", type=click.Path(), help="Add dirt, with the picture of a file, to --glare"
+    )
+    @functools.wraps(command)
+    def run(
+        streaks: int | None, ghosts: bool, halo: bool, dirt: str | None, **rest: object
+    ) -> object:
+        added: list[vkbloom.Glare] = []
+        if streaks is not None:
+            added.append(vkbloom.Streaks(directions=streaks))
+        if ghosts:
+            added.append(vkbloom.Ghosts())
+        if halo:
+            added.append(vkbloom.Halo())
+        if dirt is not None:
+            picture = fields.read_colours(dirt)
+            with as_wrong_use():
+                added.append(vkbloom.Dirt(image=picture))
+        return command(added=tuple(added), **rest)
+
+    return run
+
+
+def _images_of(rest: dict[str, Any]) -> Sequence[str]:
+    """Return a command's image files."""
+    names = next((value for name in _IMAGES if (value := rest.get(name))), ())
+    return [names] if isinstance(names, str) else names
+
+
+def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
+    """Return the settings of a file, and what the highlights of its picture were expanded up to."""
+    with silenced(), as_file(name) as file:
+        try:
+            with open(file, "rb") as stream:
+                is_json = stream.read(64).lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{")
+            if is_json or name.lower().endswith(".json"):
+                text = Path(file).read_text(encoding="utf-8-sig")
+                return vkbloom.Settings.from_json(text), PHOTO_EXPANSION
+            facts = facts_of(file)
+            if "settings" not in facts:
+                raise ValueError("holds no settings; PNG and OpenEXR files of vkbloom hold them")
+            expand = facts.get("expand")
+            settings = vkbloom.Settings.from_json(facts["settings"])
+            return settings, None if expand is None else float(expand)
+        except (TypeError, ValueError) as error:
+            reason = str(error)
+            raise ValueError(reason if file in reason else f"{file}: {reason}") from error
+
+
+def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settings:
+    """Return settings with the options' changes."""
+    foreign = [name for name in changes if not hasattr(begun, name)]
+    if foreign:
+        declared = {
+            name: info for kind in METHODS.values() for name, info in fields_of(kind).items()
+        }
+        names = ", ".join(f"--{declared[name].option.replace('_', '-')}" for name in foreign)
+        having = " or ".join(
+            method
+            for method, kind in METHODS.items()
+            if all(name in fields_of(kind) for name in foreign)
+        )
+        raise click.UsageError(
+            f"the method {begun.method} has no {names}; "
+            + (f"give --method {having}" if having else "no method has all of them")
+        )
+    with as_wrong_use():
+        return begun.replace(**changes)

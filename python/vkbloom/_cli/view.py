@@ -1,0 +1,121 @@
+"""``vkbloom view``: show the bloom of a scene or an image in a window."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import click
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom._checks import import_extra
+from vkbloom._cli.fields import SIZE, Command
+from vkbloom._cli.live import HELP, Live
+from vkbloom._cli.live_options import live_options
+from vkbloom._cli.terminal import detail_device, say
+from vkbloom._renderer.surface import Surface
+from vkbloom._settings.settings import SHADINGS, Shading
+
+_LARGEST: Final = (1600, 900)  # size of a window for an image
+_TITLE_SECONDS: Final = 0.5  # between updates of the title
+_WAIT_SECONDS: Final = 0.1  # while the window is hidden
+_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"123456789")
+
+
+@click.command(cls=Command, epilog=f"\b\n{HELP}")
+@click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
+@click.option("--shading", type=click.Choice(SHADINGS), default="forward", show_default=True)
+@click.option("--mailbox", is_flag=True, help="Each refresh shows the newest frame, not the next.")
+@click.option("-o", "--out", default="view", show_default=True, help="Folder of screenshots.")
+@live_options(image_has_size=True)
+def command(
+    *,
+    image: NDArray[Any] | None,
+    origin: dict[str, Any],
+    size: tuple[int, int] | None,
+    shading: Shading,
+    mailbox: bool,
+    out: str,
+    adapter: str,
+    validation: bool,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
+    glfw = import_extra("glfw", "window", "view")
+    height, width = (720, 1280) if image is None else image.shape[:2]
+    loaded = scene() if image is None else image
+    with (
+        _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
+        vkbloom.Renderer(adapter, validation=validation) as renderer,
+        Surface(renderer, window, mailbox=mailbox) as surface,
+    ):
+        detail_device(renderer)
+        source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
+        live = Live(settings, source, shading)
+        _listen(glfw, window, renderer, live)
+        since = before = time.perf_counter()
+        shown = 0
+        while not (live.closed or glfw.window_should_close(window)):
+            options: dict[str, Any] = {"shading": live.shading, "time": live.time}
+            if surface.present(live.source, live.settings, framebuffer=live.framebuffer, **options):
+                shown += 1
+            else:
+                glfw.wait_events_timeout(_WAIT_SECONDS)
+            glfw.poll_events()
+            now = time.perf_counter()
+            live.advance(now - before)
+            before = now
+            if shown and now - since >= _TITLE_SECONDS:
+                glfw.set_window_title(window, live.title((now - since) / shown))
+                since, shown = now, 0
+            if live.screenshot:
+                live.screenshot = False
+                if image is None:
+                    frames = renderer.render(live.source, live.settings, surface.size, **options)
+                else:
+                    frames = renderer.apply(live.source, live.settings)
+                for path in frames.save(Path(out, time.strftime("%Y%m%d-%H%M%S"))):
+                    say(f"wrote {path}")
+
+
+@contextlib.contextmanager
+def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
+    """Open a window without an OpenGL context."""
+    glfw.ERROR_REPORTING = "ignore"  # The last error is asked for.
+    try:
+        window = None
+        if glfw.init():
+            glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
+            window = glfw.create_window(*size, "vkbloom", None, None)
+        if not window:
+            raise vkbloom.Error(f"no window was opened: {glfw.get_error()[1].decode()}")
+        yield window
+    finally:
+        glfw.terminate()
+
+
+def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
+    """Connect keys and the mouse to the state."""
+    keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
+    last = [0.0, 0.0]
+
+    def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
+        if action != glfw.RELEASE and key in keys:
+            outputs = renderer.plan(live.source, live.settings, shading=live.shading).framebuffers
+            colours = [name for name, (shape, _) in outputs.items() if len(shape) == 3]
+            live.press(keys[key], colours)
+
+    def on_move(_: Any, x: float, y: float) -> None:
+        if glfw.get_mouse_button(window, glfw.MOUSE_BUTTON_LEFT) == glfw.PRESS:
+            live.drag(x - last[0], y - last[1])
+        last[:] = x, y
+
+    glfw.set_key_callback(window, on_key)
+    if isinstance(live.source, vkbloom.Scene):
+        glfw.set_cursor_pos_callback(window, on_move)
+        glfw.set_scroll_callback(window, lambda _, x, y: live.scroll(y))

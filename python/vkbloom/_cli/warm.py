@@ -1,0 +1,91 @@
+"""``vkbloom warm``: fill the caches of pipelines and kernels before the first call needs them."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from typing import Any, Final
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+import vkbloom
+from vkbloom._cli.device_options import adapter_option
+from vkbloom._cli.fields import SIZE, NameOf
+from vkbloom._cli.terminal import detail_device, hides_progress, say
+from vkbloom._settings.registry import METHODS
+
+_TYPES: Final = ("uint8", "float16", "float32")
+_USUAL_SIZE: Final = (1920, 1080)
+# A single framebuffer may come from a fused pass.
+_KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
+
+
+@click.command()
+@click.option(
+    "--preset",
+    "presets",
+    type=NameOf("preset", vkbloom.presets),
+    multiple=True,
+    help="Only this preset; repeat it for more [default: all, and the built-in scene]",
+)
+@click.option(
+    "--method",
+    "methods",
+    type=NameOf("method", METHODS),
+    multiple=True,
+    help="Only this method with its defaults, or a file of a custom method; repeat it for more",
+)
+@click.option(
+    "--type",
+    "types",
+    type=click.Choice(_TYPES),
+    multiple=True,
+    help="Only images of this type; repeat it for more [default: all]",
+)
+@click.option(
+    "--size",
+    "sizes",
+    type=SIZE,
+    multiple=True,
+    help="Size of the images to come; repeat it for more [default: 1920x1080]",
+)
+@adapter_option
+def command(
+    presets: tuple[str, ...],
+    methods: tuple[str, ...],
+    types: tuple[str, ...],
+    sizes: tuple[tuple[int, int], ...],
+    adapter: str,
+) -> None:
+    """Compile the pipelines of presets and methods, so that later processes find them.
+
+    Some pipelines are made for the size of the image: those of convolutions, and of small levels.
+
+    Kernels of convolutions, which take up to a second to compute, are kept in the cache, too.
+
+    The caches are vkbloom's and the driver's; vkbloom doctor shows their folders. Call it when a
+    container's image is built, or in the step whose caches CI keeps. Mesa's software driver
+    compiles for the CPU that it runs on: another type of CPU does not find these pipelines.
+    """
+    begun, used = time.perf_counter(), time.process_time()
+    everything = not presets and not methods
+    warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
+    warmed += [METHODS[name]() for name in methods]
+    calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), warmed, _KEPT))
+    with vkbloom.Renderer(adapter) as renderer:
+        detail_device(renderer)
+        if everything:
+            scene = vkbloom.Scene.ufo()
+            for shading in ("forward", "deferred"):
+                for framebuffers in _KEPT:
+                    renderer.render(scene, shading=shading, framebuffers=framebuffers)
+        for size, dtype, channels, settings, framebuffers in tqdm(
+            calls, unit="call", leave=False, disable=hides_progress()
+        ):
+            image = np.zeros((size[1], size[0], channels), dtype)
+            renderer.apply(image, settings, framebuffers=framebuffers)
+        name = renderer.info.summary
+    seconds, processor = time.perf_counter() - begun, time.process_time() - used
+    say(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")

@@ -1,0 +1,100 @@
+"""Blocks BUFFER: uniform and storage buffers whose variables the file declares."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from typing import Final
+
+from vkbloom._custom.blocks import Block, Directive
+from vkbloom._custom.names import check_name
+from vkbloom._custom.source import Source
+from vkbloom._custom.textures import read_hex
+
+#: Rows and columns of each type; all numbers have 4 bytes.
+TYPES: Final = {
+    **dict.fromkeys(("float", "int", "uint"), (1, 1)),
+    **{f"{kind}vec{n}": (n, 1) for kind in ("", "i", "u") for n in (2, 3, 4)},
+    **{f"mat{n}": (n, n) for n in (2, 3, 4)},
+    **{f"mat{c}x{r}": (r, c) for c in (2, 3, 4) for r in (2, 3, 4)},
+}
+#: What every device of Vulkan 1.1 allows for a uniform buffer.
+LARGEST_UNIFORM: Final = 16384
+LARGEST_STORAGE: Final = 1 << 27
+
+
+@dataclasses.dataclass(frozen=True)
+class Variable:
+    """A variable of a buffer; `count` is None if it is no array."""
+
+    type: str
+    name: str
+    count: int | None
+
+    @property
+    def declared(self) -> str:
+        """The declaration in GLSL."""
+        return f"{self.type} {self.name}" + ("" if self.count is None else f"[{self.count}]")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Buffer:
+    """A buffer with its size in bytes, and its data (None: zero)."""
+
+    name: str
+    variables: tuple[Variable, ...]
+    storage: bool
+    size: int
+    data: bytes | None
+    line: int
+
+
+def packed_size(variables: tuple[Variable, ...], storage: bool) -> int:
+    """Return the size of a buffer up to its last number: std430 for storage, else std140."""
+    end = 0
+    for variable in variables:
+        rows, columns = TYPES[variable.type]
+        align = 4 * (4 if rows == 3 else rows)
+        repeated = columns > 1 or variable.count is not None
+        if repeated and not storage:
+            align = 16
+        count = columns * (1 if variable.count is None else variable.count)
+        end = -(-end // align) * align + (align * count if repeated else 4 * rows)
+    return end
+
+
+def read_buffer(source: Source, block: Block) -> Buffer:
+    """Read a block BUFFER."""
+    head = block.directives[0]
+    name = check_name(source, head, "BUFFER")
+    storage = block.last("STORAGE") is not None
+    variables = tuple(read_variable(source, one) for one in block.all("VAR"))
+    if not variables:
+        raise source.fault(head.line, f"BUFFER {name}: the block has no //!VAR")
+    size = packed_size(variables, storage)
+    largest = LARGEST_STORAGE if storage else LARGEST_UNIFORM
+    if size > largest:
+        raise source.fault(head.line, f"BUFFER {name}: {size} bytes are more than {largest}")
+    data = read_hex(source, block)
+    if len(data) != size and not (storage and not data):
+        raise source.fault(
+            block.body_line, f"BUFFER {name}: the data has {len(data)} bytes, not {size}"
+        )
+    return Buffer(name, variables, storage, size, data or None, head.line)
+
+
+def read_variable(source: Source, directive: Directive) -> Variable:
+    """Read a directive VAR: a type, a name, and for an array its length."""
+    found = re.fullmatch(r"(\S+)\s+([A-Za-z_]\w*)\s*(\[\s*(\S*?)\s*\])?", directive.value, re.ASCII)
+    if not found:
+        raise source.fault(
+            directive.line, f"VAR: {directive.value!r} is not 'type name' or 'type name[count]'"
+        )
+    kind, name, array, length = found.groups()
+    if kind not in TYPES:
+        raise source.fault(directive.line, f"VAR: {kind!r} is not one of {', '.join(TYPES)}")
+    if array is None:
+        return Variable(kind, name, None)
+    if not re.fullmatch(r"\d{1,9}", length or "", re.ASCII) or int(length) < 1:
+        raise source.fault(directive.line, f"VAR: {length!r} is not an array's length, 1 or more")
+    return Variable(kind, name, int(length))

@@ -1,0 +1,205 @@
+"""The compiler of own shaders: glslang as a process of its own, with limits, and a cache."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import importlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vkbloom._core import ShaderError
+from vkbloom._custom.file import CustomFile
+from vkbloom._custom.glsl import BODY, Shader
+from vkbloom._custom.passes import CustomPass
+from vkbloom._custom.spirv import without_contraction
+from vkbloom._io import pipeline_cache
+
+#: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result.
+MAX_PROCESSOR_SECONDS: Final = 20
+MAX_SECONDS: Final = 60.0
+MAX_MEMORY: Final = 2 << 30
+LARGEST_RESULT: Final = 64 << 20
+
+#: The package's GLSL that `#include` finds.
+LIBRARY: Final = Path(__file__).parent / "glsl"
+#: Of a shader's code in the cache; a change of what is stored changes it.
+CACHE_MAGIC: Final = b"vkbloom own shader 1\n"
+SPIRV_MAGIC: Final = 0x07230203
+MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
+
+MISSING: Final = (
+    "custom methods need the compiler glslang (glslangValidator); on Debian or Ubuntu: apt install "
+    "glslang-tools; or the wheel vkbloom-glslang (extra shaders)"
+)
+
+
+@functools.cache
+def find_compiler() -> str:
+    """Return the path of the compiler: the wheel's, or the system's."""
+    with contextlib.suppress(ImportError):
+        return str(importlib.import_module("vkbloom_glslang").PATH)
+    found = shutil.which("glslangValidator") or shutil.which("glslang")
+    if found is None:
+        raise ShaderError(MISSING)
+    return found
+
+
+@functools.cache
+def identity() -> bytes:
+    """Return bytes that differ between compilers, and between states of the library."""
+    compiler = os.stat(find_compiler())
+    known = hashlib.sha256(f"{find_compiler()} {compiler.st_size} {compiler.st_mtime_ns}".encode())
+    for file in sorted(LIBRARY.rglob("*.glsl")):
+        known.update(file.read_bytes())
+    return known.digest()
+
+
+def compile_shader(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
+    """Return the SPIR-V of a pass, from the cache where it is there."""
+    code = cached_code(shader)
+    if code is None:
+        code = compiled(file, one, shader)
+        if kept := cache_file(shader):
+            write_cached(kept, code)
+    return code
+
+
+def cached_code(shader: Shader) -> bytes | None:
+    """Return the SPIR-V of a shader that was compiled before; None if the cache has it not."""
+    kept = cache_file(shader)
+    return None if kept is None else read_cached(kept)
+
+
+def cache_file(shader: Shader) -> Path | None:
+    """Return the file of a shader's code in the cache; None without a cache."""
+    folder = pipeline_cache.folder()
+    if folder is None:
+        return None
+    key = hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode())
+    return folder / "own" / f"{key.hexdigest()}.spv"
+
+
+def read_cached(file: Path) -> bytes | None:
+    """Return the code in a file of the cache; None if it is missing or damaged."""
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return None
+    code = content[len(CACHE_MAGIC) + 32 :]
+    return code if content == wrapped(code) else None
+
+
+def wrapped(code: bytes) -> bytes:
+    """Return the content of a file of the cache."""
+    return CACHE_MAGIC + hashlib.sha256(code).digest() + code
+
+
+def write_cached(file: Path, code: bytes) -> None:
+    """Write a file of the cache, which only saves time: failing to write it is not an error."""
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(wrapped(code))
+        os.replace(temporary, file)
+
+
+def compiled(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
+    """Run the compiler; raise ShaderError with the user's file and line if it refuses."""
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        target = Path(folder) / "shader.spv"
+        command = [find_compiler(), "-V", "--target-env", "vulkan1.1", "--stdin"]
+        command += ["-S", "comp" if shader.compute else "frag", f"-I{LIBRARY}", "-o", str(target)]
+        status, text = run_limited(command, shader.text, folder)
+        code = target.read_bytes() if status == 0 and target.exists() else b""
+    if not code:
+        raise ShaderError(explained(file, one, status, text))
+    words = np.frombuffer(code, "=u4")
+    if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
+        raise ShaderError(file.source.where(one.line, "the compiler's result is not SPIR-V"))
+    return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
+
+
+def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
+    """Run a process that reads a text; return its exit status and its output.
+
+    The limits are set after the process started and before it gets the text, so that nothing of
+    this process runs between fork and exec. What is preloaded into this process stays out: a
+    sanitizer needs more address space than the limit.
+    """
+    environment = {name: os.environ[name] for name in os.environ if name != "LD_PRELOAD"}
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        cwd=folder,
+        env=environment,
+    ) as process:
+        limit(process.pid)
+        try:
+            output, _ = process.communicate(text.encode(), timeout=MAX_SECONDS)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            return process.returncode, ""
+        except BaseException:
+            process.kill()
+            raise
+        return process.returncode, output.decode(errors="replace")
+
+
+def limit(process: int) -> None:
+    """Set the limits of a process, where the system can."""
+    if sys.platform != "linux":
+        return
+    import resource  # noqa: PLC0415  only on Unix
+
+    for which, most in (
+        (resource.RLIMIT_CPU, MAX_PROCESSOR_SECONDS),
+        (resource.RLIMIT_AS, MAX_MEMORY),
+        (resource.RLIMIT_FSIZE, LARGEST_RESULT),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        with contextlib.suppress(ProcessLookupError, ValueError, PermissionError):
+            resource.prlimit(process, which, (most, most))
+
+
+def explained(file: CustomFile, one: CustomPass, status: int, text: str) -> str:
+    """Return the message of a pass that does not compile."""
+    source = file.source
+    if status < 0 or status > 128:
+        number = -status if status < 0 else status - 128
+        known = number in set(signal.Signals)
+        name = signal.Signals(number).name if known else f"status {status}"
+        return source.where(
+            one.line,
+            f"the compiler was ended by {name}: it may take {MAX_PROCESSOR_SECONDS} s and "
+            f"{MAX_MEMORY >> 20} MiB for a pass",
+        )
+    last = one.body_line + one.body.count("\n")
+    for part, number, cause in MESSAGE.findall(text):
+        if part == str(BODY):
+            return source.where(min(max(int(number), 1), last), cause.strip())
+    if "'hook'" in text:
+        kind = "void hook()" if one.compute else "vec4 hook()"
+        return source.where(one.body_line, f"the pass defines no function '{kind}'")
+    found = MESSAGE.search(text)
+    cause = found[3].strip() if found else text.strip().split("\n")[-1]
+    # A name of a block that GLSL does not accept, in the lines before the body.
+    lines = {block.name: block.line for block in (*file.params, *file.given.values())}
+    for name in re.findall(r"'(\w+)'", cause):
+        if name in lines:
+            return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")
+    return source.where(one.body_line, f"the pass is not complete GLSL: {cause}")

@@ -1,0 +1,144 @@
+"""The file of a custom method: all of its blocks, checked as far as this needs no image."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+from vkbloom._custom.blocks import read_blocks
+from vkbloom._custom.buffers import Buffer, read_buffer
+from vkbloom._custom.expressions import ExpressionError, Values, evaluate
+from vkbloom._custom.names import BLOOM, GLOW, HOOKED, STAGES, stage_of
+from vkbloom._custom.params import Param, read_param
+from vkbloom._custom.passes import CustomPass, Expression, read_pass
+from vkbloom._custom.source import Source
+from vkbloom._custom.textures import Texture, read_texture
+
+#: Sizes that every expression may name, beside those of stages and saved textures.
+KNOWN_SIZES = (HOOKED, GLOW, "OUTPUT", "NATIVE_CROPPED")
+
+
+@dataclasses.dataclass(frozen=True)
+class CustomFile:
+    """The blocks of a file."""
+
+    source: Source
+    params: tuple[Param, ...]
+    textures: tuple[Texture, ...]
+    buffers: tuple[Buffer, ...]
+    passes: tuple[CustomPass, ...]
+
+    @property
+    def given(self) -> dict[str, Texture | Buffer]:
+        """The textures and buffers whose data is in the file, by name."""
+        found: dict[str, Texture | Buffer] = {one.name: one for one in self.textures}
+        return {**found, **{one.name: one for one in self.buffers}}
+
+    @property
+    def saves_bloom(self) -> bool:
+        """Whether the file gives the bloom, and leaves the composite to the package."""
+        return any(one.saved_at(stage) == BLOOM for stage, one in self.runs())
+
+    def runs(self) -> Iterator[tuple[str, CustomPass]]:
+        """Return each pass with its stage, in the order in which they run."""
+        for stage in STAGES:
+            for one in self.passes:
+                if stage in one.stages:
+                    yield stage, one
+
+    def words(self, values: dict[str, float]) -> dict[str, float]:
+        """Return what the words of expressions mean, for some values of the parameters."""
+        indices = {
+            name: float(index) for param in self.params for index, name in enumerate(param.names)
+        }
+        return {**indices, **values}
+
+
+def read_file(source: Source) -> CustomFile:
+    """Read a file; raise ValueError if it is not valid."""
+    params: list[Param] = []
+    textures: list[Texture] = []
+    buffers: list[Buffer] = []
+    passes: list[CustomPass] = []
+    for block in read_blocks(source):
+        if block.kind == "PARAM":
+            params.append(read_param(source, block))
+        elif block.kind == "TEXTURE":
+            textures.append(read_texture(source, block))
+        elif block.kind == "BUFFER":
+            buffers.append(read_buffer(source, block))
+        else:
+            passes.append(read_pass(source, block))
+    if not passes:
+        raise source.fault(1, "the file has no pass; a pass begins with //!HOOK")
+    file = CustomFile(source, tuple(params), tuple(textures), tuple(buffers), tuple(passes))
+    check_unique(file)
+    check_names(file)
+    check_picture(file)
+    return file
+
+
+def check_unique(file: CustomFile) -> None:
+    """Check that no two blocks have the same name."""
+    seen: dict[str, int] = {}
+    blocks: list[Param | Texture | Buffer] = [*file.params, *file.textures, *file.buffers]
+    for block in blocks:
+        if block.name in seen:
+            raise file.source.fault(
+                block.line,
+                f"{block.name!r} is the name of another block, in line {seen[block.name]}",
+            )
+        seen[block.name] = block.line
+
+
+def check_names(file: CustomFile) -> None:
+    """Check that each name of a pass is known when the pass runs, whatever the image."""
+    known: set[str] = set()
+    words = file.words({param.name: param.default for param in file.params})
+    for place, (stage, one) in enumerate(file.runs()):
+        reached = {*STAGES[: STAGES.index(stage) + 1], *known}
+        for binding in one.bindings:
+            name = stage_of(binding.value)
+            if name not in {*reached, *file.given, HOOKED, GLOW}:
+                raise file.source.fault(
+                    binding.line, unknown_texture(file, place, stage, binding.value)
+                )
+        sizes = dict.fromkeys({*reached, *KNOWN_SIZES, "MAINPRESUB"}, (7, 5))
+        if "MAIN" not in reached:
+            del sizes["MAINPRESUB"]
+        for expression in (one.when, one.width, one.height):
+            check_expression(file, expression, Values(sizes, words))
+        if saved := one.saved_at(stage):
+            known.add(saved)
+
+
+def unknown_texture(file: CustomFile, place: int, stage: str, name: str) -> str:
+    """Return why a texture is not known to a pass."""
+    later = [one for at, one in list(file.runs())[place:] if one.saved_at(at) == stage_of(name)]
+    if later:
+        return f"BIND: {name!r} is saved only by a later pass, in line {later[0].line}"
+    if stage_of(name) in STAGES:
+        return f"BIND: the stage {name} comes after the pass's own, {stage}"
+    saved = [one.save.value for _, one in list(file.runs())[:place] if one.save]
+    known = dict.fromkeys([HOOKED, GLOW, *saved, *file.given])
+    return f"BIND: {name!r} is not a texture here; known are {', '.join(known)} and the stages"
+
+
+def check_expression(file: CustomFile, expression: Expression | None, values: Values) -> None:
+    """Check words and operands of an expression; its numbers are checked when it runs."""
+    if expression is None:
+        return
+    try:
+        evaluate(expression.text, values, finite=False)
+    except ExpressionError as error:
+        raise file.source.fault(expression.line, f"{expression.name}: {error}") from None
+
+
+def check_picture(file: CustomFile) -> None:
+    """Check that the file gives a bloom or a picture."""
+    if not any(one.saved_at(stage) in (None, BLOOM) for stage, one in file.runs()):
+        raise file.source.fault(
+            file.passes[-1].line,
+            "no pass writes the picture or saves BLOOM; let the last pass replace the picture "
+            "(no //!SAVE), or give it //!SAVE BLOOM",
+        )

@@ -1,0 +1,325 @@
+"""Custom methods as settings: the classes that `load_method` makes."""
+
+from __future__ import annotations
+
+import copy
+import copyreg
+import dataclasses
+import keyword
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final, Literal, Self
+
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._argument_types import checked
+from vkbloom._custom.file import CustomFile, read_file
+from vkbloom._custom.params import RANGES, Param
+from vkbloom._custom.planning import Request, Row, planned
+from vkbloom._custom.resources import made_resources
+from vkbloom._custom.shaders import Shaders
+from vkbloom._custom.source import Source, read_source
+from vkbloom._settings.fields import number_field, value_field
+from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import Settings
+
+Twin = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
+
+#: The largest value of a uniform.
+LARGEST_FLOAT: Final = 3.4028234663852886e38
+#: Fields that a file without BLOOM has not, since it composites by itself.
+COMPOSITED: Final = ("intensity", "composite")
+
+
+class CustomType(type):
+    """The type of the classes, which are pickled as the text that they are made of."""
+
+    method: str
+    file: CustomFile
+    twin: Twin | None
+
+
+class CoreView:
+    """The fields that the core reads of own settings: those of all settings."""
+
+    method = "own"
+
+    def __init__(self, settings: CustomMethod) -> None:
+        for field in dataclasses.fields(Settings):
+            setattr(self, field.name, getattr(settings, field.name))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CustomMethod(Settings, metaclass=CustomType):
+    """Base class of the settings of custom methods."""
+
+    file: ClassVar[CustomFile]
+    shaders: ClassVar[Shaders]
+    twin: ClassVar[Twin | None] = None
+    _place: ClassVar[int] = 0
+    _state: ClassVar[dict[Any, Any] | None] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.file.saves_bloom:
+            for name in COMPOSITED:
+                if getattr(self, name) != getattr(type(self), name):
+                    raise ValueError(
+                        f"{name}: {getattr(self, name)!r} is not {getattr(type(self), name)!r}; "
+                        f"the method {self.method} composites by itself, since it saves no BLOOM"
+                    )
+
+    def numbers(self) -> dict[str, float]:
+        """Return the number of each parameter."""
+        return {param.name: param.plain(getattr(self, param.name)) for param in self.file.params}
+
+    @property
+    def core_view(self) -> CoreView:
+        """What the core reads in place of the settings."""
+        return CoreView(self)
+
+    def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Row, ...]:
+        """Return the passes of a frame, as rows."""
+        if self._state is None:
+            changed = made_resources(self.file, storage=True)
+        elif (changed := self._state.get(type(self), {})) == {}:
+            changed = self._state[type(self)] = made_resources(self.file, storage=True)
+        request = Request(
+            frame,
+            buffers,
+            self.numbers(),
+            self.dither_seed,
+            self._place,
+            {**self.shaders.resources, **changed},
+        )
+        return planned(self.file, self.shaders, request)
+
+    @property
+    def _has_state(self) -> bool:
+        """Whether passes change textures or buffers, so that frames depend on those before."""
+        return any(block.storage for block in self.file.given.values())
+
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+        """Return a copy for a frame of a sequence, which counts the frames before it."""
+        copied = copy.copy(self)
+        object.__setattr__(copied, "_place", place)
+        object.__setattr__(copied, "_state", state)
+        return copied
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return method, SHA-256 of the text, and the fields."""
+        return {"method": self.method, "sha256": self.file.source.digest, **super().to_dict()}
+
+    @classmethod
+    def _check_stored(cls, values: dict[str, Any]) -> None:
+        digest = values.pop("sha256", cls.file.source.digest)
+        if digest != cls.file.source.digest:
+            raise ValueError(
+                f"sha256: the method {cls.method} that is loaded, {cls.file.source.name}, has "
+                f"another text; load the file that has {digest} with vkbloom.load_method"
+            )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        # Not the class: cloudpickle, which Dask uses, would copy what the class holds.
+        kind = type(self)
+        return settings_of, (kind.method, kind.file.source, kind.twin, values)
+
+
+def settings_of(
+    name: str, source: Source, twin: Twin | None, values: dict[str, Any]
+) -> CustomMethod:
+    """Return settings of the class of a text; for pickle."""
+    return class_of(name, source, twin)(**values)
+
+
+def class_of(name: str, source: Source, twin: Twin | None) -> type[CustomMethod]:
+    """Return the class of a text: the one that is registered, or a new one; for pickle."""
+    if name in METHODS:
+        known = METHODS[name]
+        if isinstance(known, CustomType) and known.file.source == source:
+            return known
+    return registered(name, source, twin)
+
+
+def reduced(kind: CustomType) -> Any:
+    """Return how a class is made again; for pickle."""
+    if kind is CustomMethod:
+        return kind.__name__
+    return class_of, (kind.method, kind.file.source, kind.twin)
+
+
+copyreg.pickle(CustomType, reduced)
+
+
+@checked
+def load_method(
+    source: str | Path, *, name: str | None = None, reference: Twin | None = None
+) -> type[Settings]:
+    """Load a method from a file of passes in the syntax of mpv's user shaders.
+
+    Parameters
+    ----------
+    source : path or str
+        The file, or its text, which contains a line feed.
+    name : str, optional
+        The method's name, an identifier that no method of the package has. Default: the file's stem
+        with _ in place of other characters, "own" for a text. A method that was loaded under this
+        name is replaced.
+    reference : callable, optional
+        A twin in NumPy: ``reference(image, settings)`` gets an array (H, W, 4) in float64 and
+        returns framebuffers by name, with ``bloom`` or ``final``. `reference.apply` calls it.
+
+    Returns
+    -------
+    type
+        A class of settings with the fields of all settings, and one for each ``//!PARAM``. An ENUM
+        is a choice of its names.
+
+    Raises
+    ------
+    ValueError
+        The file is not valid; the message names file and line, and quotes the line. Or the name is
+        not possible, or a PARAM has the name of a field of all settings.
+    ShaderError
+        A pass does not compile; the message names file and line. Or the compiler is missing.
+    OSError
+        The file cannot be read.
+
+    See Also
+    --------
+    Settings : The fields of all methods.
+    Renderer.apply : Uses settings.
+
+    Notes
+    -----
+    Passes can bind ``MAIN`` (the frame), ``GLOW`` (what glows), and what they saved. Saved textures
+    are framebuffers under their lower-case names. A file that saves ``BLOOM`` leaves the composite
+    to the package; any other file replaces the picture.
+
+    Examples
+    --------
+    >>> text = '''//!PARAM gain
+    ... //!TYPE float
+    ... //!MINIMUM 0
+    ... //!MAXIMUM 4
+    ... 2
+    ... //!HOOK MAIN
+    ... //!BIND GLOW
+    ... //!SAVE BLOOM
+    ... vec4 hook() { return gain * GLOW_tex(GLOW_pos); }
+    ... '''
+    >>> Gained = vkbloom.load_method(text, name="gained")
+    >>> Gained(gain=3).gain
+    3.0
+    """
+    read = read_source(source)
+    if name is None:
+        name = own_name(Path(read.name).stem if read.name != "<text>" else "own")
+    elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise ValueError(f"name: {name!r} is not an identifier")
+    known = class_of(name, read, reference)
+    return known if known.twin is reference else registered(name, read, reference)
+
+
+def own_name(stem: str) -> str:
+    """Return an identifier for a file's stem."""
+    name = re.sub(r"\W", "_", stem)
+    return name if name.isidentifier() and not keyword.iskeyword(name) else f"_{name}"
+
+
+def registered(name: str, source: Source, twin: Twin | None) -> type[CustomMethod]:
+    """Make the class of a text, and register it."""
+    if name in METHODS and not isinstance(METHODS[name], CustomType):
+        raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
+    file = read_file(source)
+    shaders = Shaders(name, file)
+    shaders.compile_all({param.name: param.default for param in file.params})
+    fields = [(param.name, *field_of(file, param)) for param in file.params]
+    kind: Any = dataclasses.make_dataclass(
+        class_name(name),
+        fields,
+        bases=(CustomMethod,),
+        namespace={
+            "__doc__": f"The method {name}, loaded from {source.name}.",
+            "__module__": __name__,
+            "method": name,
+            "file": file,
+            "shaders": shaders,
+            "twin": None if twin is None else staticmethod(twin),
+        },
+        frozen=True,
+        kw_only=True,
+    )
+    METHODS.register(kind)
+    made: type[CustomMethod] = kind
+    return made
+
+
+def class_name(name: str) -> str:
+    """Return the name of a method's class: soft_bloom is SoftBloom."""
+    joined = "".join(part[:1].upper() + part[1:] for part in name.split("_"))
+    return joined if joined.isidentifier() else f"Own{joined}"
+
+
+def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:
+    """Return type and declaration of a parameter's field."""
+    low, high = max(param.low, -LARGEST_FLOAT), min(param.high, LARGEST_FLOAT)
+    shared = param.name == SHARED and param.number == "float"
+    if shared:
+        _, least, most = _core.VALUES[SHARED]
+        low, high = max(low, least), min(high, most)
+    elif hasattr(CustomMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
+        owner = "Python reserves" if keyword.iskeyword(param.name) else "all settings have"
+        raise file.source.fault(
+            param.line, f"PARAM: {param.name!r} is a name that {owner}; rename it"
+        )
+    if param.names:
+        read = EnumReader(param.name, param.names)
+        return Literal[param.names], value_field(
+            param.names[0], kind="choice", choices=param.names, read=read, text=param.description
+        )
+    whole = param.number != "float"
+    default = int(param.default) if whole else param.default
+    return (int if whole else float), number_field(
+        default=default,
+        # Finite, since a range that ends at infinity does not contain its beginning.
+        range=(low, high),
+        slider=() if shared else slider_of(param),
+        text=param.description,
+    )
+
+
+def slider_of(param: Param) -> tuple[float, float] | tuple[()]:
+    """Return the ends of a slider: the file's limits, where one is missing twice the default."""
+    low, high = RANGES[param.number]
+    start = param.low if param.low != low else min(0.0, 2 * param.default)
+    end = param.high if param.high != high else max(start + 1, 2 * param.default)
+    if param.low == param.high:
+        return ()
+    return (start if start < end else end - 1), end
+
+
+#: The setting that a PARAM can be: the file gives its default and narrows its range, the body and
+#: the encoding get its value. Published files of tone curves have it with the same meaning.
+SHARED: Final = "reference_white"
+#: Names that classes of settings have beside their attributes.
+TAKEN: Final = {"method", "sha256", "threshold", "self"}
+
+
+@dataclasses.dataclass(frozen=True)
+class EnumReader:
+    """Reads the value of an ENUM: one of its names, or the index of one."""
+
+    name: str
+    names: tuple[str, ...]
+
+    def __call__(self, value: object) -> str:
+        """Return the name."""
+        if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < len(self.names):
+            return self.names[value]
+        if isinstance(value, str) and value in self.names:
+            return self.names[self.names.index(value)]
+        raise ValueError(f"{self.name}: {value!r} is not one of {', '.join(self.names)}")

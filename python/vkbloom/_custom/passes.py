@@ -1,0 +1,171 @@
+"""Passes: the blocks of a file that draw."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from typing import Final
+
+from vkbloom._custom.blocks import Block, Directive
+from vkbloom._custom.expressions import ExpressionError, tokens
+from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, UNREACHED, check_name, stage_of
+from vkbloom._custom.source import Source
+
+MAX_STAGES: Final = 16
+MAX_BINDINGS: Final = 16
+#: Threads of a workgroup, and of its sides: what every device of Vulkan has.
+MAX_THREADS: Final = 1024
+LARGEST_GROUP: Final = (1024, 1024)
+LARGEST_BLOCK: Final = 16384
+
+
+@dataclasses.dataclass(frozen=True)
+class Expression:
+    """An expression with its line."""
+
+    text: str
+    line: int
+    name: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Compute:
+    """The pixels and the threads of a workgroup."""
+
+    block: tuple[int, int]
+    threads: tuple[int, int]
+
+
+@dataclasses.dataclass(frozen=True)
+class CustomPass:
+    """A pass as the file states it. `save` is None if the result replaces the picture."""
+
+    title: str
+    stages: tuple[str, ...]
+    bindings: tuple[Directive, ...]
+    save: Directive | None
+    width: Expression | None
+    height: Expression | None
+    when: Expression | None
+    compute: Compute | None
+    body: str
+    body_line: int
+    line: int
+
+    def saved_at(self, stage: str) -> str | None:
+        """Return the name of the result at a stage; None if it replaces the picture."""
+        if self.save is None or stage_of(self.save.value) in (HOOKED, stage):
+            return None
+        return stage_of(self.save.value)
+
+
+def read_pass(source: Source, block: Block) -> CustomPass:
+    """Read a pass."""
+    save = block.last("SAVE")
+    if save:
+        name = check_name(source, save, "SAVE")
+        if stage_of(name) == GLOW:
+            raise source.fault(save.line, "SAVE: GLOW is what glows; save under another name")
+        if len(name) > LONGEST:
+            raise source.fault(save.line, f"SAVE: {name!r} is longer than {LONGEST} characters")
+    check_ignored(source, block)
+    bindings = block.all("BIND")
+    if len(bindings) > MAX_BINDINGS:
+        raise source.fault(bindings[MAX_BINDINGS].line, f"BIND: a pass has at most {MAX_BINDINGS}")
+    for binding in bindings:
+        check_name(source, binding, "BIND")
+    title = block.last("DESC")
+    return CustomPass(
+        title.value if title else "",
+        read_stages(source, block),
+        tuple(bindings),
+        save,
+        read_expression(source, block, "WIDTH"),
+        read_expression(source, block, "HEIGHT"),
+        read_expression(source, block, "WHEN"),
+        read_compute(source, block),
+        block.body,
+        block.body_line,
+        block.line,
+    )
+
+
+def read_stages(source: Source, block: Block) -> tuple[str, ...]:
+    """Return the stages of a pass, in the order in which they run."""
+    hooks = block.all("HOOK")
+    if not hooks:
+        raise source.fault(block.line, "the pass has no //!HOOK, so it never runs")
+    if len(hooks) > MAX_STAGES:
+        raise source.fault(hooks[MAX_STAGES].line, f"HOOK: a pass has at most {MAX_STAGES}")
+    for hook in hooks:
+        if hook.value in UNREACHED:
+            raise source.fault(
+                hook.line,
+                f"HOOK: the stage {hook.value} is never reached, since pictures are linear RGB; "
+                f"it is not one of {', '.join(STAGES)}",
+            )
+        if stage_of(hook.value) not in STAGES:
+            raise source.fault(hook.line, f"HOOK: {hook.value!r} is not one of {', '.join(STAGES)}")
+    named = {stage_of(hook.value) for hook in hooks}
+    return tuple(stage for stage in STAGES if stage in named)
+
+
+def read_expression(source: Source, block: Block, name: str) -> Expression | None:
+    """Read an expression; an empty one counts as none."""
+    found = block.last(name)
+    if found is None or not found.value:
+        return None
+    try:
+        tokens(found.value)
+    except ExpressionError as error:
+        raise source.fault(found.line, f"{name}: {error}") from None
+    return Expression(found.value, found.line, name)
+
+
+def numbers(directive: Directive) -> list[int] | None:
+    """Return the directive's value as integers; None if it is something else."""
+    words = directive.value.split()
+    if not all(re.fullmatch(r"[+-]?\d{1,9}", word, re.ASCII) for word in words):
+        return None
+    return [int(word) for word in words]
+
+
+def read_compute(source: Source, block: Block) -> Compute | None:
+    """Read //!COMPUTE: two or four numbers."""
+    found = block.last("COMPUTE")
+    if found is None:
+        return None
+    given = numbers(found)
+    if given is None or len(given) not in (2, 4):
+        raise source.fault(found.line, f"COMPUTE: {found.value!r} is not two or four numbers")
+    width, height = given[:2]
+    threads = (given[-2], given[-1])
+    if not (1 <= width <= LARGEST_BLOCK and 1 <= height <= LARGEST_BLOCK):
+        raise source.fault(
+            found.line, f"COMPUTE: {width} x {height} pixels are out of range, 1 to {LARGEST_BLOCK}"
+        )
+    if (
+        min(threads) < 1
+        or threads[0] * threads[1] > MAX_THREADS
+        or any(side > limit for side, limit in zip(threads, LARGEST_GROUP, strict=True))
+    ):
+        raise source.fault(
+            found.line,
+            f"COMPUTE: {threads[0]} x {threads[1]} threads are out of range, 1 to {MAX_THREADS}",
+        )
+    return Compute((width, height), threads)
+
+
+def check_ignored(source: Source, block: Block) -> None:
+    """Check the directives that change no pixel here: OFFSET and COMPONENTS."""
+    for found in block.all("COMPONENTS"):
+        given = numbers(found)
+        if given is None or len(given) != 1 or not 1 <= given[0] <= 4:
+            raise source.fault(found.line, f"COMPONENTS: {found.value!r} is not a number, 1 to 4")
+    for found in block.all("OFFSET"):
+        words = found.value.split()
+        number = r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"
+        if words != ["ALIGN"] and not (
+            len(words) == 2 and all(re.fullmatch(number, word, re.ASCII) for word in words)
+        ):
+            raise source.fault(found.line, f"OFFSET: {found.value!r} is not two numbers or ALIGN")

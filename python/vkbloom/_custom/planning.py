@@ -1,0 +1,211 @@
+"""The passes of a custom method for one frame, as rows for the core."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vkbloom._custom.buffers import Buffer
+from vkbloom._custom.expressions import ExpressionError, Values, evaluate, rounded
+from vkbloom._custom.file import CustomFile
+from vkbloom._custom.names import GLOW, HOOKED, LONGEST, RESIZING, STAGES
+from vkbloom._custom.passes import CustomPass, Expression
+from vkbloom._custom.resources import Resources
+from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
+from vkbloom._custom.textures import Texture
+
+Size = tuple[int, int]
+#: Of `core_passes`: name, shader, size, format, reads, shown, parameters, block, resources, turn.
+Row = tuple[Any, ...]
+
+#: A pass that changes a resource has another turn in each request.
+TURNS: Final = itertools.count(1)
+#: What the core calls the finished picture and the bloom.
+PICTURE: Final = "main"
+BLOOM_IMAGE: Final = "bloom"
+LARGEST_SIDE: Final = 16384
+#: Names of the package's own images.
+TAKEN: Final = {"image", "emission", "mask", "glow", "final", "scene", "hdr", "depth", PICTURE}
+
+
+@dataclasses.dataclass(frozen=True)
+class Image:
+    """An image that passes read: its name, and its size."""
+
+    name: str
+    size: Size
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What a frame has: sizes, the parameters' numbers, and the number of frames before it."""
+
+    frame: Size
+    buffers: Size
+    values: Mapping[str, float]
+    seed: int
+    index: int
+    resources: Resources
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A pass that runs, with the images that it reads and writes."""
+
+    one: CustomPass
+    stage: str
+    saved: str | None
+    image: Image
+    sizes: Mapping[str, Image]
+
+
+class Planner:
+    """Goes through the passes of a file in the order in which they run."""
+
+    def __init__(self, file: CustomFile, request: Request) -> None:
+        self._file = file
+        self._request = request
+        self._words = file.words(dict(request.values))
+        self._picture = Image("MAIN", request.frame)
+        self._saved: dict[str, Image] = {}
+        # The picture as each stage left it.
+        self._left: dict[str, Image] = {}
+        self.steps: list[Step] = []
+        for stage in STAGES:
+            self._saved.pop(stage, None)
+            self._left[stage] = self._picture
+            for one in file.passes:
+                if stage in one.stages and self._holds(one.when, stage):
+                    self._run(stage, one)
+        self._check_size()
+
+    def _holds(self, when: Expression | None, stage: str) -> bool:
+        return when is None or self._value(when, stage) != 0
+
+    def _run(self, stage: str, one: CustomPass) -> None:
+        images = self._images(stage)
+        for binding in one.bindings:
+            if binding.value not in images and binding.value not in self._file.given:
+                raise self._file.source.fault(
+                    binding.line,
+                    f"BIND: {binding.value!r} was not saved, since the WHEN of its pass is 0",
+                )
+        size = (self._side(one.width, stage, 0), self._side(one.height, stage, 1))
+        saved = one.saved_at(stage)
+        if saved is None and stage not in RESIZING and size != self._picture.size:
+            raise self._file.source.fault(
+                one.line,
+                f"the picture's size is {size} after this pass, not {self._picture.size}; only the "
+                f"stages {', '.join(RESIZING)} can change it",
+            )
+        image = Image(f"{len(self.steps)}.{saved or PICTURE}"[:LONGEST], size)
+        self.steps.append(Step(one, stage, saved, image, images))
+        if saved is None:
+            self._picture = self._left[stage] = image
+        else:
+            self._saved[saved] = image
+
+    def _images(self, stage: str) -> dict[str, Image]:
+        """Return the images that a pass of a stage finds, by name."""
+        found = {GLOW: Image(GLOW, self._request.buffers), **self._left, **self._saved}
+        found[HOOKED] = found[stage] = self._picture
+        if "MAIN" in found:
+            found["MAINPRESUB"] = found["MAIN"]
+        return found
+
+    def _value(self, expression: Expression, stage: str) -> float:
+        """Return the value of an expression at this place."""
+        sizes = {name: image.size for name, image in self._images(stage).items()}
+        sizes["OUTPUT"] = sizes["NATIVE_CROPPED"] = self._request.frame
+        try:
+            return evaluate(expression.text, Values(sizes, self._words))
+        except ExpressionError as error:
+            raise self._file.source.fault(expression.line, f"{expression.name}: {error}") from None
+
+    def _side(self, expression: Expression | None, stage: str, axis: int) -> int:
+        """Return a side of a pass's result."""
+        if expression is None:
+            return self._picture.size[axis]
+        side = rounded(self._value(expression, stage))
+        if not 1 <= side <= LARGEST_SIDE:
+            raise self._file.source.fault(
+                expression.line,
+                f"{expression.name}: a side of {side} pixels is out of range, 1 to {LARGEST_SIDE}",
+            )
+        return side
+
+    def _check_size(self) -> None:
+        """Check that the picture ends with the frame's size."""
+        size, frame = self._picture.size, self._request.frame
+        if size == frame or self._file.saves_bloom:
+            return
+        last = next(step for step in self.steps if step.image == self._picture)
+        raise self._file.source.fault(
+            last.one.line, f"the picture's size is {size} at the end, not the frame's, {frame}"
+        )
+
+
+def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, ...]:
+    """Return the rows of a frame."""
+    steps = Planner(file, request).steps
+    names = framebuffers(file, steps)
+    rows = []
+    for place, step in enumerate(steps):
+        shader, core_shader = shaders.of(step.one, step.stage, request.values)
+        given = {
+            **request.values,
+            "vkb_target": step.image.size,
+            "input_size": request.frame,
+            "target_size": request.frame,
+            "frame": request.index * len(steps) + place + 1,
+            "random": random_number(request.seed, request.index * len(steps) + place),
+            **{name: image.size for name, image in step.sizes.items()},
+        }
+        name = names.get(step.image.name, step.image.name)
+        shown = name not in (step.image.name, PICTURE)
+        images = [step.sizes[image].name for image in shader.images]
+        reads = tuple(names.get(image, image) for image in images)
+        block = step.one.compute.block if step.one.compute else None
+        params = shader.packed(given)
+        blocks: list[Texture | Buffer] = [*shader.textures, *shader.buffers]
+        bound = tuple(request.resources[one.name] for one in blocks)
+        turn = next(TURNS) if any(one.storage for one in blocks) else 0
+        row = (name, core_shader, step.image.size, None, reads, shown, params, block)
+        rows.append((*row, bound, turn))
+    written = {row[0] for row in rows}
+    frame = request.frame
+    if file.saves_bloom and BLOOM_IMAGE not in written:
+        rows.append(package_row(BLACK, BLOOM_IMAGE, frame, ()))
+    elif not file.saves_bloom:
+        if PICTURE not in written:
+            rows.append(package_row(COPY, PICTURE, frame, ("MAIN",)))
+        rows.append(package_row(DIFFERENCE, BLOOM_IMAGE, frame, (PICTURE, "MAIN")))
+    return tuple(rows)
+
+
+def package_row(shader: int, name: str, size: Size, reads: tuple[str, ...]) -> Row:
+    """Return the row of one of the package's passes."""
+    return (name, package_shader(shader), size, None, reads, name == BLOOM_IMAGE, b"", None)
+
+
+def framebuffers(file: CustomFile, steps: list[Step]) -> dict[str, str]:
+    """Return the names of the results that the core or the user know, by the image's own name.
+
+    If several passes save the same name, the last one is the framebuffer.
+    """
+    last = {(step.saved or "").lower(): step.image.name for step in steps}
+    picture = last.pop("", None)
+    names = {image: f"saved_{saved}" if saved in TAKEN else saved for saved, image in last.items()}
+    if picture is not None and not file.saves_bloom:
+        names[picture] = PICTURE
+    return names
+
+
+def random_number(seed: int, count: int) -> float:
+    """Return a number in [0, 1) for a pass: a hash (PCG, Jarzynski and Olano, JCGT 9(3), 2020)."""
+    state = (seed * 747796405 + count * 2891336453 + 1) & 0xFFFFFFFF
+    state = (state * 747796405 + 2891336453) & 0xFFFFFFFF
+    word = ((state >> ((state >> 28) + 4)) ^ state) * 277803737 & 0xFFFFFFFF
+    return ((word >> 22) ^ word) / 2**32

@@ -1,0 +1,92 @@
+"""The compiled shaders of a custom method."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final
+
+from vkbloom import _core
+from vkbloom._custom.compiler import cached_code, compile_shader
+from vkbloom._custom.file import CustomFile, read_file
+from vkbloom._custom.glsl import Shader, write_shader
+from vkbloom._custom.passes import CustomPass
+from vkbloom._custom.resources import made_resources
+from vkbloom._custom.source import Source
+
+#: Passes that the package adds: a copy, the difference of two pictures, and black.
+PACKAGE_PASSES: Final = """\
+//!HOOK MAIN
+//!BIND HOOKED
+vec4 hook() { return texelFetch(HOOKED_raw, ivec2(gl_FragCoord.xy), 0); }
+//!HOOK MAIN
+//!BIND HOOKED
+//!BIND GLOW
+vec4 hook()
+{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    return vec4(texelFetch(HOOKED_raw, at, 0).rgb - texelFetch(GLOW_raw, at, 0).rgb, 1.0);
+}
+//!HOOK MAIN
+vec4 hook() { return vec4(0.0, 0.0, 0.0, 1.0); }
+"""
+COPY, DIFFERENCE, BLACK = range(3)
+
+
+class Shaders:
+    """The shaders of a file, each compiled at its first use."""
+
+    def __init__(self, name: str, file: CustomFile) -> None:
+        self._name = name
+        self._file = file
+        self.resources = made_resources(file, storage=False)
+        self._compiled: dict[tuple[Any, ...], tuple[Shader, _core.Shader]] = {}
+
+    def of(
+        self, one: CustomPass, stage: str, values: Mapping[str, float]
+    ) -> tuple[Shader, _core.Shader]:
+        """Return the shader of a pass at a stage, for the values that the compiler must know."""
+        key = self._key(one, stage, values)
+        found = self._compiled.get(key)
+        if found is None:
+            shader = write_shader(self._file, one, stage, values)
+            found = self._keep(key, one, shader, compile_shader(self._file, one, shader))
+        return found
+
+    def compile_all(self, values: Mapping[str, float]) -> None:
+        """Compile all passes, several at a time."""
+        missing = []
+        for stage, one in self._file.runs():
+            # The cache has most, and a thread takes longer than to read them.
+            shader = write_shader(self._file, one, stage, values)
+            code = cached_code(shader)
+            if code is None:
+                missing.append((one, stage))
+            else:
+                self._keep(self._key(one, stage, values), one, shader, code)
+        if not missing:
+            return
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            futures = [threads.submit(self.of, one, stage, values) for one, stage in missing]
+        for future in futures:
+            future.result()
+
+    def _key(self, one: CustomPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
+        fixed = tuple(values[param.name] for param in self._file.params if param.use != "uniform")
+        return one.line, stage, fixed
+
+    def _keep(
+        self, key: tuple[Any, ...], one: CustomPass, shader: Shader, code: bytes
+    ) -> tuple[Shader, _core.Shader]:
+        found = shader, _core.shader(f"{self._name}_{one.line}", code)
+        self._compiled[key] = found
+        return found
+
+
+@functools.cache
+def package_shader(place: int) -> _core.Shader:
+    """Return the shader of one of the package's passes."""
+    file = read_file(Source("vkbloom", PACKAGE_PASSES))
+    return Shaders("own", file).of(file.passes[place], "MAIN", {})[1]

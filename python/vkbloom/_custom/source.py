@@ -1,0 +1,89 @@
+"""The text of a custom method, and errors that name a line of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import re
+from pathlib import Path
+from typing import Final
+
+#: No file of passes is larger; a picture that was given by mistake is.
+LARGEST_FILE: Final = 1 << 26
+#: Of a line that a message quotes.
+QUOTED_CHARACTERS: Final = 160
+
+#: What the files of other programs contain, and what to change in them.
+OTHER_SYNTAXES: Final = (
+    (
+        re.compile(r"\bvoid\s+mainImage\s*\("),
+        "this is Shadertoy's syntax: begin with lines '//!HOOK MAIN' and '//!BIND HOOKED', replace "
+        "'void mainImage(out vec4 fragColor, in vec2 fragCoord)' by 'vec4 hook()' that returns the "
+        "colour, 'fragCoord / iResolution.xy' by 'HOOKED_pos' and 'texture(iChannel0, p)' by "
+        "'HOOKED_tex(p)'",
+    ),
+    (
+        re.compile(r'^\s*(?:technique\d*\s+\w|#include\s+"ReShade)|\bSV_Target', re.MULTILINE),
+        "this is ReShade's syntax: write each 'pass' of the technique as a block that begins with "
+        "lines '//!HOOK MAIN' and '//!BIND HOOKED' and defines 'vec4 hook()' in GLSL, a render "
+        "target as '//!SAVE NAME', and an annotated uniform as a block '//!PARAM name'",
+    ),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """The text of a custom method, and the name under which messages mention it."""
+
+    name: str
+    text: str
+
+    @property
+    def digest(self) -> str:
+        """The SHA-256 of the text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def quoted(self, line: int) -> str:
+        """Return a line of the file, counted from 1, as messages quote it."""
+        lines = self.text.split("\n")
+        text = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+        return text if len(text) <= QUOTED_CHARACTERS else text[:QUOTED_CHARACTERS] + "..."
+
+    def where(self, line: int, cause: str) -> str:
+        """Return a message that names file, line and cause, and quotes the line."""
+        return f"{self.name}:{line}: {cause}\n    {self.quoted(line)}"
+
+    def fault(self, line: int, cause: str) -> ValueError:
+        """Return the error of a line."""
+        return ValueError(self.where(line, cause))
+
+
+def read_source(source: str | Path) -> Source:
+    """Read a file, or take a text: what contains a line feed is one."""
+    if isinstance(source, str) and "\n" in source:
+        return checked(Source("<text>", source.replace("\r\n", "\n")))
+    if not isinstance(source, str | Path):
+        raise TypeError(f"source: {source!r} is neither a path nor a text")
+    path = Path(source)
+    if path.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"{path}: {path.stat().st_size} bytes are more than {LARGEST_FILE}")
+    data = path.read_bytes().replace(b"\r\n", b"\n")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(
+            f"{path}:{line}: byte {data[error.start]:#04x} is not UTF-8; save the file as UTF-8"
+        ) from None
+    return checked(Source(str(path), text))
+
+
+def checked(source: Source) -> Source:
+    """Return the source; raise ValueError if it is in the syntax of another program."""
+    if (place := source.text.find("\0")) >= 0:
+        raise source.fault(source.text.count("\n", 0, place) + 1, "the line has a null character")
+    for pattern, advice in OTHER_SYNTAXES:
+        found = pattern.search(source.text)
+        if found and "//!HOOK" not in source.text:
+            raise source.fault(source.text.count("\n", 0, found.start()) + 1, advice)
+    return source

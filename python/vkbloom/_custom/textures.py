@@ -1,0 +1,241 @@
+"""Blocks TEXTURE: images whose data is in the file."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from typing import Final, Literal, TypeVar
+
+import numpy as np
+
+from vkbloom._custom.blocks import Block
+from vkbloom._custom.names import check_name
+from vkbloom._custom.source import Source
+
+Scalar = Literal["float", "int", "uint"]
+Filter = Literal["NEAREST", "LINEAR"]
+Border = Literal["CLAMP", "REPEAT", "MIRROR"]
+
+Word = TypeVar("Word", bound=str)
+
+FILTERS: Final[tuple[Filter, ...]] = ("NEAREST", "LINEAR")
+BORDERS: Final[tuple[Border, ...]] = ("CLAMP", "REPEAT", "MIRROR")
+#: Of a side, in each number of dimensions: what every device of Vulkan 1.1 has.
+LARGEST_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
+
+
+@dataclasses.dataclass(frozen=True)
+class TextureFormat:
+    """A format: its number in Vulkan, its name in GLSL, and how the file's data becomes texels.
+
+    `file_bytes` are those of a texel in the file.
+    """
+
+    vulkan: int
+    layout: str
+    scalar: Scalar
+    channels: int
+    file_bytes: int
+    read: Callable[[bytes], np.ndarray]
+    stored: bool = True
+
+
+def as_channels(
+    kind: str, channels: int, to: str, order: str = ""
+) -> Callable[[bytes], np.ndarray]:
+    """Return a function that reads texels; three channels become four, with the largest alpha."""
+
+    def read(data: bytes) -> np.ndarray:
+        texels = np.frombuffer(data, np.dtype(kind).newbyteorder("<")).reshape(-1, channels)
+        if order == "bgra":
+            texels = texels[:, [2, 1, 0, 3]]
+        texels = texels.astype(to)
+        if channels == 3:
+            whole = 1 if to[0] == "f" else np.iinfo(to).max
+            texels = np.concatenate([texels, np.full((len(texels), 1), whole, to)], axis=1)
+        return np.ascontiguousarray(texels)
+
+    return read
+
+
+def packed_565(data: bytes) -> np.ndarray:
+    """Read texels of 16 bits with red in the upper 5 as floats."""
+    words = np.frombuffer(data, "<u2").astype(np.uint32)
+    channels = [(words >> 11) / 31, (words >> 5 & 63) / 63, (words & 31) / 31, np.ones(len(words))]
+    return np.stack(channels, axis=1).astype("f4")
+
+
+def packed_10(data: bytes) -> np.ndarray:
+    """Read texels of 32 bits, 10 for each colour with red in the lower ones, as floats."""
+    words = np.frombuffer(data, "<u4")
+    channels = [(words & 1023) / 1023, (words >> 10 & 1023) / 1023, (words >> 20 & 1023) / 1023]
+    return np.stack([*channels, (words >> 30) / 3], axis=1).astype("f4")
+
+
+#: For 1, 2 and 4 channels, the number of Vulkan's format: by bits and kind.
+NUMBERS: Final = {
+    (8, ""): (9, 16, 37),
+    (8, "s"): (10, 17, 38),
+    (8, "u"): (13, 20, 41),
+    (8, "i"): (14, 21, 42),
+    (16, ""): (70, 77, 91),
+    (16, "s"): (71, 78, 92),
+    (16, "u"): (74, 81, 95),
+    (16, "i"): (75, 82, 96),
+    (16, "f"): (76, 83, 97),
+    (32, "u"): (98, 101, 107),
+    (32, "i"): (99, 102, 108),
+    (32, "f"): (100, 103, 109),
+}
+LAYOUT_KINDS: Final = {"": "", "s": "_snorm", "u": "ui", "i": "i", "f": "f"}
+SCALARS: Final[dict[str, Scalar]] = {"u": "uint", "i": "int"}
+RGBA32_FLOAT: Final = 109
+
+
+def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
+    """Return a format of the table; `file` is the type of a channel in the file."""
+    place = {1: 0, 2: 1, 3: 2, 4: 2}[channels]
+    letter = {"": "u", "s": "i"}.get(kind, kind) + str(bits // 8)
+    return TextureFormat(
+        NUMBERS[bits, kind][place],
+        ("r", "rg", "rgba")[place] + str(bits) + LAYOUT_KINDS[kind],
+        SCALARS.get(kind, "float"),
+        channels,
+        channels * int(file[1:]),
+        as_channels(file, channels, letter),
+        channels != 3,
+    )
+
+
+def made_formats() -> dict[str, TextureFormat]:
+    """Return the formats by the names that files use."""
+    formats = {}
+    for bits, kind in NUMBERS:
+        for channels, names in ((1, "r"), (2, "rg"), (3, "rgb"), (4, "rgba")):
+            if channels == 3 and (bits, kind) not in {(8, ""), (16, ""), (32, "f")}:
+                continue
+            letter = {"": "u", "s": "i"}.get(kind, kind)
+            formats[f"{names}{bits}{kind}"] = numbered(bits, kind, channels, f"{letter}{bits // 8}")
+    # Of half floats the file has single ones, unless the name says otherwise.
+    for channels, names in ((1, "r"), (2, "rg"), (4, "rgba")):
+        formats[f"{names}16f"] = numbered(16, "f", channels, "f4")
+        formats[f"{names}16hf"] = numbered(16, "f", channels, "f2")
+    formats["bgra8"] = dataclasses.replace(
+        formats["rgba8"], read=as_channels("u1", 4, "u1", "bgra"), stored=False
+    )
+    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565, False)
+    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10, False)
+    return formats
+
+
+FORMATS: Final = made_formats()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Texture:
+    """A texture: one to three sides, and texels (None: zero)."""
+
+    name: str
+    sides: tuple[int, ...]
+    format: TextureFormat
+    filter: Filter
+    border: Border
+    storage: bool
+    texels: bytes | None
+    line: int
+
+    @property
+    def declared(self) -> str:
+        """The type of the sampler or image in GLSL."""
+        prefix = {"float": "", "int": "i", "uint": "u"}[self.format.scalar]
+        return f"{prefix}{'image' if self.storage else 'sampler'}{len(self.sides)}D"
+
+
+def read_texture(source: Source, block: Block) -> Texture:
+    """Read a block TEXTURE."""
+    head = block.directives[0]
+    name = check_name(source, head, "TEXTURE")
+    storage = block.last("STORAGE") is not None
+    sides = read_sides(source, block)
+    found = block.last("FORMAT")
+    if found is None:
+        raise source.fault(head.line, f"TEXTURE {name}: the block has no //!FORMAT")
+    if found.value not in FORMATS:
+        raise source.fault(
+            found.line, f"FORMAT: {found.value!r} is not one of {', '.join(FORMATS)}"
+        )
+    texels = FORMATS[found.value]
+    if storage and not texels.stored:
+        raise source.fault(
+            found.line, f"FORMAT: {found.value} has no STORAGE; use rgba8 or rgba32f"
+        )
+    filtering = read_word(source, block, "FILTER", FILTERS)
+    if filtering == "LINEAR" and texels.scalar != "float":
+        line = block.all("FILTER")[-1].line
+        raise source.fault(line, f"FILTER: LINEAR is not possible with integers ({found.value})")
+    data = read_hex(source, block)
+    size = texels.file_bytes * int(np.prod(sides))
+    if len(data) != size and not (storage and not data):
+        line = block.body_line
+        raise source.fault(
+            line,
+            f"TEXTURE {name}: the data has {len(data)} bytes, not {size}: "
+            f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({found.value})",
+        )
+    return Texture(
+        name,
+        sides,
+        texels,
+        filtering,
+        read_word(source, block, "BORDER", BORDERS),
+        storage,
+        texels.read(data).tobytes() if data else None,
+        head.line,
+    )
+
+
+def read_sides(source: Source, block: Block) -> tuple[int, ...]:
+    """Read //!SIZE: one to three numbers."""
+    found = block.last("SIZE")
+    if found is None:
+        return (1, 1)
+    words = found.value.split()
+    if not 1 <= len(words) <= 3 or not all(re.fullmatch(r"\d+", word, re.ASCII) for word in words):
+        raise source.fault(found.line, f"SIZE: {found.value!r} is not one, two or three numbers")
+    sides = tuple(int(word) for word in words)
+    largest = LARGEST_SIDES[len(sides)]
+    if not all(1 <= side <= largest for side in sides):
+        raise source.fault(
+            found.line,
+            f"SIZE: {found.value} is out of range, 1 to {largest} in {len(sides)} dimensions",
+        )
+    return sides
+
+
+def read_word(source: Source, block: Block, name: str, words: tuple[Word, ...]) -> Word:
+    """Read a directive whose value is one of some words; the first is the default."""
+    found = block.last(name)
+    if found is None:
+        return words[0]
+    for word in words:
+        if found.value == word:
+            return word
+    raise source.fault(found.line, f"{name}: {found.value!r} is not one of {', '.join(words)}")
+
+
+def read_hex(source: Source, block: Block) -> bytes:
+    """Read the body's data: hexadecimal digits, with blanks and line breaks anywhere."""
+    wrong = re.search(r"[^0-9a-fA-F\s]", block.body)
+    what = f"{block.kind} {block.directives[0].value}"
+    if wrong:
+        line = block.body_line + block.body.count("\n", 0, wrong.start())
+        raise source.fault(
+            line, f"{what}: {wrong[0]!r} is not a hexadecimal digit; the body is data only"
+        )
+    digits = "".join(block.body.split())
+    if len(digits) % 2:
+        raise source.fault(
+            block.body_line, f"{what}: {len(digits)} hexadecimal digits are not full bytes"
+        )
+    return bytes.fromhex(digits)

@@ -1,0 +1,144 @@
+"""Check whether this machine can render, and explain what prevents it.
+
+A fault of the machine raises no exception here: each check returns a `Finding`. Code that opens a
+driver runs in a child process (`vkbloom._doctor.child`), so that a driver's crash becomes a finding
+too.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vkbloom._doctor import child, drivers, installation
+from vkbloom._doctor.finding import Finding, Report
+
+#: Versions of Mesa whose lavapipe the package is tested with.
+TESTED_MESA: Final = ("22.3.6", "25.0.7")
+
+
+def examine() -> Report:
+    """Examine everything that rendering needs, and make a test render on each adapter.
+
+    Takes some seconds. The test render adds to the pipeline cache, as every render does.
+    """
+    listed = child.ask("adapters", "all", environment=drivers.LOG)
+    adapters: list[Mapping[str, Any]] = listed.value["adapters"] if listed.value else []
+    chosen = child.ask("render", "auto", "plain")
+    renders = {} if chosen.value is None else {chosen.value["name"]: chosen}
+    for adapter in adapters:
+        if adapter["name"] not in renders:
+            renders[adapter["name"]] = child.ask("render", adapter["name"], "plain")
+    working = [name for name, answer in renders.items() if answer.value is not None]
+    loading = [_loader(listed), *drivers.examine(listed.messages)]
+    if any(adapter["bundled"] for adapter in adapters):
+        # The bundled driver needs neither loader nor manifest.
+        loading = [one._replace(status=one.status.replace("problem", "note")) for one in loading]
+    findings = [
+        installation.package(),
+        *installation.memory(),
+        *loading,
+        *installation.environment(),
+        _adapters(listed, any(finding.status == "problem" for finding in loading)),
+        *([_software(adapters)] if adapters else []),
+        *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
+        *([_chosen(chosen)] if adapters else []),
+        *(_test_render(name, answer) for name, answer in renders.items()),
+        *map(_validation, working[:1]),
+        *installation.caches(),
+        *installation.extras(),
+    ]
+    is_right = [not answer.value["differences"] for answer in renders.values() if answer.value]
+    return Report(tuple(findings), any(is_right))
+
+
+def _loader(listed: child.Answer) -> Finding:
+    """Judge the loader by its log, and by why there is no adapter of the system."""
+    reason = listed.failure or (listed.value or {}).get("reason", "")
+    version = re.search(r"Version (\d+\.\d+\.\d+)", "\n".join(listed.messages))
+    if "Vulkan loader" in reason or not (version or listed.value):
+        advice = "Install the loader: apt install libvulkan1, or dnf install vulkan-loader."
+        return Finding("Vulkan loader", "problem", f"not found: {reason}", advice)
+    return Finding("Vulkan loader", "ok", f"version {version[1] if version else 'not in its log'}")
+
+
+def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
+    """Judge the list of adapters; `has_problem`: the loader or a driver has a problem."""
+    if listed.value and listed.value["adapters"]:
+        return Finding("adapters", "ok", drivers.names(listed.value["adapters"]))
+    reason = listed.failure or "no driver has a device with Vulkan 1.1"
+    messages = drivers.complaints(listed.messages)
+    said = f"; the loader says: {' / '.join(messages)}" if messages else ""
+    is_above = has_problem or installation.memory()
+    advice = "Solve the problems above first." if is_above else drivers.INSTALL_DRIVER
+    return Finding("adapters", "problem", f"none: {reason}{said}", advice)
+
+
+def _software(adapters: list[Mapping[str, Any]]) -> Finding:
+    topic, advice = "lavapipe", "Check the test render below."
+    found = [adapter for adapter in adapters if adapter["type"] == "cpu"]
+    # As the choice of "software" has it.
+    found.sort(key=lambda adapter: not adapter["bundled"])
+    if not found:
+        advice = "To use it: install the package vkbloom-lavapipe, or mesa-vulkan-drivers."
+        return Finding(topic, "note", 'there is none; adapter="software" fails', advice)
+    described = found[0]["driver_info"]
+    tested = " and ".join(TESTED_MESA)
+    if "Mesa" not in described:
+        return Finding(
+            topic,
+            "note",
+            f"the software adapter is {found[0]['name']}, not lavapipe, whose versions {tested} "
+            "are tested; it should work",
+            "Check the test render below.",
+        )
+    # As in "Mesa 22.3.6 (LLVM 15.0.6)"; a distribution may append its own revision.
+    version = re.match(r"Mesa ([\d.]+)", described)
+    if version and version[1] in TESTED_MESA:
+        return Finding(topic, "ok", f"{described}, one of the tested versions ({tested})")
+    text = f"{described} is not one of the tested versions ({tested}), but should work"
+    if "Mesa" not in described:
+        name = f"the software adapter is {found[0]['name']}, not lavapipe"
+        text = f"{name}, whose versions {tested} are tested; it should work"
+    return Finding(topic, "note", text, advice)
+
+
+def _chosen(chosen: child.Answer) -> Finding:
+    topic, wanted = "chosen adapter", os.environ.get("VKBLOOM_ADAPTER")
+    reason = (
+        '"auto" prefers discrete, integrated, virtual, cpu, in that order, and any of them to '
+        "a driver that is not conformant"
+    )
+    advice = "Set VKBLOOM_ADAPTER to software, hardware, or a part of another adapter's name."
+    if wanted:
+        reason = f'VKBLOOM_ADAPTER is {wanted!r} and replaces "auto"'
+        advice = "Correct or unset VKBLOOM_ADAPTER."
+    if chosen.value is None:
+        return Finding(topic, "problem", f"{reason}; it fails: {chosen.failure}", advice)
+    return Finding(topic, "ok", f"{chosen.value['summary']}; {reason}")
+
+
+def _test_render(name: str, answer: child.Answer) -> Finding:
+    topic, advice = "test render", "Update its driver, or use another adapter."
+    if answer.value is None:
+        advice = installation.memory_advice() or advice
+        return Finding(topic, "problem", f"{name} fails: {answer.failure}", advice)
+    if answer.value["differences"]:
+        found = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
+        return Finding(topic, "problem", found, f"{advice} Do not trust its framebuffers.")
+    return Finding(topic, "ok", f"{name} renders the expected values in all framebuffers")
+
+
+def _validation(adapter: str) -> Finding:
+    """Check the validation layer by a test render on an adapter that works without it."""
+    topic = "validation layer"
+    answer = child.ask("render", adapter, "validated")
+    if answer.value is not None:
+        return Finding(topic, "ok", "installed; the test render has no validation errors")
+    if "is not installed" in answer.failure:
+        advice = "To use validation=True: apt install vulkan-validationlayers (Debian, Ubuntu)."
+        return Finding(topic, "note", "it is not installed", advice)
+    advice = "Install the layer again, in the loader's version, or do not use validation=True."
+    return Finding(topic, "problem", f"the test render fails with it: {answer.failure}", advice)

@@ -1,0 +1,106 @@
+"""Check the installation: memory, environment variables, extras, GPU device files and caches."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import tempfile
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vkbloom._doctor.finding import Finding
+from vkbloom._free_memory import ADVICE, address_space_left
+from vkbloom._io import pipeline_cache
+
+# Address space of a render of a small image on lavapipe, with the interpreter.
+_AMPLE: Final = 1 << 30
+# Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
+_VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|EN)ABLE_LAYER)_\w+")
+
+
+def package() -> Finding:
+    """Return the versions of vkbloom, Python, NumPy and the platform."""
+    found = f"version {metadata.version('vkbloom')}, Python {platform.python_version()}, NumPy "
+    return Finding("vkbloom", "ok", f"{found}{np.__version__}, {platform.platform()}")
+
+
+def memory() -> list[Finding]:
+    """Report a limit of address space under which drivers fail or crash."""
+    left = address_space_left()
+    if left is None or left >= _AMPLE:
+        return []
+    found = f"memory is short: a limit leaves {left >> 20} MiB of address space to each process"
+    found += f"; a driver and a test render need up to {_AMPLE >> 20} MiB, and may crash with less"
+    return [Finding("memory", "problem", found, f"To render: {ADVICE}.")]
+
+
+def memory_advice() -> str:
+    """Return what to do first about a driver that fails where memory is short; "" elsewhere."""
+    return "Raise the limit of memory first (ulimit -v)." if memory() else ""
+
+
+def environment() -> list[Finding]:
+    """Report the set environment variables that change the rendering or choose the device."""
+    variables = sorted(name for name in os.environ if _VARIABLES.fullmatch(name))
+    listed = ", ".join(f"{name}={os.environ[name]}" for name in variables)
+    found = f"these variables change the rendering or choose the device: {listed}"
+    return [Finding("environment", "note", found)] if variables else []
+
+
+def extras() -> list[Finding]:
+    """Return one finding for each optional extra of the package."""
+    needed: dict[str, list[str]] = {}
+    for requirement in metadata.requires("vkbloom") or []:
+        parts = re.match(r"([\w.-]+).*extra == [\"']([\w-]+)[\"']", requirement)
+        # The others are for work on the package, or stand for several.
+        if parts and parts[2] not in ("all", "test", "docs", "lint"):
+            needed.setdefault(parts[2], []).append(parts[1])
+    return [_extra(*item) for item in needed.items()]
+
+
+def _extra(name: str, distributions: list[str]) -> Finding:
+    missing = [one for one in distributions if not any(metadata.distributions(name=one))]
+    if missing:
+        advice = f"To use it: pip install vkbloom[{name}]"
+        return Finding(f"extra {name}", "note", f"missing: {', '.join(missing)}", advice)
+    return Finding(f"extra {name}", "ok", ", ".join(distributions))
+
+
+def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
+    """Examine the device files of GPUs, which Linux has."""
+    nodes = sorted([*Path("/dev/dri").glob("renderD*"), *Path("/dev").glob("nvidia[0-9]*")])
+    if not nodes or has_gpu_adapter:
+        return []
+    found = f"{', '.join(map(str, nodes))}, but no Vulkan adapter that uses it"
+    advice = "Install the Vulkan driver of the GPU's vendor. In a container, mount the driver."
+    if all(os.access(node, os.R_OK | os.W_OK) for node in nodes):
+        return [Finding("GPU", "note", found, advice)]
+    advice = 'Add this user to the group that owns it, often "render" or "video".'
+    return [Finding("GPU", "problem", f"{found}: this user cannot open it", advice)]
+
+
+def caches() -> list[Finding]:
+    """Examine whether the caches of vkbloom and of the drivers can be written."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    drivers = ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
+    found = [_cache("VKBLOOM_CACHE_DIR", pipeline_cache.folder())]
+    return found + [_cache(name, os.environ.get(name) or home) for name in drivers]
+
+
+def _cache(variable: str, folder: str | Path | None) -> Finding:
+    topic = f"cache {variable}"
+    if folder is None:
+        return Finding(topic, "note", "off: the variable is empty")
+    existing = next(path for path in (Path(folder), *Path(folder).parents) if path.exists())
+    try:
+        # The folder is created with its first file; creating it here would leave it behind.
+        with tempfile.TemporaryDirectory(dir=existing):
+            return Finding(topic, "ok", f"{folder}, writable")
+    except OSError as error:
+        found = f"{folder} is not writable ({existing}: {error.strerror or error})"
+        advice = f"Set {variable} to a writable folder, or each process compiles again."
+        return Finding(topic, "note", found, advice)

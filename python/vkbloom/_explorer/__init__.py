@@ -1,0 +1,119 @@
+"""The explorer: controls for all settings and a live picture, in a notebook or on a web page.
+
+==================== ====================================================================
+`controls`           the fields of the settings as descriptions of controls; settings as code
+`viewer`             one viewer: takes the page's messages, returns pictures and values
+`shown`              framebuffers as PNG, optimized for speed
+`custom_files`          the files of custom methods, which are loaded again when they change
+`widget`             the page in a notebook (anywidget)
+`server`             the page on 127.0.0.1 (tornado), for ``vkbloom explore``
+``page.js``, ``.css`` the page itself, the same for both
+==================== ====================================================================
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from vkbloom._checks import import_extra
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from vkbloom._explorer.widget import Explorer
+    from vkbloom._renderer.renderer import Renderer
+    from vkbloom._scene import Scene
+    from vkbloom._settings.settings import Settings, Shading
+
+__all__ = ["explore"]
+
+
+def explore(
+    source: Scene | NDArray[Any] | None = None,
+    settings: Settings | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+    against: Settings | None = None,
+    size: tuple[int, int] = (1280, 720),
+    shading: Shading = "deferred",
+    renderer: Renderer | None = None,
+) -> Explorer:
+    """Explore a bloom in a notebook, with controls for all settings.
+
+    Every change renders a new picture at the size at which it is shown. While a picture is being
+    rendered, only the newest change is kept. A wipe compares the settings with other settings, B.
+    The values under the pointer are those of the framebuffer, not of the picture.
+
+    Parameters
+    ----------
+    source : Scene or ndarray, optional
+        The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
+        shown is reduced first by averaging, unless the page selects its own size. Default:
+        ``Scene.ufo()`` with lights 6 times as bright as white.
+    settings : Settings, optional
+        The initial settings. Default: ``presets["bevy_natural"]`` for an image and
+        ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if the
+        shading is deferred.
+    mask, emission : ndarray, optional
+        For an image, as for `Renderer.apply`. They are reduced with the image.
+    against : Settings, optional
+        The initial settings of B. Default: `settings` without bloom.
+    size : (int, int)
+        Width and height of a scene's frame. They give the aspect ratio, and the size if the page
+        selects the source's own size. Not used for an image.
+    shading : {"deferred", "forward"}
+        Initial shading of a scene. The page has a control for it.
+    renderer : Renderer, optional
+        Default: a new renderer, which `Explorer.close` closes.
+
+    Returns
+    -------
+    Explorer
+        A widget, which the notebook shows. ``.settings``, ``.against`` and ``.frames`` are those
+        of the page; the first two can be set.
+
+    Raises
+    ------
+    TypeError
+        An argument has another type.
+    ValueError
+        An argument is out of range, or the renderer is closed.
+    ModuleNotFoundError
+        anywidget is not installed: ``pip install vkbloom[notebook]``.
+
+    See Also
+    --------
+    grid : Many settings at once.
+
+    Notes
+    -----
+    ``vkbloom explore`` shows the same page without a notebook. A bloom whose width is given in
+    texels looks wider in a reduced frame.
+
+    Examples
+    --------
+    >>> image = np.full((32, 32, 4), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     explorer = vkbloom.explore(image, vkbloom.Pyramid(levels=3), renderer=renderer)
+    ...     explorer.settings = explorer.settings.replace(radius=2.0)
+    ...     print(explorer.settings.radius)
+    ...     explorer.close()
+    2.0
+    """
+    import_extra("anywidget", "notebook", "explore")
+    from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module
+    from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
+
+    return Explorer(
+        Viewer(
+            source,
+            settings,
+            mask=mask,
+            emission=emission,
+            against=against,
+            size=size,
+            shading=shading,
+            renderer=renderer,
+        )
+    )

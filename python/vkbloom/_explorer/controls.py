@@ -1,0 +1,231 @@
+"""The controls of the page, made from the fields of the settings; settings as Python code."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from vkbloom import psf
+from vkbloom._settings.fields import FieldInfo, fields_of
+from vkbloom._settings.glare import Glare
+from vkbloom._settings.registry import METHODS, STAGES, glares, presets
+from vkbloom._settings.settings import Settings
+from vkbloom.psf._base import PSF, functions
+
+__all__ = ["as_code", "as_fields", "code_with_image", "controls", "described", "settings_from"]
+
+# Fields of everyday use: these, in this order, with the numbers that only this method has between
+# them.
+_FIRST: Final = ("bloom", "intensity", "threshold")
+_LAST: Final = ("exposure", "tonemap")
+# Numbers of methods that are rarely changed.
+_RARE: Final = (
+    "clamp_max",
+    "jitter",
+    "low_frequency_boost_curvature",
+    "luminance_cap",
+    "max_mip_dimension",
+    "maximum",
+    "saturation",
+    "scale_x",
+    "scale_y",
+    "smoothness",
+    "white",
+)
+# Fields that keep their values on the page when another preset or method is selected.
+_LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
+
+
+# Examples of point-spread functions that have parameters without a default.
+_EXAMPLES: Final[tuple[PSF, ...]] = (psf.aperture(psf.iris()), psf.gaussian(8.0))
+
+_STEPS: Final = 200
+
+
+def controls() -> dict[str, Any]:
+    """Describe methods, point-spread functions, stages and presets.
+
+    Returns: "methods": for each method its "defaults", and for each field with a control its
+    "name", "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
+    "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
+    range from "low" to "high", and "integer"; choices have "choices", and may have a name for
+    "none" of them. "functions": the same for the point-spread functions of a convolution; the name
+    of a field of the mask begins with "mask.". "glare": "stages", the same for the stages of glare,
+    and "presets", for each name of `glares` its stages. "presets": settings by name, as from
+    `Settings.to_dict`. "look": the fields that keep their values when another preset or method is
+    selected.
+    """
+    return {
+        "methods": {name: described(kind) for name, kind in METHODS.items()},
+        "functions": {
+            type(one).__name__: {"defaults": one.to_dict(), "fields": _fields_of_function(one)}
+            for one in _functions()
+        },
+        "glare": {
+            "stages": {
+                name: {"defaults": kind().to_dict(), "fields": _controls(kind)}
+                for name, kind in STAGES.items()
+            },
+            "presets": {name: [one.to_dict() for one in some] for name, some in glares.items()},
+        },
+        "presets": {name: settings.to_dict() for name, settings in presets.items()},
+        "look": _LOOK,
+    }
+
+
+def described(kind: type[Settings]) -> dict[str, Any]:
+    """Describe a method: its defaults and its fields."""
+    return {"defaults": as_fields(kind()), "fields": _fields_of_method(kind)}
+
+
+def as_fields(settings: Settings) -> dict[str, Any]:
+    """Return settings as `settings_from` reads them, also after a custom method's file changed."""
+    fields = settings.to_dict()
+    fields.pop("sha256", None)
+    return fields
+
+
+def _functions() -> list[PSF]:
+    """Return the functions that can be made without arguments, and the examples of others."""
+    made = [
+        kind()
+        for kind in functions().values()
+        if all(info.default is not dataclasses.MISSING for info in fields_of(kind).values())
+    ]
+    return [*made, *_EXAMPLES]
+
+
+def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
+    shared = fields_of(Settings)
+    found = _controls(kind)
+    for control in found:
+        # An integer with two values is more like a switch than a slider.
+        slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
+        is_own = control["name"] not in shared and control["name"] not in _RARE
+        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_own and slides)
+
+    def place(control: dict[str, Any]) -> tuple[int, ...]:
+        name = control["name"]
+        if name in _FIRST:
+            return 0, _FIRST.index(name)
+        return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
+
+    return sorted(found, key=place)
+
+
+def _fields_of_function(one: PSF) -> list[dict[str, Any]]:
+    found = _controls(type(one))
+    mask = getattr(one, "mask", None)
+    if dataclasses.is_dataclass(mask):
+        found += [
+            control | {"name": f"mask.{control['name']}"} for control in _controls(type(mask))
+        ]
+    return found
+
+
+def _controls(kind: type[Any]) -> list[dict[str, Any]]:
+    found = ((info, _control(info)) for info in fields_of(kind).values())
+    return [
+        {"name": info.name, "help": info.help, "optional": info.optional} | control
+        for info, control in found
+        if control is not None
+    ]
+
+
+def _control(info: FieldInfo) -> dict[str, Any] | None:
+    """Return the control of a field; None for arrays, sizes, and fields with one value."""
+    if info.kind == "glare":
+        return {"kind": "choice", "choices": list(glares), "optional": True, "none": "none"}
+    if info.kind == "flag":
+        return {"kind": "bool"}
+    if info.kind == "choice":
+        return {"kind": "choice", "choices": list(info.choices)}
+    if info.ends is None or info.range is None:
+        return None
+    start, end = info.ends
+    low, high = info.range if info.is_bounded else info.ends
+    integer = info.kind == "integer"
+    return {
+        "kind": "number",
+        "integer": integer,
+        "low": low,
+        "high": high,
+        "from": start,
+        "to": end,
+        "step": 1 if integer else _step(start, end),
+    }
+
+
+def _step(start: float, end: float) -> float:
+    """Return the largest step of 1, 2 or 5 times a power of ten that gives at least 200 steps."""
+    step = (end - start) / _STEPS
+    for power in range(3, -9, -1):
+        for digit in (5, 2, 1):
+            # Parsed from text, since a product may not be the nearest float.
+            if (round_one := float(f"{digit}e{power}")) <= step * (1 + 1e-9):
+                return round_one
+    raise ValueError(f"step: {step!r} is too small")
+
+
+def settings_from(fields: object) -> Settings:
+    """Return the settings that a page sent."""
+    made: Settings = Settings.from_dict(fields)  # type: ignore[arg-type]
+    return made
+
+
+def code_with_image(settings: Settings, file: str, expand: float | None) -> str:
+    """Return Python code of the settings, and of the image if its highlights are expanded."""
+    if not file or expand is None:
+        return as_code(settings)
+    # Quotes and separators of paths as in Python.
+    read = f"image = vkbloom.read({json.dumps(file)}, expand={expand:g})"
+    return f"{read}\nsettings = {as_code(settings)}"
+
+
+def as_code(settings: Settings) -> str:
+    """Return Python code that makes the settings, after ``import vkbloom``."""
+    look = {name: getattr(settings, name) for name in _LOOK}
+    for name, preset in presets.items():
+        if preset != type(preset)() and type(preset) is type(settings):
+            if settings == preset:
+                return f'vkbloom.presets["{name}"]'
+            if settings == preset.replace(**look):
+                return f'vkbloom.presets["{name}"].replace({_arguments(settings, preset)})'
+    return f"{_maker(type(settings))}({_arguments(settings, type(settings)())})"
+
+
+def _maker(kind: Any) -> str:
+    """Return Python code of the class."""
+    if not METHODS.is_added(kind.method):
+        return f"vkbloom.{kind.__name__}"
+    from vkbloom._custom.method import (  # noqa: PLC0415  needed by few pages
+        CustomType,
+        own_name,
+    )
+
+    if not isinstance(kind, CustomType):
+        return str(kind.__name__)
+    path = kind.file.source.name
+    source = "text" if path == "<text>" else json.dumps(path)
+    name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'
+    return f"vkbloom.load_method({source}{name})"
+
+
+def _arguments(settings: Settings, begun: Settings) -> str:
+    """Return the fields in which settings differ from others, as keywords."""
+    return ", ".join(
+        f"{field.name}={_literal(getattr(settings, field.name))}"
+        for field in dataclasses.fields(settings)
+        if getattr(settings, field.name) != getattr(begun, field.name)
+    )
+
+
+def _literal(value: object) -> str:
+    if isinstance(value, tuple) and value and all(isinstance(one, Glare) for one in value):
+        return f"({', '.join(f'vkbloom.{one!r}' for one in value)},)"
+    if isinstance(value, PSF):
+        return f"vkbloom.psf.{value!r}"
+    # Names of choices need no escapes.
+    return f'"{value}"' if isinstance(value, str) else repr(value)

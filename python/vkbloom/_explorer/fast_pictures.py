@@ -1,0 +1,56 @@
+"""Framebuffers as PNG, optimized for speed (the sRGB curve is a table); pixels as text."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._views import pictures
+
+__all__ = ["picture_of", "texts_of"]
+
+# Compression level of zlib. The pictures go to a browser on this machine or through a notebook
+# server, where compressing takes longer than sending a larger file.
+_LEVEL: Final = 1
+
+
+def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
+    """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha.
+
+    `array`: ndarray, shape (H, W, C) or (H, W).
+    """
+    if array.dtype == np.uint8:
+        picture = array[:, :, :3]
+    elif array.ndim == 3 and name not in ("normal", "position"):
+        with np.errstate(over="ignore"):
+            halves = np.ascontiguousarray(array[:, :, :3]).astype(np.float16, copy=False)
+        picture = _levels(stops, name == "final" and is_encoded)[halves.view(np.uint16)]
+    else:
+        picture = pictures.picture(array, name)[:, :, :3]
+    return pictures.png(picture, _LEVEL)
+
+
+@functools.lru_cache(maxsize=16)
+def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
+    """Return the 8-bit level of every half float, by its bits."""
+    halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).reshape(1, -1, 1)
+    with np.errstate(all="ignore"):
+        colours = halves.repeat(3, axis=2)
+        shown = pictures.picture(colours, encoded=is_encoded, stops=stops)
+    return shown[0, :, 0]
+
+
+def texts_of(pixel: NDArray[Any]) -> list[str]:
+    """Return the numbers of a pixel with as many digits as identify each value of the dtype."""
+    return [_text(number) for number in np.atleast_1d(pixel)]
+
+
+def _text(number: Any) -> str:
+    if number.dtype.kind == "u" or not np.isfinite(number):
+        return str(number)
+    if number == 0 or 1e-4 <= abs(float(number)) < 1e6:
+        return np.format_float_positional(number, trim="0")
+    return np.format_float_scientific(number, trim="0")

@@ -1,0 +1,221 @@
+"""A server that serves the page only to this machine's user.
+
+It listens on 127.0.0.1, which excludes other machines, but not other users of this machine or other
+sites in the user's browser. So every address contains a token that cannot be guessed, requests must
+name the server as their host (which excludes foreign names that point here), and only the page
+itself can open the socket.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import secrets
+import socket
+import struct
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
+from typing import Any, Final
+
+from tornado.httpserver import HTTPServer
+from tornado.httputil import HTTPServerRequest
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from vkbloom._explorer.viewer import Viewer
+
+__all__ = ["Server"]
+
+_ADDRESS: Final = "127.0.0.1"
+_FILES: Final = resources.files("vkbloom._explorer")
+_TYPES: Final = {
+    "": ("page.html", "text/html; charset=utf-8"),
+    "page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "start.js": ("start.js", "text/javascript; charset=utf-8"),
+    "page.css": ("page.css", "text/css; charset=utf-8"),
+}
+# Nothing is loaded from other sites, and no site can frame the page.
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_REFUSED: Final = (
+    "<!doctype html><title>vkbloom explore</title><p>This address is not that of the explorer. It "
+    "changes with each start. Open the complete address that the running <code>vkbloom explore"
+    "</code> or the notebook printed, or start <code>vkbloom explore</code> again.</p>"
+)
+# The longest text message in bytes. Settings are shorter. Files are sent as binary messages.
+_LARGEST_MESSAGE: Final = 1 << 16
+_LARGEST_FILE: Final = 1 << 30
+
+
+class Server:
+    """Serves the page until it is stopped.
+
+    - `new_viewer`: Makes a viewer for each page that is opened. Viewers may share a renderer.
+    - `port`: The port to listen on; 0: any free port.
+    - `url`: The address of the page.
+
+    Create and use it in a running event loop.
+    """
+
+    def __init__(self, new_viewer: Callable[[], Viewer], port: int = 0) -> None:
+        listening = socket.create_server((_ADDRESS, port))
+        listening.setblocking(False)
+        self.port: int = listening.getsockname()[1]
+        self.token = secrets.token_urlsafe(24)
+        self.url = f"http://{_ADDRESS}:{self.port}/{self.token}/"
+        # One thread: the renderer takes one call at a time.
+        self._worker = ThreadPoolExecutor(1, "vkbloom-explore")
+        shared = {"server": self, "new_viewer": new_viewer, "worker": self._worker}
+        self._http = HTTPServer(
+            Application(
+                [
+                    (r"/([^/]+)/socket", _Socket, shared),
+                    (r"/([^/]+)/([a-z.]*)", _File, {"server": self}),
+                ],
+                websocket_max_message_size=_LARGEST_FILE,
+                log_function=lambda handler: None,
+            )
+        )
+        self._http.add_socket(listening)
+
+    def allows(self, request: HTTPServerRequest, token: str) -> bool:
+        """Return whether a request names this server and knows the token."""
+        return request.host in self._hosts and hmac.compare_digest(
+            token.encode(), self.token.encode()
+        )
+
+    def is_origin(self, origin: str) -> bool:
+        """Return whether a page's origin is this server."""
+        return origin in {f"http://{host}" for host in self._hosts}
+
+    @property
+    def _hosts(self) -> set[str]:
+        return {f"{_ADDRESS}:{self.port}", f"localhost:{self.port}"}
+
+    async def stop(self) -> None:
+        """Stop listening and close all pages' sockets."""
+        self._http.stop()
+        await self._http.close_all_connections()
+        self._worker.shutdown()
+
+
+class _File(RequestHandler):
+    """The files of the page."""
+
+    def initialize(self, server: Server) -> None:
+        self._server = server
+
+    def set_default_headers(self) -> None:
+        self.set_header("Content-Security-Policy", _POLICY)
+        self.set_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Cache-Control", "no-store")
+        self.clear_header("Server")
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        self.finish(_REFUSED if status_code == 403 else f"{status_code}: there is no such file.")
+
+    def get(self, token: str, name: str) -> None:
+        if not self._server.allows(self.request, token):
+            raise HTTPError(403)
+        if name not in _TYPES:
+            raise HTTPError(404)
+        file, kind = _TYPES[name]
+        self.set_header("Content-Type", kind)
+        self.finish((_FILES / file).read_bytes())
+
+
+class _Socket(WebSocketHandler):
+    """The socket of one page. Its newest message is answered; older waiting ones are dropped."""
+
+    def initialize(
+        self, server: Server, new_viewer: Callable[[], Viewer], worker: ThreadPoolExecutor
+    ) -> None:
+        self._server = server
+        self._new_viewer = new_viewer
+        self._worker = worker
+        self._waiting: dict[str, dict[str, Any]] = {}
+        self._files: list[bytes] = []
+        self._answers: asyncio.Future[None] | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        return self._server.is_origin(origin)
+
+    def prepare(self) -> None:
+        # A browser always sends the origin. Tornado accepts sockets without one.
+        token, origin = self.path_args[0], self.request.headers.get("Origin", "")
+        if not (self._server.allows(self.request, token) and self.check_origin(origin)):
+            raise HTTPError(403)
+
+    def open(self, *arguments: str) -> None:
+        # Pictures are small messages, which must not be delayed.
+        self.set_nodelay(True)
+        self._viewer = self._new_viewer()
+
+    def on_message(self, message: str | bytes) -> None:
+        if isinstance(message, str) and len(message) > _LARGEST_MESSAGE:
+            self.close(1009, "the message is too long")
+            return
+        try:
+            text, files = (message, []) if isinstance(message, str) else _unpacked(message)
+            asked = json.loads(text)
+            kind = str(asked["kind"])
+        except (ValueError, TypeError, KeyError, struct.error):
+            self.close(1003, "a message with a kind is needed")
+            return
+        if files:
+            self._files = files
+        newest = dict(asked)
+        older = self._waiting.get(kind, {}).get("sides")
+        newer = newest.get("sides")
+        if isinstance(older, dict) and isinstance(newer, dict):
+            # A side that is missing in the newest message still has to be shown.
+            newest["sides"] = older | newer
+        self._waiting[kind] = newest
+        # Not awaited here, so that the next message is read before the answer is sent.
+        if self._answers is None or self._answers.done():
+            self._answers = asyncio.ensure_future(self._answer())
+
+    async def _answer(self) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            while self._waiting:
+                asked = self._waiting.pop(next(iter(self._waiting)))
+                files = self._files if asked["kind"] == "open" else []
+                header, pictures = await loop.run_in_executor(
+                    self._worker, self._viewer.answer, asked, files
+                )
+                if files is self._files:
+                    self._files = []
+                await self.write_message(_packed(header, pictures), binary=True)
+        except WebSocketClosedError:
+            self._waiting.clear()
+        except Exception:
+            # An error that the viewer does not answer. Closing the socket ends the page's wait.
+            self.close(1011, "the server failed")
+            raise
+
+    def on_close(self) -> None:
+        self._waiting.clear()
+
+
+def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:
+    """Return the header and the file of a message from `_packed`."""
+    (length,) = struct.unpack_from("<I", message)
+    if length > _LARGEST_MESSAGE:
+        raise ValueError(f"message: the length {length} of its header is out of range")
+    return message[4 : 4 + length], [message[4 + length :]]
+
+
+def _packed(header: dict[str, Any], buffers: list[bytes]) -> bytes:
+    """Return a message: the header's length (uint32, little-endian), the header, the buffers."""
+    text = json.dumps(
+        {**header, "buffers": [len(buffer) for buffer in buffers]}, allow_nan=False
+    ).encode()
+    return b"".join([struct.pack("<I", len(text)), text, *buffers])

@@ -1,0 +1,450 @@
+"""One viewer of a source: answers the messages of a page with pictures and values.
+
+It is the same for notebooks and for the page of ``vkbloom explore``, and does not depend on how
+messages are transported. Messages are values that JSON can represent:
+
+======== ============================================= =========================================
+kind     asked                                         answered
+======== ============================================= =========================================
+setup                                                  controls, both sides' settings, source
+frame    sides: settings of "a", "b" or both;          of each side: a picture (a buffer), the
+         framebuffer, size, time, stops; at; of a      framebuffer's facts, the plan's passes and
+         scene shading, glow                           the times of those that ran, settings as
+                                                       code, the values under the pointer; or an
+                                                       error
+probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
+open     name; the content of a file as a buffer;      source, and the settings to begin with
+         as: "image", "mask" or "emission"; without a
+         file the mask or the emission is removed
+save     settings; all else as of frame                a picture of the source's own size
+methods                                                the custom methods whose files changed, as in
+                                                       setup, and the errors of their files
+======== ============================================= =========================================
+
+``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
+received the one before. Of the changes in between, only the newest one is rendered.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._checks import check_emission, check_image, check_mask, check_number, check_size
+from vkbloom._explorer.controls import (
+    as_fields,
+    code_with_image,
+    controls,
+    described,
+    settings_from,
+)
+from vkbloom._explorer.custom_files import CustomFiles, current
+from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._io.glows import alike, grey_mask
+from vkbloom._renderer.plans import Pass
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.sources import image_source, scene_source
+from vkbloom._settings.registry import presets
+from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
+from vkbloom._views.pictures import reduced
+
+if TYPE_CHECKING:
+    from vkbloom._renderer.frames import Frames
+    from vkbloom._scene import Scene
+    from vkbloom._settings.settings import Settings, Shading
+
+__all__ = ["GLOW", "SIDES", "Viewer"]
+
+SIDES: Final = ("a", "b")
+#: The glow's intensity in the default scene: bright enough to show the differences between the
+#: presets' blooms.
+GLOW: Final = 6.0
+
+_LARGEST_SIDE: Final = 8192
+# Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
+_VIEWS_KEPT: Final = 8
+_FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
+_LARGEST_GLOW: Final = 1e4
+# A deferred scene has light above white, which needs a tone map.
+_DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
+
+_GLOWS: Final = ("mask", "emission")
+
+Answer = tuple[dict[str, Any], list[bytes]]
+
+
+class Viewer:
+    """A source and the settings of both sides.
+
+    Arguments are those of `vkbloom.explore`, the adapter of a new renderer, the file of an image,
+    and what its highlights were expanded up to.
+
+    - `settings`, `frames`: The latest ones of the sides "a" and "b".
+    """
+
+    def __init__(
+        self,
+        source: Scene | NDArray[Any] | None = None,
+        settings: Settings | None = None,
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+        against: Settings | None = None,
+        size: tuple[int, int] = (1280, 720),
+        shading: Shading = "deferred",
+        renderer: Renderer | None = None,
+        adapter: str = "auto",
+        file: str = "",
+        expand: float | None = None,
+    ) -> None:
+        from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+        if source is None:
+            source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
+        self._shading: Shading = check_shading(shading)
+        self._named(file, expand)
+        self._scene = source if isinstance(source, Scene) else None
+        self.settings: dict[str, Settings] = {}
+        self._files = CustomFiles()
+        self._begin(settings)
+        if against is not None:
+            self.settings["b"] = check_settings(against)
+        if isinstance(source, Scene):
+            self._own_size = check_size("size", size)
+            for name, given in (("mask", mask), ("emission", emission)):
+                if given is not None:
+                    raise ValueError(f"{name}: the source is a scene; leave the argument out")
+        else:
+            self._show_image(source, mask, emission)
+        if renderer is not None and renderer.closed:
+            raise ValueError("renderer: it is closed")
+        self.renderer = Renderer(adapter) if renderer is None else renderer
+        self._owned = renderer is None
+        self.frames: dict[str, Frames] = {}
+        self._shown: dict[object, dict[str, NDArray[Any]]] = {}
+
+    def close(self) -> None:
+        """Close the renderer, unless the caller passed it. May be called twice."""
+        if self._owned:
+            self.renderer.close()
+
+    def _begin(self, settings: Settings | None, *, is_photo: bool = False) -> None:
+        """Set A to the settings or to the source's default, and B to the same without bloom."""
+        is_default = settings is None
+        if settings is None:
+            of_image = "photo" if is_photo else "bevy_natural"
+            settings = presets[of_image if self._scene is None else "tutorial"]
+            if self._scene is not None and self._shading == "deferred":
+                settings = settings.replace(**_DEVELOPED)
+        begun = check_settings(settings)
+        self._default = begun if is_default else None
+        self.settings = {"a": begun, "b": begun.replace(bloom=False)}
+
+    def _named(self, file: str, expand: float | None) -> None:
+        """Keep the file of the source, and what its highlights were expanded up to."""
+        self._file, self._expand = file, expand
+        self._name = PurePath(file).name
+        self._note = f"highlights expanded up to {expand:g}" if expand is not None else ""
+
+    def _show_image(
+        self,
+        source: NDArray[Any],
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> None:
+        # Copies, since the caller may change the arrays while the page is open.
+        image = np.array(check_image(source), order="C")
+        given = {"image": image}
+        if emission is not None:
+            given["emission"] = np.array(check_emission(emission, image), order="C")
+        if mask is not None:
+            # With a channel axis, as `reduced` requires.
+            given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
+        self._glows = {name: "" for name in given if name != "image"}
+        self._scene, self._image = None, given
+        self._own_size = (image.shape[1], image.shape[0])
+        self._reduced = (self._own_size, self._image)
+
+    def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
+        """Return the answer to a message.
+
+        It has pictures, too; it is ``{"kind": "error", "error": ...}`` if the message is invalid.
+
+        - `message`: A mapping; see the table above.
+        - `files`: Contents of the files that belong to the message.
+        """
+        kinds = {
+            "setup": self._setup,
+            "frame": self._frame,
+            "probe": self._probe,
+            "open": lambda message: self._open(message, files),
+            "save": self._save,
+            "methods": self._methods,
+        }
+        kind = message.get("kind") if isinstance(message, Mapping) else None
+        if not isinstance(message, Mapping) or not isinstance(kind, str) or kind not in kinds:
+            return {"kind": "error", "error": f"message: {message!r:.80} is not understood"}, []
+        try:
+            body, buffers = kinds[kind](message)
+        except _FAILURES as error:
+            kind, body, buffers = "error", {"error": _described(error)}, []
+        return {"kind": kind, "view": message.get("view"), "id": message.get("id"), **body}, buffers
+
+    def _setup(self, message: Mapping[str, Any]) -> Answer:
+        self._files = CustomFiles()
+        return {
+            **controls(),
+            **self._source(),
+            "adapter": self.renderer.info.summary,
+            "has_files": bool(self._files),
+        }, []
+
+    def _methods(self, message: Mapping[str, Any]) -> Answer:
+        new, errors = self._files.changes()
+        return {
+            "methods": {name: described(kind) for name, kind in new.items()},
+            "errors": errors,
+        }, []
+
+    def _source(self) -> dict[str, Any]:
+        """Return a description of the source, and the initial settings."""
+        scene = self._scene
+        return {
+            "sides": {side: as_fields(current(one)) for side, one in self.settings.items()},
+            "name": self._name,
+            "note": self._note,
+            "animated": scene is not None,
+            "own_size": self._own_size,
+            "shadings": [] if scene is None else list(SHADINGS),
+            "shading": self._shading,
+            "glow": None if scene is None or scene.glow is None else scene.glow_intensity,
+            "glows": None if scene is not None else self._glows,
+        }
+
+    def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
+        """Replace the source by an image file, or its mask or its emission."""
+        name = PurePath(str(message.get("name", ""))).name
+        kind = message.get("as", "image")
+        if kind in _GLOWS:
+            self._open_glow(kind, name, files)
+            return {"as": kind, **self._source()}, []
+        image, is_photo = _read(name, files, expand=PHOTO_EXPANSION)
+        was_scene = self._scene is not None
+        self._show_image(image)
+        self._named(name, PHOTO_EXPANSION if is_photo else None)
+        self._shown.clear()
+        # With a scene's settings a photograph would be white.
+        if was_scene or self.settings["a"] == self._default:
+            self._begin(None, is_photo=is_photo)
+        return {"as": "image", **self._source()}, []
+
+    def _open_glow(self, kind: str, name: str, files: Sequence[bytes]) -> None:
+        """Give the image a mask or an emission, or take it away."""
+        if self._scene is not None:
+            raise ValueError(f"{kind}: the source is a scene; open an image first")
+        image = self._image["image"]
+        given = {one: array for one, array in self._image.items() if one != kind}
+        glows = {one: text for one, text in self._glows.items() if one != kind}
+        if files:
+            glows[kind] = name
+            given[kind] = (
+                check_emission(alike(_read(name, files)[0], image), image)
+                if kind == "emission"
+                else check_mask(_read(name, files, is_mask=True)[0], image.shape[:2])[
+                    ..., np.newaxis
+                ]
+            )
+        self._image, self._glows = given, glows
+        self._reduced = (self._own_size, given)
+
+    def _save(self, message: Mapping[str, Any]) -> Answer:
+        settings = settings_from(message.get("settings"))
+        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
+        frames, *_ = self._render(settings, self._own_size, message)
+        (name,) = frames
+        is_encoded = settings.encoding != "none"
+        picture = picture_of(frames[name], name, is_encoded=is_encoded, stops=stops)
+        return {"framebuffer": name}, [picture]
+
+    def _frame(self, message: Mapping[str, Any]) -> Answer:
+        asked = message.get("sides")
+        if not isinstance(asked, Mapping) or not set(asked) <= set(SIDES):
+            raise ValueError(f"sides: {asked!r:.80} are not settings of a or b")
+        size = message.get("size")
+        size = self._own_size if size is None else check_size("size", size)
+        size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
+        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
+        self._looked_at(message)
+        at = None if message.get("at") is None else _place(message["at"])
+        arrays = self._arrays_of(message.get("view"))
+        sides: dict[str, Any] = {}
+        buffers: list[bytes] = []
+        for side in SIDES:
+            if side not in asked:
+                continue
+            try:
+                settings = settings_from(asked[side])
+                frames, names, plan = self._render(settings, size, message)
+                (shown,) = frames
+                picture = picture_of(
+                    frames[shown],
+                    shown,
+                    is_encoded=settings.encoding != "none",
+                    stops=stops,
+                )
+            except _FAILURES as error:
+                # The other side is still shown.
+                sides[side] = {"error": _described(error)}
+                continue
+            self.settings[side], self.frames[side] = settings, frames
+            arrays[side] = frames[shown]
+            sides[side] = {
+                "framebuffer": shown,
+                "names": names,
+                "size": [frames[shown].shape[1], frames[shown].shape[0]],
+                "dtype": str(frames[shown].dtype),
+                "note": _note_of(settings, shown),
+                "code": code_with_image(settings, self._file, self._expand),
+                "plan": [one._asdict() for one in plan],
+                "passes": _finite(frames.timings),
+                "picture": len(buffers),
+            }
+            if at is not None:
+                sides[side]["probe"] = _probed(frames[shown], at)
+            buffers.append(picture)
+        return {"sides": sides}, buffers
+
+    def _probe(self, message: Mapping[str, Any]) -> Answer:
+        at = _place(message.get("at"))
+        arrays = self._arrays_of(message.get("view"))
+        return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
+
+    def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
+        """Return the time, shading and glow of a message; missing ones stay as they are."""
+        own = 1.0 if self._scene is None else self._scene.glow_intensity
+        time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
+        shading, glow = message.get("shading"), message.get("glow")
+        return (
+            time,
+            self._shading if shading is None else check_shading(shading),
+            own if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+        )
+
+    def _render(
+        self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
+    ) -> tuple[Frames, list[str], list[Pass]]:
+        """Return the named framebuffer, or `final`; the names of all; the planned passes."""
+        name = message.get("framebuffer", "final")
+        time, self._shading, glow = self._looked_at(message)
+        if self._scene is None:
+            given: dict[str, Any] = dict(self._image_of(size))
+            image = given.pop("image")
+            if "mask" in given:
+                # Rounding may move averages of 0..1 out of this range.
+                given["mask"] = given["mask"][..., 0].clip(0, 1)
+            names = list(self.renderer.plan(image, settings).framebuffers)
+            chosen = str(name) if name in names else "final"
+            frames = self.renderer.apply(image, settings, framebuffers=[chosen], **given)
+            source = image_source(image, **given)
+            return frames, names, self._passes(source, settings, chosen)
+        if glow != self._scene.glow_intensity:
+            self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
+        plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
+        names = list(plan.framebuffers)
+        chosen = str(name) if name in names else "final"
+        frames = self.renderer.render(
+            self._scene,
+            settings,
+            size,
+            shading=self._shading,
+            time=time,
+            framebuffers=[chosen],
+        )
+        source = scene_source(self._scene, size, self._shading, time)
+        return frames, names, self._passes(source, settings, chosen)
+
+    def _passes(self, source: _core.Source, settings: Settings, name: str) -> list[Pass]:
+        """Return the passes of a framebuffer; of an image with its mask and emission."""
+        plan = self.renderer._core.plan(source, settings, (name,))
+        return [Pass(*row[:-1]) for row in plan.passes]
+
+    def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+        """Return the image, and its mask and emission, at the size at which it is shown."""
+        if self._reduced[0] != size:
+            images = {name: reduced(array, size) for name, array in self._image.items()}
+            self._reduced = (size, images)
+        return self._reduced[1]
+
+    def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
+        """Return the dict of the framebuffers that a view shows, by side."""
+        arrays = self._shown.pop(str(view), {})
+        self._shown[str(view)] = arrays
+        while len(self._shown) > _VIEWS_KEPT:
+            del self._shown[next(iter(self._shown))]
+        return arrays
+
+
+def _read(
+    name: str, files: Sequence[bytes], *, is_mask: bool = False, expand: float | None = None
+) -> tuple[NDArray[Any], bool]:
+    """Return the image of a file's content, and whether it has integers; errors name the file."""
+    from vkbloom._io import image_reading  # noqa: PLC0415  needs OpenImageIO
+    from vkbloom._io.array_files import read  # noqa: PLC0415
+
+    if len(files) != 1:
+        raise ValueError("open: the message does not have the content of one file")
+    with tempfile.TemporaryDirectory() as folder:
+        # The file name may be anything. Only its extension is used, for the format.
+        path = Path(folder, f"image{PurePath(name).suffix[:8]}")
+        path.write_bytes(files[0])
+        try:
+            if is_mask:
+                picture = image_reading.decode(image_reading.load(path), "linear")
+                return grey_mask(picture.pixels, name), True
+            image, facts = read(path, expand=expand, metadata=True)
+            return image, facts["numbers"].startswith("uint")
+        except (OSError, ValueError) as error:
+            text = str(error).replace(str(path), name)
+            raise ValueError(text if name in text else f"{name}: {text}") from error
+
+
+def _note_of(settings: Settings, shown: str) -> str:
+    """Return what a page says of a framebuffer that is not what its name or its colours tell."""
+    if shown == "glow":
+        return settings.glow_note and f"glow is {settings.glow_note}"
+    if shown != "final" or settings.encoding not in ("pq", "hlg"):
+        return ""
+    return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"
+
+
+def _finite(timings: Mapping[str, float]) -> dict[str, float]:
+    """Return the times that are finite, which JSON requires."""
+    return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
+
+
+def _described(error: BaseException) -> str:
+    return str(error) or type(error).__name__
+
+
+def _place(at: object) -> tuple[float, float]:
+    if not (isinstance(at, list | tuple) and len(at) == 2):
+        raise TypeError(f"at: {at!r:.80} is not (x, y)")
+    for part in at:
+        check_number("at", part, 0, 1)
+    return float(at[0]), float(at[1])
+
+
+def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
+    height, width = array.shape[:2]
+    # A position of 1 is the far edge of the last pixel.
+    x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
+    return {"x": x, "y": y, "values": texts_of(array[y, x])}

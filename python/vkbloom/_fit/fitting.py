@@ -1,0 +1,482 @@
+"""Settings that give a picture."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, Final, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_image, check_index, import_extra
+from vkbloom._fit.descent import Descent, check_derivatives
+from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
+from vkbloom._fit.result import FitResult, loss_text
+from vkbloom._fit.search import CLOSE, ENOUGH, Search
+from vkbloom._fit.space import Bounds, Space, spaces_of, spaces_of_all
+from vkbloom._gradients import pullback_of
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.sources import Inputs, image_source
+from vkbloom._settings.registry import presets
+from vkbloom._settings.settings import Settings, check_settings
+
+__all__ = ["Maker", "fit"]
+
+#: A function of an image, such as `vkbloom.testing.command` makes of a program.
+Maker = Callable[[NDArray[Any]], NDArray[Any]]
+
+# Longer side of the image of the first search in pixels, and its share of the calls.
+_COARSE_SIDE: Final = 384
+_COARSE_CALLS: Final = 0.6
+# Share of the loss of an image without bloom that is close to a target.
+_FAINT: Final = 0.02
+
+
+@overload
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any] | Maker,
+    settings: Settings,
+    vary: str | Sequence[str],
+    *,
+    framebuffer: str = ...,
+    loss: Loss = ...,
+    bounds: Bounds | None = ...,
+    renderer: Renderer | None = ...,
+    max_calls: int = ...,
+    gradient: bool = ...,
+    progress: bool = ...,
+) -> FitResult: ...
+@overload
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any] | Maker,
+    settings: Sequence[Settings] | Literal["all"],
+    vary: str | Sequence[str],
+    *,
+    framebuffer: str = ...,
+    loss: Loss = ...,
+    bounds: Bounds | None = ...,
+    renderer: Renderer | None = ...,
+    max_calls: int = ...,
+    gradient: bool = ...,
+    progress: bool = ...,
+) -> list[FitResult]: ...
+@checked
+def fit(
+    image: NDArray[Any] | Image,
+    target: NDArray[Any] | Maker,
+    settings: Settings | Sequence[Settings] | Literal["all"],
+    vary: str | Sequence[str],
+    *,
+    framebuffer: str = "final",
+    loss: Loss = "relative",
+    bounds: Bounds | None = None,
+    renderer: Renderer | None = None,
+    max_calls: int = 1000,
+    gradient: bool = False,
+    progress: bool = False,
+) -> FitResult | list[FitResult]:
+    """Find the settings that make a given picture of an image.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
+        As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
+    target : ndarray, shape (H, W, 3) or (H, W, 4), or callable
+        The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
+        Alpha is not compared. With a target of 8 bits, such as a screenshot from `vkbloom.read`,
+        framebuffers are clipped and rounded as it is, and its saturated pixels are left out. Of a
+        callable, such as `vkbloom.testing.command` makes of a program, what it makes of the image,
+        which is then an array.
+    settings : Settings, sequence of Settings, or "all"
+        Where the search starts, and the fields that stay as they are. Of several, such as presets
+        of several engines, each is searched by itself. "all": every preset; of a preset those of
+        the varied fields vary that it has and that have an effect.
+    vary : str or sequence of str
+        The fields to find: numbers, integers, flags and choices.
+    framebuffer : str
+        The framebuffer to compare. ``final`` is the picture with its bloom, ``bloom`` the bloom
+        alone before `intensity`.
+    loss : {"relative", "l2", "log", "flip"} or callable
+        "relative": norm(a - b) / norm(b). "l2": the root mean square of a - b. "log": the same of
+        log10 of values from 1e-4 of the target's largest on, which weighs the faint parts of a
+        bloom like the bright ones. "flip": mean FLIP, as `compare` has it. Or a callable of
+        framebuffer and target, both (H, W, 3) of float64, that returns a number.
+    bounds : mapping of str to (float, float), optional
+        Narrower ranges of varied fields; of a choice, the values to try. Default: the ranges that
+        the settings declare; a threshold ends at the brightest value of the image, and a size of
+        buffers at the image's height.
+    renderer : Renderer, optional
+        Default: a new one.
+    max_calls : int
+        The most renders of a candidate.
+    gradient : bool
+        Whether to search by the derivatives of `vjp`: fewer renders for many fields, but
+        pullbacks take longer than renders. The varied fields must have a derivative and the loss
+        must be "relative", "l2" or "log".
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    FitResult or list of FitResult
+        Of "all" and of a sequence of settings a list, the smallest loss first.
+
+    Raises
+    ------
+    ValueError
+        A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
+        target has another size or is black; an argument is out of range; or, with `gradient`, a
+        field or the loss has no derivative, or the image is an `Image`.
+    TypeError
+        An argument has the wrong type.
+    ModuleNotFoundError
+        SciPy is missing: ``pip install vkbloom[fit]``.
+    OutOfMemoryError, DeviceLostError, ValidationError, Error
+        The device failed.
+
+    See Also
+    --------
+    translate : Settings of another method, without a picture.
+    fit_pyramid : The weights of a pyramid for a point-spread function.
+    grid : All combinations of some values.
+
+    Notes
+    -----
+    Images of more than 384 pixels are reduced first, by boxes. There, points that fill the space
+    are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
+    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Integers
+    and choices are changed one at a time, while the numbers follow. The result is refined at the
+    image's own size. With `gradient`, the derivatives of the least squares come from pullbacks,
+    which are no calls. If that ends far from the target, the search without derivatives follows.
+    Fields that put few passes out of date are changed first. The same arguments give the same
+    result.
+
+    A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
+    a product of two factors. Then the loss is small, and the parameters are some of those that
+    have it.
+
+    Examples
+    --------
+    >>> image = np.random.default_rng(0).random((48, 64, 3), np.float32) ** 8 * 10
+    >>> target = vkbloom.reference.apply(image, vkbloom.Pyramid(threshold=1.3, levels=3))["bloom"]
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     found = vkbloom.fit(
+    ...         image,
+    ...         target,
+    ...         vkbloom.Pyramid(threshold=0.5),
+    ...         ["threshold", "levels"],
+    ...         framebuffer="bloom",
+    ...         renderer=renderer,
+    ...     )
+    >>> round(found.settings.threshold, 2), found.settings.levels
+    (1.3, 3)
+    """
+    is_all = isinstance(settings, str) and settings == "all"
+    candidates = _candidates(settings)
+    names = _checked_names(vary)
+    check_index("max_calls", max_calls, 1, 10_000_000)
+    for name in bounds or {}:
+        if name not in names:
+            raise ValueError(f"bounds: {name!r} is not among the varied fields {', '.join(names)}")
+    if renderer is None and isinstance(image, Image):
+        raise ValueError("renderer: an uploaded image needs the renderer that has it")
+    pixels = None if isinstance(image, Image) else check_image(image)
+    if callable(target):
+        if pixels is None:
+            raise TypeError("image: a callable target needs an array, not an uploaded image")
+        target = target(pixels)
+    measure = Measure.of(check_image(target, "target"), loss_named(loss))
+    brightest = math.inf if pixels is None else float(light(pixels).max())
+    limits = (bounds or {}, brightest, len(measure.target))
+    varied = spaces_of_all if is_all else spaces_of
+    spaces = varied(candidates, names, *limits)
+    if gradient:
+        check_derivatives(spaces, measure.loss, pixels)
+    opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
+    with opened as used:
+        stages = _stages(used, image, pixels, measure)
+        # All of them before the first is searched: the most likely failures come at once.
+        priced = [_priced(used, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
+        found = []
+        for space, cost in priced:
+            if not space.axes:
+                continue
+            with _bar(progress, space.start.method, max_calls) as told:
+                one = _fitted(
+                    used,
+                    stages,
+                    space,
+                    cost,
+                    framebuffer,
+                    max_calls=max_calls,
+                    told=told,
+                    gradient=gradient,
+                )
+                found.append(one)
+    found.sort(key=lambda one: one.loss)
+    return found[0] if isinstance(settings, Settings) else found
+
+
+def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]:
+    """Return where the searches start."""
+    if isinstance(settings, str) and settings == "all":
+        return list(presets.values())
+    some: list[Any] = [settings] if isinstance(settings, Settings | str) else list(settings)
+    if not some:
+        raise ValueError("settings: there are none; give at least one")
+    return [check_settings(one) for one in some]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Stage:
+    """One size of the image, on the device, and its target."""
+
+    image: Image
+    pixels: NDArray[Any] | None
+    measure: Measure
+    factor: int
+
+
+def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
+    names = (vary,) if isinstance(vary, str) else tuple(vary)
+    if not names:
+        raise ValueError("vary: there are no fields; name at least one")
+    if len(set(names)) < len(names):
+        raise ValueError(f"vary: {', '.join(names)} has a field twice")
+    return names
+
+
+def _stages(
+    renderer: Renderer,
+    image: NDArray[Any] | Image,
+    pixels: NDArray[Any] | None,
+    measure: Measure,
+) -> list[_Stage]:
+    """Return the image at its own size, and before it a smaller one where it is large."""
+    handle = image if isinstance(image, Image) else renderer.upload(image)
+    target = measure.target
+    if handle.shape[:2] != target.shape[:2]:
+        raise ValueError(
+            f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
+            f"{handle.shape[1]} x {handle.shape[0]}"
+        )
+    stages = [_Stage(handle, pixels, measure, 1)]
+    factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
+    if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
+        small = reduced(pixels, factor)
+        stages.insert(0, _Stage(renderer.upload(small), small, measure.reduced(factor), factor))
+    return stages
+
+
+def _priced(
+    renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
+) -> tuple[Space, NDArray[np.int_]]:
+    """Return a space, and how many passes run after a change of each varied field alone.
+
+    `drop`: Whether to leave out fields without an effect; otherwise they are errors.
+    """
+    plan = renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
+    shape = plan.framebuffers[framebuffer][0]
+    if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
+        raise ValueError(
+            f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
+            f"not the size of the target; it can be bloom or final"
+        )
+    costs = np.array(
+        [_cost(stage.image, space, index, framebuffer) for index in range(len(space.axes))]
+    )
+    for axis, cost in zip(space.axes, costs, strict=True):
+        if not (cost or drop):
+            raise ValueError(
+                f"vary: {axis.name} has no effect on {framebuffer}"
+                + ("; give framebuffer='final'" if framebuffer != "final" else "")
+            )
+    kept = tuple(itertools.compress(space.axes, costs))
+    return dataclasses.replace(space, axes=kept), costs[costs > 0]
+
+
+def _cost(image: Image, space: Space, index: int, framebuffer: str) -> int:
+    """Return how many passes run after a change of one varied field."""
+    steps = []
+    # From several places: at one of them a field may be without effect.
+    for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
+        point = space.origin.copy()
+        point[index] = place
+        one = space.settings(point)
+        steps.append((image_source(image), _core.plan(image_source(image), one, (framebuffer,))))
+    return max(map(len, _core.dry_run(tuple(steps))[1:]))
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let BLAS compute in one thread.
+
+    Its other threads wait for work in a loop after each call. These are small here, and on a CPU
+    such threads take the cores from the device.
+    """
+    try:
+        import threadpoolctl  # noqa: PLC0415  an extra
+    except ModuleNotFoundError:  # only time is lost
+        yield
+        return
+    with threadpoolctl.threadpool_limits(1, user_api="blas"):
+        yield
+
+
+def _fitted(
+    renderer: Renderer,
+    stages: list[_Stage],
+    space: Space,
+    costs: NDArray[np.int_],
+    framebuffer: str,
+    *,
+    max_calls: int,
+    told: Callable[[float], None],
+    gradient: bool,
+) -> FitResult:
+    """Return what is found from one start."""
+    began = time.perf_counter()
+    history: list[float] = []
+    points = [space.origin]
+    searches = []
+    for number, stage in enumerate(stages):
+        is_last = number == len(stages) - 1
+
+        def render(settings: Settings, stage: _Stage = stage) -> NDArray[np.float64]:
+            frames = renderer.apply(
+                stage.image, _smaller(settings, stage.factor), framebuffers=[framebuffer]
+            )
+            return light(frames[framebuffer])
+
+        kind: Any = Search
+        if gradient:
+            kind = partial(Descent, partial(_derivatives, renderer, stage, framebuffer))
+        search = kind(
+            space,
+            stage.measure,
+            render,
+            max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
+            costs=costs,
+            told=told,
+            close=_close(stage, framebuffer),
+        )
+        with _one_thread():
+            if number:
+                search.refine(points)
+            else:
+                search.run(points)
+        history += search.history
+        points.append(search.best)
+        searches.append(search)
+    seconds = time.perf_counter() - began
+    return _result(
+        renderer, stages[-1], space, searches[-1], framebuffer, history=history, seconds=seconds
+    )
+
+
+def _result(
+    renderer: Renderer,
+    stage: _Stage,
+    space: Space,
+    last: Search,
+    framebuffer: str,
+    *,
+    history: list[float],
+    seconds: float,
+) -> FitResult:
+    """Return what a search found, judged at the image's own size."""
+    settings = space.settings(last.best)
+    measure = stage.measure
+    frames = renderer.apply(stage.image, settings)
+    plain = np.zeros_like(measure.target)
+    if framebuffer == "final":
+        bare = settings.replace(bloom=False, glare=())
+        plain = light(renderer.apply(stage.image, bare, framebuffers=["final"])["final"])
+    with _one_thread():
+        explained = measure.explained(last.loss, plain)
+    return FitResult(
+        settings=settings,
+        loss=last.loss,
+        start_loss=last.history[0],
+        calls=len(history),
+        history=np.array(history),
+        seconds=seconds,
+        framebuffer=framebuffer,
+        loss_name=loss_text(measure.loss),
+        vary=tuple(axis.name for axis in space.axes),
+        frames=frames,
+        target=measure.target,
+        residual=measure.compared(light(frames[framebuffer])) - measure.target,
+        plain=measure.compared(plain),
+        explained=explained,
+    )
+
+
+def _close(stage: _Stage, framebuffer: str) -> float:
+    """Return the loss below which a search only polishes, less for a faint bloom."""
+    if framebuffer != "final" or stage.pixels is None:
+        return CLOSE
+    with _one_thread():
+        return float(np.clip(_FAINT * stage.measure(light(stage.pixels)), ENOUGH, CLOSE))
+
+
+def _derivatives(
+    renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings
+) -> Callable[[NDArray[np.float64]], Any]:
+    """Return the function from a cotangent to the derivatives by each field."""
+    assert stage.pixels is not None
+    pullback = pullback_of(renderer, Inputs(stage.pixels), _smaller(settings, stage.factor))
+    # The shape of a framebuffer of four channels, such as "bloom", differs from the image's.
+    channels = stage.pixels.shape[2] if framebuffer == "final" else 4
+
+    def back(cotangent: NDArray[np.float64]) -> Any:
+        whole = np.zeros((*cotangent.shape[:2], channels))
+        whole[..., :3] = cotangent
+        found = pullback({framebuffer: whole})
+        if "blur_scale" in found:  # of `_smaller`
+            found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
+        return found
+
+    return back
+
+
+def _smaller(settings: Settings, factor: int) -> Settings:
+    """Return settings that blur a reduced image as far as a share of its size."""
+    if factor == 1:
+        return settings
+    changes: dict[str, Any] = {}
+    if hasattr(settings, "blur_scale"):
+        changes["blur_scale"] = settings.blur_scale / factor
+    if settings.bloom_size is not None:
+        changes["bloom_size"] = tuple(max(1, side // factor) for side in settings.bloom_size)
+    return settings.replace(**changes)
+
+
+@contextlib.contextmanager
+def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
+    """Give the function that is told each loss, and shows it where asked for."""
+    if not progress:
+        yield lambda loss: None
+        return
+    tqdm = import_extra("tqdm.auto", "cli", "A progress bar").tqdm
+    best = math.inf
+    with tqdm(total=total, desc=method, unit="call", leave=False) as bar:
+
+        def tell(loss: float) -> None:
+            nonlocal best
+            best = min(best, loss)
+            bar.set_postfix_str(f"loss {best:.3g}", refresh=False)
+            bar.update()
+
+        yield tell

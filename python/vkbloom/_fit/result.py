@@ -1,0 +1,236 @@
+"""What a fit found, and its report."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._fit.causes import is_found, likely_cause
+from vkbloom._fit.losses import Loss
+from vkbloom._renderer.frames import Frames
+from vkbloom._settings.settings import Settings
+from vkbloom._views import pictures
+
+__all__ = ["FitResult"]
+
+# The smallest shares of the loss without bloom that a good and a fair fit explain.
+_GOOD, _FAIR = 0.95, 0.8
+
+_WIDTH, _HEIGHT = 300, 180  # pixels of a diagram
+_COLOURS = ("#5b8def", "#d9822b")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FitResult:
+    """The settings that a fit found.
+
+    Attributes
+    ----------
+    settings : Settings
+    loss : float
+        Of these settings, at the size of the image.
+    start_loss : float
+        Of the settings that the search started from.
+    calls : int
+        Number of renders, at all sizes.
+    history : ndarray of float64, shape (calls,)
+        The loss of each; the first ones may be of a smaller image.
+    seconds : float
+        Time of the search.
+    framebuffer : str
+        Name of the framebuffer that was compared.
+    loss_name : str
+    vary : tuple of str
+        The varied fields.
+    frames : Frames
+        With these settings.
+    target : ndarray of float64, shape (H, W, 3)
+    residual : ndarray of float64, shape (H, W, 3)
+        The framebuffer less the target, in real units. With a target of 8 bits the framebuffer is
+        clipped to 0..1, and saturated pixels of the target are not compared: they are 0.
+    plain : ndarray of float64, shape (H, W, 3)
+        The picture without bloom, compared like the framebuffer; black if the framebuffer is not
+        ``final``.
+    explained : float
+        The share of the difference between target and `plain` that the bloom explains: 1 less the
+        ratio of `loss` to the loss of `plain`. At most 1, and 0 or less if it explains nothing.
+    verdict : {"good", "fair", "poor"}
+        Good: at least 0.95 are explained. Fair: 0.8. Poor: less, or no more than a change of each
+        pixel's colour explains, such as brightness or contrast.
+    cause : str
+        What the likely cause is if the verdict is not good: no bloom in the target; a target that
+        is clipped, encoded or turned; or another method.
+
+    See Also
+    --------
+    vkbloom.fit : Returns it.
+    vkbloom.translate, vkbloom.fit_pyramid : Return it, too.
+
+    Examples
+    --------
+    >>> image = np.zeros((16, 16, 3), np.float32)
+    >>> image[8, 8] = 9
+    >>> target = vkbloom.reference.apply(image, vkbloom.Separable(blur_scale=1.5))["bloom"]
+    >>> found = vkbloom.fit(
+    ...     image, target, vkbloom.Separable(), ["blur_scale"], framebuffer="bloom"
+    ... )
+    >>> round(found.settings.blur_scale, 2), len(found.history) == found.calls
+    (1.5, True)
+    >>> found.verdict
+    'good'
+    """
+
+    settings: Settings
+    loss: float
+    start_loss: float
+    calls: int
+    history: NDArray[np.float64]
+    seconds: float
+    framebuffer: str
+    loss_name: str
+    vary: tuple[str, ...]
+    frames: Frames
+    target: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    plain: NDArray[np.float64]
+    explained: float
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={_shown(getattr(self.settings, name))}" for name in self.vary)
+        return (
+            f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.3g} after "
+            f"{self.calls} calls; {self.verdict}>"
+        )
+
+    @cached_property
+    def verdict(self) -> Literal["good", "fair", "poor"]:
+        """Whether the search found the picture."""
+        if self.explained < _FAIR or not is_found(self.target, self.residual, self.plain):
+            return "poor"
+        return "good" if self.explained >= _GOOD else "fair"
+
+    @cached_property
+    def cause(self) -> str:
+        """The likely cause of a verdict that is not good; empty if it is good."""
+        if self.verdict == "good":
+            return ""
+        return likely_cause(self.target, self.residual, self.plain, self.settings.method, self.vary)
+
+    @property
+    def words(self) -> str:
+        """The verdict with its cause."""
+        return f"{self.verdict}: {self.cause}" if self.cause else self.verdict
+
+    def _repr_html_(self) -> str:
+        """Return a report: pictures, radial profile, and the loss over the calls."""
+        found = self.target + self.residual
+        peak = float(np.percentile(self.target.max(axis=2), 99.9)) or 1.0
+        largest = float(np.abs(self.residual).max()) or 1.0
+        shown = (
+            (self.framebuffer, found / peak, f"1 is {peak:.3g}"),
+            ("target", self.target / peak, f"1 is {peak:.3g}"),
+            ("difference", np.abs(self.residual) / largest, f"1 is {largest:.3g}"),
+        )
+        parts = [
+            '<div style="color:inherit;font-size:13px;max-width:68em">',
+            f"<div><b>{html.escape(repr(self)[1:-1])}</b>, from a loss ({self.loss_name}) of "
+            f"{self.start_loss:.3g}, in {self.seconds:.1f} s</div>",
+            f"<div>{html.escape(self.words)}</div>",
+            '<div style="display:flex;flex-wrap:wrap;gap:12px">',
+        ]
+        for name, values, note in shown:
+            height, width = values.shape[:2]
+            size = pictures.scaled(width, height, min(1.0, _WIDTH / max(width, height)))
+            data = base64.b64encode(
+                pictures.png(pictures.picture(values.astype(np.float32), size=size))
+            ).decode("ascii")
+            parts.append(
+                f'<figure style="margin:0"><img alt="{html.escape(name)}" '
+                f'src="data:image/png;base64,{data}" style="width:{_WIDTH}px;max-width:100%;'
+                f'image-rendering:pixelated"><figcaption><b>{html.escape(name)}</b> {note}'
+                "</figcaption></figure>"
+            )
+        radii, profiles = radial_profiles((found, self.target))
+        best = np.minimum.accumulate(self.history)
+        parts += [
+            diagram("radial profile", radii, profiles, (self.framebuffer, "target"), "pixels"),
+            diagram("loss", np.arange(1, len(best) + 1.0), [best], ("best so far",), "calls"),
+            '</div><code style="color:inherit;background:none;padding:0;white-space:pre-wrap">'
+            f"{html.escape(repr(self.settings))}</code></div>",
+        ]
+        return "".join(parts)
+
+
+def radial_profiles(
+    images: Sequence[NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return the mean of images in rings around the brightest pixel of the last one."""
+    planes = [image.mean(axis=2) for image in images]
+    height, width = planes[-1].shape
+    y, x = np.unravel_index(int(planes[-1].argmax()), planes[-1].shape)
+    distance = np.hypot(np.arange(width) - x, (np.arange(height) - y)[:, np.newaxis])
+    count = max(2, int(math.log(max(2.0, float(distance.max()))) / math.log(1.25)))
+    edges = np.concatenate([[0.0], 0.9 * 1.25 ** np.arange(count + 1)])
+    ring = np.searchsorted(edges, distance.ravel(), side="right") - 1
+    size = np.bincount(ring, minlength=len(edges))
+    lit = size > 0
+    middle = np.bincount(ring, distance.ravel(), len(edges))[lit] / size[lit]
+    sums = [np.bincount(ring, plane.ravel(), len(edges))[lit] / size[lit] for plane in planes]
+    return middle + 0.5, sums
+
+
+def diagram(
+    title: str,
+    x: NDArray[np.float64],
+    lines: Sequence[NDArray[np.float64]],
+    labels: Sequence[str],
+    unit: str,
+) -> str:
+    """Return curves on double logarithmic axes as SVG; values of 0 and less are left out."""
+    values = np.concatenate([line[line > 0] for line in lines])
+    if not values.size:
+        return ""
+    top = float(values.max())
+    bottom = max(float(values.min()), top * 1e-6)
+    span = math.log(top / bottom) or 1.0
+    across = math.log(float(x[-1] / x[0])) or 1.0
+    shapes = []
+    for number, line in enumerate(lines):
+        points = " ".join(
+            f"{_WIDTH * math.log(place / x[0]) / across:.1f},"
+            f"{_HEIGHT * (1 - math.log(max(value, bottom) / bottom) / span):.1f}"
+            for place, value in zip(x, line, strict=True)
+            if value > 0
+        )
+        shapes.append(
+            f'<polyline points="{points}" fill="none" stroke="{_COLOURS[number]}" '
+            f'stroke-width="{2 - number}"/>'
+        )
+    key = ", ".join(
+        f'<span style="color:{colour}">{html.escape(label)}</span>'
+        for colour, label in zip(_COLOURS, labels, strict=False)
+    )
+    return (
+        f'<figure style="margin:0"><svg width="{_WIDTH}" height="{_HEIGHT}" '
+        f'viewBox="-2 -2 {_WIDTH + 4} {_HEIGHT + 4}" role="img" aria-label="{title}">'
+        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="none" stroke="currentColor" '
+        f'stroke-opacity=".3"/>{"".join(shapes)}</svg><figcaption><b>{title}</b> {key}; '
+        f"{x[0]:.3g} to {x[-1]:.3g} {unit}, {bottom:.2g} to {top:.2g}</figcaption></figure>"
+    )
+
+
+def loss_text(loss: Loss) -> str:
+    """Return the name of a loss."""
+    return loss if isinstance(loss, str) else getattr(loss, "__name__", type(loss).__name__)
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else repr(value)

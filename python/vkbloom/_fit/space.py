@@ -1,0 +1,251 @@
+"""The varied fields of settings as coordinates from 0 to 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_number
+from vkbloom._settings.fields import FieldInfo, fields_of
+from vkbloom._settings.settings import Settings
+from vkbloom._suggestions import did_you_mean
+
+__all__ = ["Axis", "Bounds", "Point", "Space", "space_of", "spaces_of", "spaces_of_all"]
+
+#: Coordinates, 0 to 1, one for each axis.
+Point = NDArray[np.float64]
+
+#: Bounds by field: (low, high) of a number, the values of a choice.
+Bounds = Mapping[str, Sequence[Any]]
+
+# A range this many times as wide as its scale is searched on a logarithmic scale.
+_WIDE: Final = 4.0
+# Of at most this many integers, all are tried.
+_FEW: Final = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """One varied field.
+
+    - `low`, `high`: Of a number.
+    - `scale`: A number x is at log(1 + (x - low) / scale), so that steps are relative to x above
+      the scale; None: at x.
+    - `choices`: Of a choice or a flag.
+    """
+
+    name: str
+    kind: Literal["number", "integer", "choice"]
+    low: float = 0.0
+    high: float = 1.0
+    scale: float | None = None
+    choices: tuple[Any, ...] = ()
+
+    def value(self, coordinate: float) -> Any:
+        """Return the field's value at a coordinate."""
+        if self.kind == "choice":
+            return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
+        number = self.low + self._unwarped(min(max(coordinate, 0.0), 1.0) * self._length)
+        number = min(max(number, self.low), self.high)
+        return round(number) if self.kind == "integer" else number
+
+    def slope(self, coordinate: float) -> float:
+        """Return the derivative of a number's value by its coordinate."""
+        place = min(max(coordinate, 0.0), 1.0) * self._length
+        return self._length * (1.0 if self.scale is None else self.scale * math.exp(place))
+
+    def coordinate(self, value: Any) -> float:
+        """Return the coordinate of a value, the nearest where it is out of bounds."""
+        if self.kind == "choice":
+            return (self.choices.index(value) + 0.5) / len(self.choices)
+        if self._length == 0:
+            return 0.0
+        number = min(max(float(value), self.low), self.high)
+        return self._warped(number - self.low) / self._length
+
+    def others(self, value: Any) -> list[Any]:
+        """Return what to try in place of an integer or a choice: all of a few, else near ones."""
+        if self.kind == "choice":
+            return [choice for choice in self.choices if choice != value]
+        low, high = round(self.low), round(self.high)
+        if high - low <= _FEW:
+            return [number for number in range(low, high + 1) if number != value]
+        steps = [sign * 2**power for power in range(0, _FEW, 2) for sign in (1, -1)]
+        return [value + step for step in steps if low <= value + step <= high]
+
+    @property
+    def _length(self) -> float:
+        return self._warped(self.high - self.low)
+
+    def _warped(self, distance: float) -> float:
+        return distance if self.scale is None else math.log1p(distance / self.scale)
+
+    def _unwarped(self, place: float) -> float:
+        return place if self.scale is None else self.scale * math.expm1(place)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Space:
+    """The varied fields of one candidate.
+
+    `start`: Its other fields stay as they are.
+    """
+
+    start: Settings
+    axes: tuple[Axis, ...]
+
+    @property
+    def origin(self) -> Point:
+        """The coordinates of the start."""
+        return np.array([axis.coordinate(_begun(self.start, axis.name)) for axis in self.axes])
+
+    @property
+    def is_number(self) -> NDArray[np.bool_]:
+        """Which axes are continuous."""
+        return np.array([axis.kind == "number" for axis in self.axes], np.bool_)
+
+    def settings(self, point: Point) -> Settings:
+        """Return the settings at some coordinates."""
+        values = {
+            axis.name: axis.value(float(place))
+            for axis, place in zip(self.axes, point, strict=True)
+        }
+        return self.start.replace(**values)
+
+
+def spaces_of(
+    candidates: Sequence[Settings],
+    names: Sequence[str],
+    bounds: Bounds,
+    brightest: float,
+    height: int,
+) -> list[Space]:
+    """Return the space of each candidate, which has all of the varied fields."""
+    return [space_of(one, names, bounds, brightest, height) for one in candidates]
+
+
+def spaces_of_all(
+    candidates: Sequence[Settings],
+    names: Sequence[str],
+    bounds: Bounds,
+    brightest: float,
+    height: int,
+) -> list[Space]:
+    """Return the space of each candidate that has some of the varied fields."""
+    spaces, refused = [], None
+    for one in candidates:
+        axes: list[Axis] = []
+        for name in names:
+            try:
+                axes += space_of(one, [name], bounds, brightest, height).axes
+            except ValueError as error:
+                refused = error
+        if axes:
+            spaces.append(Space(start=one, axes=tuple(axes)))
+    if not spaces and refused is not None:
+        raise refused
+    return spaces
+
+
+def space_of(
+    settings: Settings, vary: Sequence[str], bounds: Bounds, brightest: float, height: int
+) -> Space:
+    """Return the space of the varied fields of some settings.
+
+    `height`: Of the image in pixels. Buffers with more rows take long, and add nothing.
+    """
+    fields = fields_of(type(settings))
+    axes = []
+    for name in vary:
+        if name not in fields:
+            known = ", ".join(one for one in fields if varied_as(fields[one]))
+            raise ValueError(
+                f"vary: the method {settings.method} has no field {name!r}"
+                f"{did_you_mean(name, fields) or ';'} it can vary {known}"
+            )
+        kind = varied_as(fields[name])
+        if kind is None:
+            raise ValueError(
+                f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
+                "vkbloom.fit_pyramid"
+            )
+        if kind == "choice":
+            axes.append(_choice(settings, fields[name], bounds))
+        else:
+            axes.append(_number(settings, fields[name], kind, bounds, (brightest, height)))
+    space = Space(start=settings, axes=tuple(axes))
+    try:
+        for end in (0.0, 1.0):
+            for index in range(len(axes)):
+                point = space.origin
+                point[index] = end
+                space.settings(point)
+    except ValueError as error:
+        raise ValueError(f"vary: {error}") from None
+    return space
+
+
+def _begun(settings: Settings, name: str) -> Any:
+    """Return the value that the search starts from: no threshold is one of 0."""
+    value = getattr(settings, name)
+    return 0.0 if value is None and name == "threshold" else value
+
+
+def varied_as(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
+    """Return how a field varies; None if it cannot."""
+    match info.kind:
+        case "flag":
+            return "choice"
+        case "choice":
+            return None if info.optional else "choice"
+        case "number" | "integer":
+            return info.kind if info.is_bounded else None
+        case _:
+            return None
+
+
+def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> Axis:
+    name = info.name
+    declared = info.choices or (False, True)
+    choices = tuple(bounds.get(name, declared))
+    if unknown := [choice for choice in choices if choice not in declared]:
+        raise ValueError(
+            f"bounds: {name}: {unknown[0]!r} is not one of {', '.join(map(str, declared))}"
+        )
+    if getattr(settings, name) not in choices:
+        choices = (getattr(settings, name), *choices)
+    return Axis(name=name, kind="choice", choices=choices)
+
+
+def _number(
+    settings: Settings,
+    info: FieldInfo,
+    kind: Literal["number", "integer"],
+    bounds: Bounds,
+    limits: tuple[float, int],
+) -> Axis:
+    name = info.name
+    low, high = info.range or (0.0, 1.0)
+    if name in bounds:
+        given = bounds[name]
+        if isinstance(given, str) or len(given) != 2:
+            raise TypeError(f"bounds: {name}: {given!r} is not a pair (low, high)")
+        low, high = (check_number(f"bounds: {name}", end, low, high) for end in given)
+        if not low < high:
+            raise ValueError(f"bounds: {name}: {low:g} is not less than {high:g}")
+    elif name == "threshold":
+        high = min(high, max(limits[0], 1e-3))
+    elif info.unit == "pixel":
+        high = min(high, max(limits[1], low + 1))
+    value = _begun(settings, name)
+    if value is None:
+        raise ValueError(f"vary: {name}: None is not a number; set a number to start from")
+    default = info.default if isinstance(info.default, int | float) else 0.0
+    usual = max(abs(float(default)), abs(float(value))) or 1.0
+    is_wide = low >= 0 and high - low > _WIDE * usual
+    return Axis(name=name, kind=kind, low=low, high=high, scale=usual if is_wide else None)

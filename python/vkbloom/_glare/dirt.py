@@ -1,0 +1,118 @@
+"""Dirt on the lens."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._array_cache import kept
+from vkbloom._checks import check_number
+from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._settings.fields import value_field
+from vkbloom._settings.glare import Glare, stage_field
+
+DirtMode = Literal["multiply", "lerp"]
+
+
+def _read_image(image: Any) -> Any:
+    # Imported here, since settings are used without point-spread functions, too.
+    from vkbloom.psf._sampled import check_values  # noqa: PLC0415
+
+    return check_values("image", image)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Dirt(Glare):
+    """A picture of dirt on the lens, which multiplies bloom and glare.
+
+    Parameters
+    ----------
+    image : array-like, shape (H, W) or (H, W, 3), or None
+        The dirt D: linear and finite values, which are copied to float32 and enlarged bilinearly to
+        the frame. None: a picture of 480 x 270 pixels, made from `seed`.
+    seed : int
+        Seed of the picture that is made, 0 to 65535.
+    strength : float
+        The s of the formulas, 0 to 16; with the mode "lerp" 0 to 1.
+    mode : {"multiply", "lerp"}
+        The light L becomes L D s, or L (1 + s (D - 1)).
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Settings : Takes at most one Dirt in `glare`.
+
+    Notes
+    -----
+    Source: "multiply" from google/filament, colorGrading.mat @ 263d042924de; "lerp" from
+    godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
+
+    Examples
+    --------
+    >>> image = np.ones((4, 4, 3), np.float32)
+    >>> dirt = vkbloom.Dirt(image=[[0.5, 1]], mode="lerp", strength=0.5)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     final = renderer.apply(image, vkbloom.Pyramid(glare=(dirt,)))["final"]
+    >>> final[0, :, 0]
+    array([1.75  , 1.8125, 1.9375, 2.    ], dtype=float32)
+    """
+
+    stage: ClassVar[str] = "dirt"
+
+    image: Any = value_field(None, optional=True, read=_read_image)
+    seed: int = stage_field("seed", slider=(0, 100))
+    strength: float = stage_field("strength", slider=(0, 1))
+    mode: DirtMode = "multiply"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.mode == "lerp":
+            check_number("strength", self.strength, 0, 1)
+
+    @property
+    def lerp(self) -> int:
+        """Whether the mode is "lerp", for the core."""
+        return int(self.mode == "lerp")
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """The picture, shape (H, W) or (H, W, 3)."""
+        return _made_dirt(self.seed) if self.image is None else self.image.array
+
+    def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
+        """Return the picture as the core reads a kernel."""
+        return _core_dirt(self.replace_look())
+
+    def replace_look(self) -> Dirt:
+        """Return the dirt with defaults in the fields that do not change its picture."""
+        return Dirt(image=self.image, seed=self.seed)
+
+
+@kept
+def _core_dirt(dirt: Dirt) -> CoreKernel:
+    return core_kernel(dirt.pixels)
+
+
+@kept
+def _made_dirt(seed: int) -> NDArray[np.float32]:
+    """Return soft discs and specks of 0 to 1, (270, 480)."""
+    random = np.random.default_rng(seed)
+    y, x = np.indices((270, 480), np.float32)
+    picture = np.full(x.shape, 0.1, np.float32)
+    for radius, light in ((20.0, 0.25), (8.0, 0.4), (2.5, 0.6)):
+        for _ in range(40):
+            size = radius * random.uniform(0.5, 1.5)
+            distance = np.hypot(x - random.uniform(0, 480), y - random.uniform(0, 270)) / size
+            picture += light * random.random() * np.clip(4 * (1 - distance), 0, 1)
+    made: NDArray[np.float32] = np.minimum(picture, 1).astype(np.float32)
+    made.flags.writeable = False
+    return made

@@ -1,0 +1,157 @@
+"""Reflections in a lens: ghosts and the halo."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom import _core
+from vkbloom._checks import check_floats, check_number
+from vkbloom._settings.glare import GlareLight, stage_field
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Ghosts(GlareLight):
+    """Reflections in a lens: copies of what glows, mirrored and scaled about the centre.
+
+    Parameters
+    ----------
+    scales : sequence of float
+        Up to 16 scales s_k, -16 to 16. A negative scale mirrors the copy. A copy has 1 / abs(s_k)
+        times the size of the picture.
+    tints : sequence of (float, float, float)
+        Factors of red, green and blue for each ghost, or one tint for all ghosts.
+    maximum : float
+        Limit of each channel that a ghost reads, after the threshold, 0 to 65504.
+    falloff : float
+        Exponent of the attenuation towards the border of a copy, 0 to 64. 0: no attenuation.
+    radius : float
+        Distance from the copy's centre at which the attenuation ends in 0, as a share of the
+        picture's sides, 0.001 to 4.
+    vignette : float
+        Attenuation of the ghosts in the middle of the picture, 0 to 1.
+    aberration : float
+        Distance by which red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
+    **glare
+        The fields of `GlareLight`.
+
+    See Also
+    --------
+    Halo : A ring around the centre.
+
+    Notes
+    -----
+    With the position p of a pixel, 0 to 1 along both sides, and the glow c,
+
+        q_k = 1/2 + s_k (p - 1/2)
+        ghosts(p) = v(p) sum over k of tint_k w(q_k) min(max(c(q_k) - threshold, 0), maximum)
+
+    with w(q) = max(0, 1 - abs(q - 1/2) / radius)^falloff, and with (x, y) = 2 p - 1,
+    v(p) = 1 + vignette (min((x^2 + y^2)^2, 1) - 1). Red is read at q + a and blue at q - a, where a
+    points towards the centre and has the length `aberration`.
+
+    Source: Chapman, "Pseudo Lens Flare", 2013. The weights are those of three.js
+    (LensflareNode.js), Blender and Unity (LensFlareScreenSpaceCommon.hlsl), the aberration is
+    Filament's (flare.mat).
+
+    Examples
+    --------
+    >>> image = np.zeros((9, 9, 3), np.float32)
+    >>> image[4, 7] = 1
+    >>> ghosts = vkbloom.Ghosts(scales=(-1,), tints=((1, 0.5, 0),), falloff=0, halvings=0)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(glare=(ghosts,)))
+    >>> frames["ghosts"][4, 1]
+    array([1. , 0.5, 0. , 1. ], dtype=float32)
+    """
+
+    stage: ClassVar[str] = "ghosts"
+
+    scales: tuple[float, ...] = (-0.5, -1.0, -2.0, 3.0, 1.5)
+    tints: tuple[tuple[float, float, float], ...] = ((1.0, 1.0, 1.0),)
+    maximum: float = stage_field("maximum", slider=(0, 100))
+    falloff: float = stage_field("falloff", default=2.0, slider=(0, 32))
+    radius: float = stage_field("radius", default=0.75, slider=(0.001, 1.5))
+    vignette: float = stage_field("vignette")
+    aberration: float = stage_field("aberration", slider=(0, 0.05))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        scales = check_floats("scales", self.scales)
+        if not 1 <= len(scales) <= _core.MAX_GHOSTS:
+            raise ValueError(
+                f"scales: {len(scales)} scales are out of range, 1 to {_core.MAX_GHOSTS}"
+            )
+        for scale in scales:
+            check_number("scales", scale, -16, 16)
+        try:
+            tints = tuple(check_floats("tints", tuple(tint)) for tint in self.tints)
+        except TypeError:
+            raise TypeError(f"tints: {self.tints!r} is not a sequence of (r, g, b)") from None
+        if len(tints) not in (1, len(scales)) or any(len(tint) != 3 for tint in tints):
+            raise ValueError(
+                f"tints: {self.tints!r} is not one (r, g, b) or {len(scales)} of them, one for "
+                "each scale"
+            )
+        for tint in tints:
+            for factor in tint:
+                check_number("tints", factor, 0, 65504)
+        object.__setattr__(self, "scales", scales)
+        object.__setattr__(self, "tints", tints)
+
+    @property
+    def ghosts(self) -> tuple[tuple[float, tuple[float, float, float]], ...]:
+        """The scale and the tint of each ghost."""
+        tints = self.tints if len(self.tints) > 1 else self.tints * len(self.scales)
+        return tuple(zip(self.scales, tints, strict=True))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Halo(GlareLight):
+    """A ring around the centre of the picture, made from the glow near the centre.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the ring in heights of the picture, 0.001 to 4.
+    width : float
+        Distance from the middle of the ring to its ends in heights of the picture, 0.001 to 4.
+    maximum : float
+        Limit of each channel that the halo reads, after the threshold, 0 to 65504.
+    aberration : float
+        Distance by which red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
+    **glare
+        The fields of `GlareLight`.
+
+    See Also
+    --------
+    Ghosts : Mirrored and scaled copies of the picture.
+
+    Notes
+    -----
+    With the position p of a pixel, its distance d from the centre in heights of the picture, and
+    the direction u from p to the centre, halo(p) is
+
+        (1 - smoothstep(0, 1, abs(d - radius) / width)) c'(p + radius u)
+
+    with c' = min(max(c - threshold, 0), maximum). Red and blue are moved as in `Ghosts`.
+
+    Source: google/filament, flare.mat @ 523a261b1052.
+
+    Examples
+    --------
+    >>> image = np.zeros((33, 33, 3), np.float32)
+    >>> image[16, 16] = 1
+    >>> halo = vkbloom.Halo(radius=0.25, width=0.1, halvings=0)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     light = renderer.apply(image, vkbloom.Pyramid(glare=(halo,)))["halo"][16, :, 0]
+    >>> np.flatnonzero(light > 0.4)
+    array([ 8, 24])
+    """
+
+    stage: ClassVar[str] = "halo"
+
+    radius: float = stage_field("radius", default=0.4, slider=(0.001, 1.5))
+    width: float = stage_field("width", slider=(0.001, 1))
+    maximum: float = stage_field("maximum", slider=(0, 100))
+    aberration: float = stage_field("aberration", slider=(0, 0.05))

@@ -1,0 +1,404 @@
+"""The operators of PyTorch that `vkbloom.torch` calls, with what they are registered with.
+
+An operator takes settings as text and renderers by number. A text that was made from settings, or a
+number, is a constant of code that `torch.compile` made.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, cast
+
+import numpy as np
+
+from vkbloom._checks import check_mask, import_extra
+from vkbloom._gradients.pulling import pull_each, pullback_of
+from vkbloom._renderer.device_arrays import DeviceArray, merged, take
+from vkbloom._renderer.renderer import RENDERERS, Renderer
+from vkbloom._renderer.sources import Inputs, checked_inputs
+from vkbloom._settings.fields import Record, fields_of
+from vkbloom._settings.settings import Settings
+from vkbloom.psf._values import ARRAYS, ArrayValue
+from vkbloom.reference import apply as reference_apply
+from vkbloom.reference import vjp as reference_vjp
+from vkbloom.reference._derivatives import check_cotangents
+
+torch: Any = import_extra("torch", "torch", "vkbloom.torch")
+
+__all__ = ["number_of", "refuse_capture", "replaced", "text_of"]
+
+
+@functools.lru_cache(64)
+def _text(settings: Settings) -> str:
+    return settings.to_json()
+
+
+def text_of(settings: Settings) -> str:
+    """Return settings as the text that an operator can take."""
+    return _constant(_parts(settings)) if torch.compiler.is_compiling() else _text(settings)
+
+
+# Dynamo calls this while it compiles. It guards on the values of the argument.
+@torch.compiler.assume_constant_result  # type: ignore[untyped-decorator]
+def _constant(parts: Any) -> str:
+    settings: Settings = _whole(parts)
+    return settings.to_json()
+
+
+@torch.compiler.assume_constant_result  # type: ignore[untyped-decorator]
+def _names(kind: type[Record]) -> tuple[str, ...]:
+    return tuple(fields_of(kind))
+
+
+def _parts(value: Any) -> Any:
+    """Return settings or a value of theirs as tuples of constants, which Dynamo follows.
+
+    It would take the object that settings were copied from for the copy.
+    """
+    if isinstance(value, Record):
+        values = [_parts(getattr(value, name)) for name in _names(type(value))]
+        return (Record, type(value), *values)
+    if isinstance(value, tuple):
+        return (tuple, *[_parts(part) for part in value])
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        # Dynamo computes with other numbers as unknown ones, but not with the text of one.
+        return (float, type(value), float(value).hex())
+    return (ArrayValue, value.name) if isinstance(value, ArrayValue) else value
+
+
+def _whole(parts: Any) -> Any:
+    """Return the value of such tuples."""
+    if not isinstance(parts, tuple):
+        return parts
+    kind, *rest = parts
+    if kind is tuple:
+        return tuple(map(_whole, rest))
+    if kind is float:
+        return rest[0](float.fromhex(rest[1]))
+    if kind is ArrayValue:
+        return ARRAYS[rest[0]]
+    names = fields_of(rest[0])
+    return rest[0](**dict(zip(names, map(_whole, rest[1:]), strict=True)))
+
+
+@functools.lru_cache(64)
+def _settings(text: str) -> Settings:
+    return Settings.from_json(text)
+
+
+@functools.lru_cache(64)
+def _in_floats(text: str) -> Settings:
+    """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
+    return _settings(text).replace(format="rgba32float")
+
+
+def replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
+    """Return settings with the values of tensors."""
+    return settings.replace(
+        **{name: _field_value(value.detach().cpu().tolist()) for name, value in values.items()}
+    )
+
+
+def _field_value(value: Any) -> Any:
+    return tuple(map(_field_value, value)) if isinstance(value, list) else value
+
+
+#: The number that stands for this module's own renderer. Those of others begin at 1.
+_OWN: Final = 0
+_opening = threading.Lock()
+
+
+@functools.cache
+def _own_renderer() -> Renderer:
+    return Renderer()
+
+
+@functools.cache
+def _renderer_on(index: int) -> Renderer:
+    """Return this module's renderer on the GPU with PyTorch's number."""
+    return Renderer(f"uuid:{torch.cuda.get_device_properties(index).uuid}")
+
+
+def _forget_own() -> None:
+    """Let a forked process, such as a worker of a DataLoader, open renderers of its own."""
+    global _opening  # noqa: PLW0603  another thread of the parent may have held it
+    _opening = threading.Lock()
+    _own_renderer.cache_clear()
+    _renderer_on.cache_clear()
+
+
+os.register_at_fork(after_in_child=_forget_own)
+
+
+def _renderer(number: int, image: Any = None) -> Renderer:
+    """Return the renderer with that number; for tensors of CUDA, this module's is on their GPU."""
+    if number == _OWN:
+        with _opening:
+            return _own_renderer() if image is None else _renderer_on(image.device.index)
+    renderer = RENDERERS.get(number)
+    if renderer is None:
+        raise ValueError("renderer: it was collected; keep a reference to it until the last call")
+    return renderer
+
+
+def number_of(renderer: Renderer | None) -> int:
+    """Return the number of a renderer that the operator takes; None: of this module's own.
+
+    (Dynamo reads and guards an attribute in each version of PyTorch.)
+    """
+    return _OWN if renderer is None else renderer._number
+
+
+def _each(  # noqa: PLR0917
+    image: Any, mask: Any, emission: Any, values: Sequence[Any], names: str, text: str
+) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
+    """Yield the index, the arrays and the settings of each image of a batch."""
+    given = {"image": image, "mask": mask, "emission": emission}
+    arrays = {
+        name: part.detach().cpu().contiguous().numpy()
+        for name, part in given.items()
+        if part is not None
+    }
+    settings = replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
+    for index in np.ndindex(tuple(image.shape[:-3])):
+        yield index, {name: part[index] for name, part in arrays.items()}, settings
+
+
+def _split(names: str) -> list[str]:
+    return names.split(",") if names else []
+
+
+def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
+    """Return the derivatives: of the reference for float64, else of the renderer."""
+    if arrays["image"].dtype == np.float64:
+        return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
+    pullback = pullback_of(_renderer(renderer), checked_inputs(**arrays), settings)
+    return pullback(check_cotangents({"final": cotangent}, {"final": cotangent}))
+
+
+def _pulled_on_device(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    settings: Settings,
+    number: int,
+) -> Iterator[Any]:
+    """Yield the derivatives of each image, with those by images as tensors of the GPU."""
+    renderer = _renderer(number, image)
+    core = renderer._core
+    masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
+    images, emissions, cotangents = (
+        None if one is None else take(_batch(one), name, core, (4,))
+        for name, one in (("image", image), ("emission", emission), ("cotangent", cotangent))
+    )
+    assert images
+    assert cotangents
+    sequence = (
+        (
+            Inputs(
+                images.at(index),
+                emissions.at(index) if emissions else None,
+                None if masks is None else check_mask(masks[index], masks.shape[1:]),
+            ),
+            {"final": cotangents.at(index)},
+        )
+        for index in range(images.shape[0])
+    )
+    yield from pull_each(renderer, settings, sequence, "cuda")
+
+
+def _batch(tensor: Any) -> Any:
+    return tensor.detach().reshape(-1, *tensor.shape[-3:])
+
+
+def _operator(name: str, parameters: str, result: str) -> Any:
+    """Declare an operator, whose types PyTorch cannot read from annotations of `Any`."""
+    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor[] values, "
+    schema += f"str names, str settings, int renderer) -> {result}"
+    return torch.library.custom_op(name, mutates_args=(), schema=schema, **_TAGS)
+
+
+#: What `torch.compile` must not put into a graph of CUDA. (PyTorch has the tag since 2.8.)
+_TAGS: Final[dict[str, Any]] = (
+    {"tags": (torch.Tag.cudagraph_unsafe,)} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
+)
+
+
+def refuse_capture(image: Any) -> None:
+    """Raise RuntimeError in a capture, whose graph would leave out what Vulkan does."""
+    if image.is_cuda and torch.cuda.is_current_stream_capturing():
+        raise RuntimeError(
+            "vkbloom::bloom: a CUDA graph cannot hold it, since Vulkan computes it; capture the "
+            "parts of the step before and after it"
+        )
+
+
+@_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]
+def _bloom(  # noqa: PLR0917
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    settings: str,
+    renderer: int,
+) -> Any:
+    refuse_capture(image)
+    if image.is_cuda and image.dtype != torch.float64:
+        return _on_device(image, mask, emission, values, names, settings, renderer)
+    final = np.empty(image.shape, _dtype(image))
+    for index, arrays, one in _each(image, mask, emission, values, names, settings):
+        given = dict(arrays)
+        pixels = given.pop("image")
+        if pixels.dtype == np.float64:
+            final[index] = reference_apply(pixels, one, **given)["final"]
+        else:
+            frames = _renderer(renderer).apply(
+                pixels, one.replace(format="rgba32float"), framebuffers="final", **given
+            )
+            final[index] = frames["final"]
+    return torch.from_numpy(final).to(image.device)
+
+
+def _on_device(  # noqa: PLR0917
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    text: str,
+    number: int,
+) -> Any:
+    """Run the operator without the host; a batch without masks changes the context once."""
+    settings = _in_floats(text)
+    if names:
+        settings = replaced(settings, dict(zip(_split(names), values, strict=True)))
+    renderer = _renderer(number, image)
+    images = _batch(image)
+    if mask is None and emission is None and len(images) > 1:
+        frames = renderer.map(images, settings, framebuffers="final")
+    else:
+        masks, emissions = (
+            [None] * len(images) if one is None else one.detach().reshape(-1, *one.shape[-sides:])
+            for one, sides in ((mask, 2), (emission, 3))
+        )
+        frames = (
+            renderer.apply(
+                one, settings, mask=masks[i], emission=emissions[i], framebuffers="final"
+            )
+            for i, one in enumerate(images)
+        )
+    # The images of a batch are in the same memory.
+    batches = merged([cast("DeviceArray", one["final"]) for one in frames])
+    return _joined([torch.from_dlpack(one) for one in batches], image, torch.cat)
+
+
+def _dtype(tensor: Any) -> Any:
+    return torch.empty(0, dtype=tensor.dtype).numpy().dtype
+
+
+@_bloom.register_fake  # type: ignore[untyped-decorator]
+def _(  # noqa: PLR0917
+    image: Any, mask: Any, emission: Any, values: Any, names: str, settings: str, renderer: int
+) -> Any:
+    return torch.empty(image.shape, dtype=image.dtype, device=image.device)
+
+
+@_operator("vkbloom::bloom_backward", "Tensor cotangent, ", "Tensor[]")  # type: ignore[untyped-decorator]
+def _backward(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Sequence[Any],
+    names: str,
+    settings: str,
+    renderer: int,
+) -> list[Any]:
+    """Return the derivatives by the image, those of mask and emission that are there, and values.
+
+    Of a batch, the derivatives by values are added.
+    """
+    refuse_capture(image)
+    inputs = {"image": image, "mask": mask, "emission": emission}
+    images = {name: part for name, part in inputs.items() if part is not None}
+    fields = dict(zip(_split(names), values, strict=True))
+    found: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
+    # An empty batch has nothing to take to the device.
+    on_device = image.is_cuda and image.dtype != torch.float64 and image.numel() > 0
+    if on_device:
+        one = replaced(_settings(settings), fields)
+        pulled = _pulled_on_device(cotangent, image, mask, emission, one, renderer)
+    else:
+        wanted = cotangent.detach().cpu().numpy()
+        pulled = (
+            _pulled(arrays, one, renderer, wanted[index])
+            for index, arrays, one in _each(image, mask, emission, values, names, settings)
+        )
+    for gradients in pulled:
+        for name, parts in found.items():
+            parts.append(_as_tensor(gradients[name]))
+    return [
+        *(_joined(found[name], part) for name, part in images.items()),
+        *(sum(found[name], torch.zeros(part.shape)).to(part) for name, part in fields.items()),
+    ]
+
+
+def _as_tensor(part: Any) -> Any:
+    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact."""
+    if isinstance(part, DeviceArray):
+        return torch.from_dlpack(part)
+    return torch.from_numpy(np.array(part, np.float64))
+
+
+def _joined(parts: list[Any], like: Any, join: Any = None) -> Any:
+    """Return images, or with `join` batches, as a tensor of the kind of another one."""
+    if not parts:
+        return like.new_zeros(like.shape)
+    joined = parts[0] if len(parts) == 1 else (join or torch.stack)(parts)
+    return joined.reshape(like.shape).to(like).contiguous()
+
+
+@_backward.register_fake  # type: ignore[untyped-decorator]
+def _(  # noqa: PLR0917
+    cotangent: Any,
+    image: Any,
+    mask: Any,
+    emission: Any,
+    values: Any,
+    names: str,
+    settings: str,
+    renderer: int,
+) -> Any:
+    parts = [part for part in (image, mask, emission, *values) if part is not None]
+    return [torch.empty(part.shape, dtype=part.dtype, device=part.device) for part in parts]
+
+
+def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+    image, mask, emission, values, *ctx.texts = inputs
+    # Held until the backward pass, also if the caller lets it go before.
+    ctx.renderer = RENDERERS.get(ctx.texts[-1])
+    ctx.given = [part is not None for part in (image, mask, emission)]
+    ctx.save_for_backward(*(part for part in (image, mask, emission) if part is not None), *values)
+
+
+def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
+    saved = iter(ctx.saved_tensors)
+    inputs = [next(saved) if given else None for given in ctx.given]
+    found = iter(torch.ops.vkbloom.bloom_backward(cotangent, *inputs, [*saved], *ctx.texts))
+    return *(next(found) if given else None for given in ctx.given), [*found], None, None, None
+
+
+def _refuse(ctx: Any, *cotangents: Any) -> Any:
+    raise RuntimeError(
+        "vkbloom::bloom: its second derivative is not implemented; the first is exact, so compute "
+        "without create_graph=True"
+    )
+
+
+_bloom.register_autograd(_back, setup_context=_keep)
+_backward.register_autograd(_refuse)

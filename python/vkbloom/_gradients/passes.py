@@ -1,0 +1,227 @@
+"""Derivatives by adjoint passes on the device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._renderer import requests
+from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.sources import Inputs
+from vkbloom.reference._derivatives import Gradients, differentiable
+
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["DeviceGradients", "Passes", "Running", "check_finite", "device_fields", "on_device"]
+
+#: The most framebuffers with cotangents that a source can bring.
+_MOST: Final = 7
+#: The fields whose derivatives are the channels of a sum.
+_SUMS: Final = {
+    "by_composite": ("intensity", "exposure", "reference_white"),
+    "by_threshold": ("threshold", "knee"),
+}
+#: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
+_LEAST: Final = 0.3
+#: Curves that magnify the rounding of a float.
+_STEEP: Final = {"aces", "agx", "pq", "hlg"}
+
+
+def check_finite(cotangents: Mapping[str, NDArray[Any] | ImportedArray]) -> None:
+    """Raise ValueError if a cotangent on the device is not finite; those of the host are."""
+    for name, part in cotangents.items():
+        if isinstance(part, ImportedArray) and not np.isfinite(part.numpy()).all():
+            raise ValueError(f"cotangents: {name!r} has NaN or infinity")
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """Adjoint passes that were submitted; without a submission there is nothing to run."""
+
+    passes: Passes
+    plan: _core.Plan
+    arrays: tuple[NDArray[Any] | _core.Exported, ...]
+    place: Destination
+    submission: _core.Submission | None
+
+    def named(self) -> dict[str, NDArray[Any]]:
+        """Wait, and return the framebuffers."""
+        counts = self.submission.wait()[1] if self.submission else (1, 0)
+        # The device counts what is not finite in all inputs together.
+        if any(counts):
+            check_finite(self.passes.cotangents)
+        return requests.named(self.plan, self.arrays, self.place)
+
+    def images(self) -> dict[str, NDArray[Any]]:
+        """Wait, and return the derivatives by image, mask and emission."""
+        found = self.named()
+        return {
+            name: found[f"by_{name}"] if f"by_{name}" in found else self._zeros(part.shape)
+            for name, part in self.passes.inputs.named().items()
+        }
+
+    def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        core = self.passes.renderer._core
+        return cast("NDArray[Any]", placed(np.zeros(shape, np.float32), self.place, core))
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """The adjoint passes of an image with settings and cotangents.
+
+    - `cotangents`: Checked, by framebuffer; those on the device but for NaN and infinity.
+    - `place`: Where the derivatives by images go.
+    """
+
+    renderer: Renderer
+    inputs: Inputs
+    settings: Settings
+    cotangents: Mapping[str, NDArray[Any] | ImportedArray]
+    place: Destination = "host"
+
+    def submit(self, *, sums: bool = False) -> Running | None:
+        """Submit the passes of the derivatives by images, or the sums of those by fields.
+
+        None: a pass has no adjoint, or the renderer is closed.
+        """
+        core = self.renderer._core
+        levels = tuple(map(_level, self.cotangents.values()))
+        if core.closed or not 0 < len(levels) <= _MOST:
+            return None
+        if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
+            return None
+        source = self.inputs.source(levels)
+        plan = core.adjoint(source, self.settings, tuple(self.cotangents), sums)
+        if plan is None:
+            return None
+        place: Destination = "host" if sums else self.place
+        arrays = requests.new_arrays(core, plan, place)
+        submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
+        return Running(self, plan, arrays, place, submission)
+
+    def fields(self) -> dict[str, NDArray[np.float32]]:
+        """Return the derivatives by fields that are exact to single floats."""
+        wanted = device_fields(self.settings)
+        running = self.submit(sums=True) if wanted else None
+        found = running.named() if running else {}
+        results: dict[str, NDArray[np.float32]] = {}
+        for kind, names in _SUMS.items():
+            if kind not in found:
+                continue
+            sums, squares = (found[key][0, 0] for key in (kind, f"{kind}_squares"))
+            for name, total, square in zip(names, sums, squares, strict=False):
+                if name in wanted and abs(total) >= _LEAST * np.sqrt(square):
+                    results[name] = np.asarray(total)
+        return results
+
+
+def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
+    if isinstance(cotangent, ImportedArray):
+        return cotangent
+    return np.ascontiguousarray(cotangent, np.float32)
+
+
+def on_device(renderer: Renderer, settings: Settings) -> bool:
+    """Return whether the device has passes for the derivative of "final" by an image with alpha."""
+    pixels = np.zeros((32, 40, 4), np.float32)
+    floats = settings.replace(format="rgba32float")
+    return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
+
+
+def device_fields(settings: Settings) -> frozenset[str]:
+    """Return the fields by which the device has the derivatives.
+
+    These are what only the composite and the threshold pass read. Published methods have
+    thresholds of their own, and some read the intensity or the exposure before the composite. With
+    glare, the intensity is that of the sum before the composite.
+    """
+    if settings.published or {settings.tonemap, settings.encoding} & _STEEP:
+        return frozenset()
+    known = frozenset(name for names in _SUMS.values() for name in names)
+    return (known - {"intensity"} if settings.glare else known) & frozenset(
+        differentiable(settings)
+    )
+
+
+class DeviceGradients(Gradients):
+    """Derivatives of the device; others are computed when the first of them is read.
+
+    - `found`: Those by images.
+    - `names`: All names, in the order of the reference.
+    - `fields`: Returns those by some of the fields.
+    - `every`: Returns all, from the reference.
+    """
+
+    def __init__(
+        self,
+        found: Mapping[str, NDArray[Any]],
+        names: Iterable[str],
+        fields: Callable[[], Mapping[str, NDArray[Any]]],
+        every: Callable[[], Mapping[str, NDArray[Any]]],
+    ) -> None:
+        super().__init__(found)
+        self._names = tuple(names)
+        self._more = [fields, every]
+
+    def _complete(self) -> None:
+        """Take what is missing: of the device, then of the reference, as `__missing__` does."""
+        while self._more:
+            found = self._more.pop(0)()
+            known = {**found, **dict(super().items())}
+            super().clear()
+            super().update((name, known[name]) for name in self._names if name in known)
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        if name not in self._names:
+            raise ValueError(
+                f"gradients: {name!r} has no derivative; available: {', '.join(self._names)}"
+            )
+        if len(self._more) > 1:
+            super().update(self._more.pop(0)())
+            return self[name]
+        self._complete()
+        return self[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __repr__(self) -> str:
+        self._complete()
+        return super().__repr__()
+
+    def __eq__(self, other: object) -> bool:
+        self._complete()
+        return super().__eq__(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return a derivative, or the default where there is none."""
+        return self[name] if name in self._names else default
+
+    def keys(self) -> Any:
+        """Return the names."""
+        return dict.fromkeys(self._names).keys()
+
+    def values(self) -> Any:
+        """Return all derivatives."""
+        self._complete()
+        return super().values()
+
+    def items(self) -> Any:
+        """Return all names and derivatives."""
+        self._complete()
+        return super().items()

@@ -1,0 +1,225 @@
+"""The framebuffers of an image, and the function that takes cotangents back."""
+
+from __future__ import annotations
+
+import functools
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite
+from vkbloom._methods.separable import Separable
+from vkbloom._renderer.default import default_renderer
+from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, place_of, placed, take
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.requests import IMAGES_AHEAD
+from vkbloom._renderer.sources import Inputs, checked_inputs, image_source, uploaded_inputs
+from vkbloom._settings.settings import Settings, check_settings
+from vkbloom.reference import vjp as reference_vjp
+from vkbloom.reference._derivatives import Gradients, check_cotangents, check_shape, differentiable
+
+if TYPE_CHECKING:
+    from vkbloom._renderer.device_arrays import Destination, Device
+
+__all__ = ["Pullback", "pull_each", "pullback_of", "vjp"]
+
+#: From cotangents by framebuffer to derivatives by name.
+Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
+#: Cotangents as `Passes` has them.
+Checked = Mapping[str, NDArray[Any] | ImportedArray]
+
+
+@checked
+def vjp(
+    image: NDArray[Any] | Image,
+    settings: Settings | str | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+    device: Device | None = None,
+    renderer: Renderer | None = None,
+) -> tuple[Frames, Pullback]:
+    """Add bloom to an image, and return a function for the derivatives of a sum over it.
+
+    Parameters
+    ----------
+    image, settings, mask, emission
+        As for `vkbloom.apply`. The bloom buffers are "rgba32float", whatever `format` says.
+    device : {"host", "device"}, optional
+        As for `apply`. The derivatives by image, mask and emission go where the framebuffers
+        go.
+    renderer : Renderer, optional
+        Default: `default_renderer`.
+
+    Returns
+    -------
+    frames : Frames
+        As of `apply`.
+    pullback : callable
+        ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. They may be on
+        the GPU, as an image. With S the sum over all of them of (framebuffer . cotangent), it
+        returns the derivatives of S as float32: by "image", "mask" (H, W) and "emission" if
+        they were given, by "kernel" (of `Convolution`), and by each real field under its name,
+        such as "intensity" or "glare.0.intensity". Those by fields and kernel are arrays of
+        NumPy. Those of a uint8 image are by value / 255. At NaN and infinity of the image they
+        are 0.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As for `apply`; the image is an `Image`; or the method was loaded from a file of passes,
+        which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
+        has another shape or dtype, or is not finite. Its result raises ValueError for names
+        that have no derivative, such as "levels".
+    OutOfMemoryError, DeviceLostError, ValidationError, Error
+        The device failed.
+
+    See Also
+    --------
+    vkbloom.reference.vjp : The same in NumPy, with the subgradients at kinks.
+    fit : Finds settings by derivatives with ``gradient=True``.
+
+    Examples
+    --------
+    >>> image = np.full((4, 4, 3), 0.5, np.float32)
+    >>> frames, pullback = vkbloom.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+    >>> gradients = pullback({"final": np.ones_like(image)})
+    >>> float(gradients["intensity"])  # the sum of the bloom
+    24.0
+    >>> float(gradients["image"].sum()) / image.size  # the image and half of the bloom
+    1.5
+    """
+    settings = check_settings(settings, of_image=True)
+    renderer = renderer or default_renderer()
+    renderer._pending.wait()
+    if hasattr(settings, "twin"):
+        raise ValueError(
+            f"method: {settings.method!r} has no derivative, since its passes come from a file"
+        )
+    core = renderer._core
+    uploaded: Image
+    if isinstance(image, Image):
+        image_source(image, mask, emission)
+        # A pass without bloom copies the pixels.
+        alone = Separable(bloom=False)
+        inputs = uploaded_inputs(
+            image,
+            lambda: renderer.apply(image, alone, framebuffers="final", device="host")["final"],
+        )
+        uploaded = image
+    else:
+        inputs = checked_inputs(image, mask, emission, core).kept()
+        source = inputs.source()
+        shape, dtype = source.kind
+        uploaded = Image(source, shape, np.dtype(dtype))
+    floats = settings.replace(format="rgba32float")
+    frames = renderer.apply(uploaded, floats, device=device)
+    place = place_of(next(iter(frames.values())))
+    pulled = pullback_of(renderer, inputs, settings, place)
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        return pulled(_checked(cotangents, frames, core))
+
+    return frames, pullback
+
+
+def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
+    """Check cotangents, and copy those that are on the renderer's device.
+
+    Whether these are finite is known when the passes have run.
+    """
+    if not isinstance(cotangents, Mapping):
+        return check_cotangents(cotangents, frames)
+    found: dict[str, NDArray[Any] | ImportedArray] = {}
+    for name, given in cotangents.items():
+        part = take(given, f"cotangents[{name!r}]", core) if on_cuda(given) else given
+        if isinstance(part, ImportedArray) and part.dtype != "uint8":
+            check_shape(name, part.shape, frames)
+            found[name] = part
+        else:
+            # Levels of bytes would be read as shares of 255.
+            part = part.numpy() if isinstance(part, ImportedArray) else part
+            found |= check_cotangents({name: part}, frames)
+    return found
+
+
+def pullback_of(
+    renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination = "host"
+) -> Callable[[Checked], Gradients]:
+    """Return the pullback alone, of arrays that do not change, and checked cotangents.
+
+    `place`: Where the derivatives by images go.
+    """
+    start = _starter(renderer, inputs, settings, place)
+    return lambda cotangents: start(cotangents)()
+
+
+def pull_each(
+    renderer: Renderer,
+    settings: Settings,
+    sequence: Iterable[tuple[Inputs, Checked]],
+    place: Destination = "host",
+) -> Iterator[Gradients]:
+    """Yield the derivatives of each image. The device works on later ones meanwhile."""
+    started: deque[Callable[[], Gradients]] = deque()
+    for inputs, cotangents in sequence:
+        started.append(_starter(renderer, inputs, settings, place)(cotangents))
+        if len(started) == IMAGES_AHEAD:
+            yield started.popleft()()
+    while started:
+        yield started.popleft()()
+
+
+def _starter(
+    renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination
+) -> Callable[[Checked], Callable[[], Gradients]]:
+    """Return a function that submits passes, and returns one that waits for the derivatives."""
+    floats = settings.replace(format="rgba32float")
+    recorded = functools.cache(lambda: _recorded(inputs, settings))
+    names = (*inputs.named(), *differentiable(settings))
+    if settings.bloom and callable(getattr(settings, "kernel", None)):
+        names += ("kernel",)
+
+    def by_reference(cotangents: Checked) -> Gradients:
+        check_finite(cotangents)
+        found = recorded()({name: _on_host(part) for name, part in cotangents.items()})
+        return Gradients((name, part.astype(np.float32)) for name, part in found.items())
+
+    def start(cotangents: Checked) -> Callable[[], Gradients]:
+        passes = Passes(renderer, inputs, floats, cotangents, place)
+        running = passes.submit()
+
+        def end() -> Gradients:
+            if running is None:
+                return _placed(by_reference(cotangents), inputs, place, renderer)
+            return DeviceGradients(
+                running.images(), names, passes.fields, lambda: by_reference(cotangents)
+            )
+
+        return end
+
+    return start
+
+
+def _recorded(inputs: Inputs, settings: Settings) -> Any:
+    """Return the pullback of the reference."""
+    return reference_vjp(settings=settings, **inputs.on_host())[1]
+
+
+def _on_host(part: NDArray[Any] | ImportedArray) -> NDArray[Any]:
+    return part.numpy() if isinstance(part, ImportedArray) else part
+
+
+def _placed(found: Gradients, inputs: Inputs, place: Destination, renderer: Renderer) -> Gradients:
+    """Move the derivatives by images to where those of the device would be."""
+    core = renderer._core
+    if not core.closed:
+        for name in inputs.named():
+            found[name] = cast("NDArray[Any]", placed(found[name], place, core))
+    return found

@@ -1,0 +1,174 @@
+"""The axes of a grid: a settings field, time or images, with their values and attributes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_time
+from vkbloom._settings.fields import fields_of, plain_value
+from vkbloom._settings.registry import presets
+from vkbloom._settings.settings import Settings, check_settings, field_info
+from vkbloom._suggestions import did_you_mean
+
+__all__ = ["WHOLE", "Axis", "image_axis", "read_axes"]
+
+Kind = Literal["settings", "time", "image", "preset"]
+
+#: Axes whose values are settings of any methods, on which the other axes' fields are changed.
+WHOLE: Final = ("preset", "settings")
+
+_TIME_DESCRIPTION = "Time of the animation; its period is 1"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a grid: a settings field, "time", "image", "preset" or "settings".
+
+    - `values`: As the settings store them; labels of images, names of presets.
+    - `kind`: The axis "settings" has the kind "preset": its values are settings of any methods.
+    - `unit`: "1" for a number without a unit.
+    """
+
+    name: str
+    values: tuple[Any, ...]
+    kind: Kind
+    unit: str
+    description: str
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the coordinate."""
+        described = {"long_name": self.name, "units": self.unit, "description": self.description}
+        if self.name == "preset":
+            # The settings of these names at the time of rendering.
+            found = {name: presets[name].to_dict() for name in self.values}
+            described["settings"] = json.dumps(found)
+        return {name: text for name, text in described.items() if text}
+
+    @property
+    def coordinate(self) -> NDArray[Any]:
+        """The values as an array of numbers, bools or text.
+
+        None is NaN among numbers and "none" among text. All others (sizes, weights, stages,
+        point-spread functions, settings) are JSON text, such as "[256, 256]".
+        """
+        present = [value for value in self.values if value is not None]
+        if present and all(isinstance(value, bool) for value in self.values):
+            return np.array(self.values, np.bool_)
+        if present and all(isinstance(value, int | float) for value in present):
+            return np.array([math.nan if v is None else v for v in self.values])
+        return np.array([_text(value) for value in self.values])
+
+    def find(self, value: Any) -> int:
+        """Return the index of a value on the axis."""
+        known = tuple(value) if isinstance(value, list) else value
+        if known not in self.values:
+            held = ", ".join(map(_text, self.values[:8])) + ", ..." * (len(self.values) > 8)
+            raise ValueError(f"{self.name}: {value!r} is not a value of the axis; it has {held}")
+        return self.values.index(known)
+
+    def label(self, place: int) -> str:
+        """Return a value as a short text."""
+        value = self.values[place]
+        return f"{value:.4g}" if isinstance(value, float) else _text(value)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "none"
+    return value if isinstance(value, str) else json.dumps(plain_value(value))
+
+
+def _whole_axis(name: str, values: object) -> Axis:
+    """Check an axis of presets or of settings."""
+    listed = _sequence(name, values)
+    if name == "preset":
+        for one in listed:
+            try:
+                presets[one]
+            except KeyError as error:
+                raise ValueError(f"axes: preset: {error.args[0]}") from None
+            except TypeError:
+                raise TypeError(f"axes: preset: {one!r} is not a name") from None
+        return Axis(name, tuple(listed), "preset", "", "The name of the settings")
+    for one in listed:
+        if not isinstance(one, Settings):
+            raise TypeError(f"axes: settings: {one!r} is not Settings")
+    return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
+
+
+def _sequence(name: str, values: object) -> list[Any]:
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+        raise TypeError(f"axes: {name}: {values!r} is not a sequence of values")
+    listed = list(values)
+    if not listed:
+        raise ValueError(f"axes: {name} has no values; give at least one")
+    return listed
+
+
+def read_axes(
+    settings: Settings | None, axes: Mapping[str, Any], *, has_time: bool
+) -> tuple[Axis, ...]:
+    """Check the requested axes."""
+    if not isinstance(axes, Mapping):
+        raise TypeError(f"axes: {axes!r} is not a mapping of field names to values")
+    for name in axes:
+        if not isinstance(name, str):
+            raise TypeError(f"axes: {name!r} is not the name of a field")
+    whole = {name: _whole_axis(name, axes[name]) for name in WHOLE if name in axes}
+    if len(whole) > 1:
+        raise ValueError("axes: preset and settings exclude each other; give one of them")
+    if whole and settings is not None:
+        raise ValueError(
+            f"settings: the axis {next(iter(whole))} sets all settings; leave the argument out, "
+            "and vary fields by further axes"
+        )
+    bases = [one for axis in whole.values() for one in settings_of(axis)] or [
+        check_settings(settings, of_image=not has_time)
+    ]
+    found: list[Axis] = []
+    for name, values in axes.items():
+        if name in whole:
+            found.append(whole[name])
+            continue
+        if name == "time" and has_time:
+            times = tuple(check_time(value) for value in _sequence(name, values))
+            found.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
+            continue
+        for base in bases:
+            fields = fields_of(type(base))
+            if name not in fields and not name.startswith("glare."):
+                near = did_you_mean(name, [*fields, *WHOLE, "time"])
+                raise ValueError(
+                    f"axes: {name!r} is not a field of the method {base.method}"
+                    f"{' or time' if has_time else ''}{near or ':'} {', '.join(fields)}"
+                )
+        # `replace` checks each value and converts it to the type that the settings store.
+        listed = _sequence(name, values)
+        own = [
+            tuple(base.replace(**{name: value}).value_of(name) for value in listed)
+            for base in bases
+        ]
+        info = field_info(bases[0], name)
+        found.append(Axis(name, own[0], "settings", info.unit, info.help))
+    return tuple(found)
+
+
+def settings_of(axis: Axis) -> tuple[Settings, ...]:
+    """Return the settings at each value of an axis of presets or settings."""
+    return tuple(presets[one] if axis.name == "preset" else one for one in axis.values)
+
+
+def image_axis(labels: tuple[Any, ...]) -> Axis:
+    """Return the axis of a list of images."""
+    return Axis("image", labels, "image", "", "The image that bloom is added to")

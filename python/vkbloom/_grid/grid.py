@@ -1,0 +1,286 @@
+"""Render every combination of values of some settings: `grid`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import import_extra
+from vkbloom._grid.identity import chunk_in
+from vkbloom._grid.keys import Keys, open_keys
+from vkbloom._grid.layout import Grid, Layout, ask
+from vkbloom._grid.memory import chunk_of, in_memory
+from vkbloom._grid.order import Index
+from vkbloom._grid.parts import read_part
+from vkbloom._grid.rendering import Workers, render_grid
+from vkbloom._grid.sources import ImageSource
+from vkbloom._grid.store import IDENTITY, METADATA, GridStore, read_json, stored_identity
+from vkbloom._renderer.default import default_renderer
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.settings import Settings, Shading
+
+if TYPE_CHECKING:
+    import xarray
+    from distributed import Client
+
+    from vkbloom._scene import Scene
+
+__all__ = ["check_chunks", "grid"]
+
+
+@checked
+def grid(
+    source: Scene
+    | NDArray[Any]
+    | Image
+    | Sequence[NDArray[Any] | Image]
+    | Mapping[str, NDArray[Any] | Image],
+    settings: Settings | str | None = None,
+    axes: Mapping[str, Iterable[Any]] | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+    size: tuple[int, int] | None = None,
+    shading: Shading = "forward",
+    time: float = 0.0,
+    framebuffers: Literal["all"] | str | Sequence[str] = ("final",),
+    reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
+    store: Any = None,
+    chunks: Mapping[str, int] | None = None,
+    part: tuple[int, int] | str | None = None,
+    resume: bool = True,
+    verify: bool = True,
+    on_mended: Callable[[str], object] | None = None,
+    client: Client | None = None,
+    adapter: str | None = None,
+    validation: bool = False,
+    progress: bool | None = None,
+    renderer: Renderer | None = None,
+) -> xarray.Dataset:
+    """Render every combination of values of some settings, in memory or into a Zarr store.
+
+    Parameters
+    ----------
+    source : Scene, image, or list or mapping of images
+        Several images add the dimension "image" before all others, with a mapping's keys as
+        labels. They must have the same shape and dtype. Uploaded images belong to one renderer:
+        they have no store that a cluster fills.
+    settings : Settings or str, optional
+        The settings that the axes change, or the name of a preset. Default:
+        ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
+    axes : mapping of str to sequence
+        Values by settings field, or by "time" for a scene. The axis "preset" has names of
+        `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of these
+        two axes and the argument `settings` can be given. All other axes change the settings of
+        these axes, too.
+    mask, emission : ndarray, optional
+        Of all images, as for `apply`.
+    size : (int, int), optional
+        Width and height of a scene's frames. Default: (1280, 720).
+    shading, time
+        Of a scene, as for `render`.
+    framebuffers : "all" or sequence of str
+        The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
+        uint8 at all points, or a float type at all points. Floats are stored in the largest of
+        their dtypes.
+    reduce : mapping of str to callable, optional
+        Figures to keep, by name. Each callable gets the `Frames` of a point and returns a number
+        or a small array. `vkbloom.reductions` has several. With ``framebuffers=()`` only they are
+        kept. A callable gets the framebuffers that its attribute ``framebuffers`` names, or all
+        if it has no such attribute.
+    store : str, path-like or zarr.abc.store.Store, optional
+        Where to write the grid instead: a folder ``name.zarr``, a URL that fsspec supports, or a
+        store. With a `client`, all its workers must be able to write to it. It can be opened with
+        ``xarray.open_zarr`` while it is written; its variable ``done`` tells which points are
+        complete. If the process is killed, the same call renders only the missing points.
+    chunks : mapping of str to int, optional
+        Grid points per chunk of the store by axis; 1 for an axis that is not named. Default: chunks
+        of about 1 MiB, at most 1024 points, along the axes that vary fastest.
+    part : (int, int) or str, optional
+        Render only part i of n of a store, from 1. Part 0 is part n. Each part is a run of chunks,
+        about 1/n of the points. Processes may render parts at the same time, in any order and
+        repeatedly; `check_grid` names missing parts. Text is "3/16"; "auto/16" takes i, and "auto"
+        also n, from the environment of a job array, such as SLURM_ARRAY_TASK_ID. The default of
+        `chunks` has at least n chunks; name `chunks` for the same bytes as without parts.
+    resume : bool
+        Whether to continue an existing store. False: raise FileExistsError.
+    verify : bool
+        Whether to read the existing points of a store first and render damaged ones again. False:
+        trust the marks in ``done``.
+    on_mended : callable, optional
+        Called with a line of text for each damaged or missing key of a store that was replaced.
+    client : distributed.Client, optional
+        The workers of its cluster render a store and write it. Default: this process does.
+    adapter, validation
+        Arguments of the renderers that the workers open, or that this process opens for the grid.
+    progress : bool, optional
+        True: a progress bar in a terminal or a notebook, but not elsewhere. None: the same if tqdm
+        is installed. False: no progress bar.
+    renderer : Renderer, optional
+        Default: `default_renderer`.
+
+    Returns
+    -------
+    xarray.Dataset
+        One dimension for each axis, in the given order, then "y", "x" and "channel"; one variable
+        for each framebuffer and each reduction. The attributes have the remaining settings (as
+        JSON), the adapter, the driver, the version, the number of passes that ran ("passes_run"),
+        and how many more would run if each point were rendered alone ("passes_saved"). A store is
+        opened lazily.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; a framebuffer has different shapes along an axis, or is missing
+        at a point; or the store contains another grid (the message lists the differences) or other
+        data. This is checked before anything is rendered or written.
+    MemoryError
+        The result does not fit into the free memory. Nothing was rendered.
+    TypeError
+        An argument has the wrong type.
+    FileExistsError
+        The store exists and `resume` is False.
+    OSError
+        Writing failed, for example because the disk is full. Completed points are kept.
+    ModuleNotFoundError
+        xarray is missing, or zarr and dask for a store.
+    OutOfMemoryError, DeviceLostError, ValidationError, Error
+        The device failed.
+
+    See Also
+    --------
+    check_grid : Reads a store, and names missing and damaged data.
+    contact_sheet, response_curves : Pictures and plots of the result.
+
+    Notes
+    -----
+    Points are rendered in the order that runs the fewest passes; the order of the axes does not
+    matter. The bytes of a store depend on its grid, its chunks and the adapter, not on workers,
+    parts or interruptions.
+
+    Examples
+    --------
+    >>> image = np.zeros((32, 48, 3), np.float32)
+    >>> image[16, 24] = 50
+    >>> grid = vkbloom.grid(image, axes={"preset": ["kino", "filament"], "intensity": [0.5, 1.0]})
+    >>> dict(grid.sizes)
+    {'preset': 2, 'intensity': 2, 'y': 32, 'x': 48, 'channel': 3}
+    >>> grid["final"].sel(preset="kino", intensity=0.5).shape
+    (32, 48, 3)
+    """
+    import_extra("xarray", "grid", "grid")
+    given = {"chunks": chunks, "part": part, "client": client, "on_mended": on_mended}
+    for name, value in given.items():
+        if store is None and value is not None:
+            raise ValueError(f"{name}: a grid in memory has none; give store, too")
+    if renderer is not None and (client is not None or adapter is not None):
+        raise ValueError("renderer: the grid is rendered by those of client or adapter; give one")
+    keys = None if store is None else _keys(store, client)
+    asked = ask(
+        source,
+        settings,
+        axes,
+        mask=mask,
+        emission=emission,
+        size=size,
+        shading=shading,
+        time=time,
+        framebuffers=framebuffers,
+        reduce=reduce,
+    )
+    with ExitStack() as stack:
+        by: Renderer | Workers
+        if client is not None:
+            by = Workers(client, adapter or "auto", validation)
+        elif adapter is not None or validation:
+            by = stack.enter_context(opened_renderer(adapter or "auto", validation))
+        else:
+            by = renderer or default_renderer()
+        if keys is None and isinstance(by, Renderer):
+            return in_memory(asked, by, progress)
+        options = _Stored(keys, chunks, read_part(part), resume, verify, on_mended)
+        return _stored(asked, options, by, progress)
+
+
+class _Stored(NamedTuple):
+    """How a grid is stored."""
+
+    keys: Any
+    chunks: Mapping[str, int] | None
+    part: tuple[int, int]
+    resume: bool
+    verify: bool
+    on_mended: Callable[[str], object] | None
+
+
+def _keys(store: Any, client: Client | None) -> Keys:
+    import_extra("zarr", "grid", "grid with a store")
+    import_extra("dask.array", "grid", "grid with a store")
+    keys = open_keys(store)
+    if client is not None and not keys.is_shared:
+        raise ValueError("store: the workers cannot write to a store in memory; use a folder")
+    return keys
+
+
+def _stored(
+    grid: Grid, options: _Stored, by: Renderer | Workers, progress: bool | None
+) -> xarray.Dataset:
+    """Render a grid into a store, and return that opened."""
+    xr = import_extra("xarray", "grid", "grid")
+    keys, chunks, part, resume, verify, on_mended = options
+    if (
+        isinstance(by, Workers)
+        and isinstance(grid.source, ImageSource)
+        and any(isinstance(image, Image) for image in grid.source.images)
+    ):
+        raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
+    if "done" in (axis.name for axis in grid.axes):
+        raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
+    check_chunks(grid, chunks)
+
+    def prepared(layout: Layout) -> GridStore:
+        kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys, part[1]), part)
+        for text in kept.prepare(resume=resume, verify=verify):
+            if on_mended is not None:
+                on_mended(text)
+        return kept
+
+    tally = render_grid(grid, prepared, by, progress=progress)
+    dataset: xarray.Dataset = xr.open_zarr(keys.store)
+    dataset.attrs.pop(IDENTITY, None)
+    return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
+
+
+def _chunk(
+    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys, parts: int
+) -> Index:
+    """Return the grid points per chunk by axis: requested, from the store, or the default."""
+    if chunks is None:
+        stored = stored_identity(read_json(keys.read(METADATA)) or {})
+        held = None if stored is None else chunk_in(stored, grid.shape)
+        return chunk_of(grid, layout, parts) if held is None else held
+    return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
+
+
+def check_chunks(grid: Grid, chunks: Mapping[str, int] | None) -> None:
+    """Check the argument `chunks` of `grid`: a mapping of axis names to counts from 1."""
+    if chunks is None:
+        return
+    if not isinstance(chunks, Mapping):
+        raise TypeError(f"chunks: {chunks!r} is not a mapping of axis names to point counts")
+    names = [axis.name for axis in grid.axes]
+    for name, count in chunks.items():
+        if name not in names:
+            raise ValueError(
+                f"chunks: {name!r} is not an axis of the grid; it has {', '.join(names)}"
+            )
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+            raise ValueError(f"chunks: {name}: {count!r} is not an integer of at least 1")

@@ -1,0 +1,112 @@
+"""The identity of a stored grid, and the differences between two identities."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from vkbloom._grid.layout import Grid, Layout
+from vkbloom._grid.order import Index
+from vkbloom._grid.reductions import Reduction
+from vkbloom._grid.sources import digest
+from vkbloom._settings.fields import plain_value
+
+__all__ = ["FORMAT", "chunk_in", "differences", "fingerprint", "identity", "short"]
+
+#: Version of the store's layout. A store with another version cannot be read.
+FORMAT: Final = 3
+
+_LONGEST: Final = 60  # characters of a value in a message
+
+
+def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
+    """Return everything that determines the contents of a grid's arrays, as JSON values."""
+    found = {
+        "format": FORMAT,
+        "version": layout.version,
+        "adapter": layout.adapter,
+        "driver": layout.driver,
+        "source": grid.source.description,
+        "settings": grid.remaining_settings,
+        "axes": {axis.name: [plain_value(value) for value in axis.values] for axis in grid.axes},
+        "order of axes": [axis.name for axis in grid.axes],
+        "variables": {
+            name: {"shape": variable.shape, "dtype": variable.dtype.name}
+            for name, variable in layout.variables.items()
+        },
+        "reduce": {name: _reduction(reduction) for name, reduction in grid.reduce.items()},
+        "chunk": chunk,
+    }
+    # The same conversion as by storing it in JSON, which turns tuples into lists.
+    plain: dict[str, Any] = json.loads(json.dumps(found))
+    return plain
+
+
+def fingerprint(own: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of an identity, whatever the order of its names."""
+    try:
+        text = json.dumps(own, sort_keys=True)
+    except RecursionError:
+        text = ""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
+    """Return the chunk of a stored identity; None if it is not valid for the grid's shape.
+
+    The identity may be damaged, so any value is possible.
+    """
+    held = stored.get("chunk")
+    if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
+        return None
+    for count, size in zip(held, shape, strict=True):
+        if type(count) is not int or not 1 <= count <= max(size, 1):
+            return None
+    return tuple(held)
+
+
+def _reduction(reduction: Any) -> str:
+    if not isinstance(reduction, Reduction):
+        kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
+        return f"{kind.__module__}.{kind.__qualname__}"
+    parts = []
+    for field in dataclasses.fields(reduction):
+        value = getattr(reduction, field.name)
+        text = f"sha256 {digest(value)}" if isinstance(value, np.ndarray) else repr(value)
+        parts.append(f"{field.name}={text}")
+    return f"{type(reduction).__name__}({', '.join(parts)})"
+
+
+def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
+    """List the differences between the grid in a store and the requested one."""
+    return list(_differences("", stored, asked))
+
+
+def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
+    if isinstance(stored, Mapping) and isinstance(asked, Mapping):
+        for key in dict.fromkeys((*stored, *asked)):
+            inner = f"{name}.{key}" if name else key
+            if key not in stored:
+                yield f"{inner}: not in the store, {short(asked[key])} requested"
+            elif key not in asked:
+                yield f"{inner}: {short(stored[key])} in the store, not requested"
+            else:
+                yield from _differences(inner, stored[key], asked[key])
+    elif stored != asked:
+        yield f"{name}: {short(stored)} in the store, {short(asked)} requested"
+
+
+def short(value: Any) -> str:
+    """Return any JSON value as a short text for a message."""
+    try:
+        text = json.dumps(value)
+    except RecursionError:
+        text = "nested lists"
+    if len(text) <= _LONGEST:
+        return text
+    return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

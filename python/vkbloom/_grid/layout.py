@@ -1,0 +1,444 @@
+"""A requested grid, and its layout: variables, shapes and dtypes, before anything is rendered."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._checks import check_framebuffers
+from vkbloom._framebuffers import dimensions, leading
+from vkbloom._grid.axes import Axis, image_axis, read_axes, settings_of
+from vkbloom._grid.order import Index, ranking_of, walk
+from vkbloom._grid.reductions import Comparing, Reduction
+from vkbloom._grid.sources import Point, Source, read_source, visit
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.plans import Framebuffer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.settings import Settings, check_settings
+from vkbloom._version import installed_version
+
+__all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out", "origin"]
+
+Reduce = Mapping[str, Callable[[Frames], Any]]
+
+_CHANNELS: Final = ("r", "g", "b", "a")
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A requested grid, with checked arguments.
+
+    - `settings`: The settings that the axes change, unless an axis has the settings.
+    - `axes`: The axes, in the order of the result's dimensions.
+    - `framebuffers`: The framebuffers to keep.
+    """
+
+    source: Source
+    settings: Settings
+    axes: tuple[Axis, ...]
+    framebuffers: str | tuple[str, ...]
+    reduce: Reduce
+
+    @property
+    def shape(self) -> Index:
+        """Number of values by axis."""
+        return tuple(len(axis) for axis in self.axes)
+
+    @property
+    def wanted(self) -> str | tuple[str, ...]:
+        """The framebuffers to ask the renderer for."""
+        names = self.framebuffers
+        for reduction in self.reduce.values():
+            needed = getattr(reduction, "framebuffers", "all")
+            if "all" in (names, needed):
+                return "all"
+            names = tuple(dict.fromkeys((*names, *needed)))
+        return names
+
+    def point(self, index: Index) -> Point:
+        """Return the point at an index."""
+        place = self.source.place
+        base = self.settings
+        changes = {}
+        for axis, number in zip(self.axes, index, strict=True):
+            if axis.kind == "preset":
+                base = settings_of(axis)[number]
+            elif axis.kind == "settings":
+                changes[axis.name] = axis.values[number]
+            else:
+                place = number if axis.kind == "image" else axis.values[number]
+        return Point(index, base.replace(**changes) if changes else base, place)
+
+    def named(self, index: Index) -> str:
+        """Return a point's axis values as text for messages."""
+        values = (f"{axis.name}={axis.label(i)}" for axis, i in zip(self.axes, index, strict=True))
+        return ", ".join(values) or "the only point"
+
+    @property
+    def remaining_settings(self) -> dict[str, Any]:
+        """The settings that no axis changes, and the method; empty if an axis has the settings."""
+        if any(axis.kind == "preset" for axis in self.axes):
+            return {}
+        varied = {axis.name for axis in self.axes}
+        return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
+
+    def references(self) -> dict[str, dict[int, int]]:
+        """Return the reference points of reductions: by name, indices by number of the axis."""
+        found: dict[str, dict[int, int]] = {}
+        for name, reduction in self.reduce.items():
+            against = getattr(reduction, "against", None)
+            if isinstance(reduction, Comparing) and isinstance(against, Mapping):
+                found[name] = {}
+                for key, value in against.items():
+                    numbers = [i for i, axis in enumerate(self.axes) if axis.name == key]
+                    if not numbers:
+                        raise ValueError(
+                            f"against: {key!r} is not an axis of the grid; use one of its axes"
+                        )
+                    found[name][numbers[0]] = self.axes[numbers[0]].find(value)
+        return found
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the Dataset: a framebuffer or a figure of every point."""
+
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    attributes: Mapping[str, str]
+
+    @property
+    def size(self) -> int:
+        """Bytes of one point."""
+        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout of a grid on a renderer.
+
+    - `ranking`: The axes from the slowest to the fastest.
+    - `coordinates`: Coordinates of dimensions that are not axes.
+    - `reference_size`: Bytes of the reference frames of one point.
+    - `structural`: The axes that change which passes or framebuffers exist.
+    - `ran`: Passes that ran to learn the shapes and dtypes of the reductions.
+    """
+
+    ranking: tuple[int, ...]
+    variables: Mapping[str, Variable]
+    coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
+    reference_size: int
+    structural: tuple[int, ...]
+    ran: int
+    adapter: str
+    driver: str
+    version: str
+
+    @property
+    def point_size(self) -> int:
+        """Bytes of memory per point."""
+        return sum(variable.size for variable in self.variables.values()) + self.reference_size
+
+
+def ask(
+    source: object,
+    settings: Settings | str | None,
+    axes: Mapping[str, Any] | None,
+    *,
+    mask: object = None,
+    emission: object = None,
+    size: tuple[int, int] | None,
+    shading: str,
+    time: float,
+    framebuffers: str | Sequence[str],
+    reduce: Reduce | None,
+) -> Grid:
+    """Check the arguments that all grids share."""
+    if settings is not None:
+        settings = check_settings(settings)
+    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
+    found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
+    if checked.labels:
+        found = (image_axis(checked.labels), *found)
+    names = check_framebuffers(framebuffers)
+    if reduce is not None and not isinstance(reduce, Mapping):
+        raise TypeError(f"reduce: {reduce!r} is not a mapping of names to callables")
+    reductions = {} if reduce is None else dict(reduce)
+    taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
+    for name, reduction in reductions.items():
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            raise ValueError(f"reduce: {name!r} is not a possible name of a variable of this grid")
+        if not callable(reduction):
+            raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
+    if names == () and not reductions:
+        raise ValueError("framebuffers: there are no framebuffers and no reductions; request some")
+    grid = Grid(
+        checked,
+        check_settings(settings, of_image=not checked.has_time),
+        found,
+        "all" if names is None else names,
+        reductions,
+    )
+    grid.references()
+    return grid
+
+
+def lay_out(
+    grid: Grid,
+    renderer: Renderer,
+    check: Callable[[Mapping[str, Variable]], object] = lambda variables: None,
+) -> Layout:
+    """Determine the layout of a grid on a renderer before its points are rendered."""
+    framebuffers, structural = _survey(grid, renderer)
+    variables = _frame_variables(framebuffers)
+    check(variables)
+    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
+    for variable in variables.values():
+        if len(variable.dims) == 3:
+            labels = np.array(_CHANNELS[: variable.shape[2]])
+            coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
+    reference_size = ran = 0
+    if grid.reduce:
+        sample = _sample(grid, renderer)
+        ran = len(sample.timings)
+        for name, reduction in grid.reduce.items():
+            value = _reduced(grid, name, sample)
+            variables[name], own = _reduction_variable(name, reduction, value)
+            coordinates.update(own)
+            if name in grid.references() and isinstance(reduction, Reduction):
+                reference_size += sample[reduction.framebuffer].nbytes
+    return Layout(
+        ranking=ranking(grid),
+        variables=variables,
+        coordinates=coordinates,
+        reference_size=reference_size,
+        structural=structural,
+        ran=ran,
+        **origin(renderer),
+    )
+
+
+def origin(renderer: Renderer) -> dict[str, str]:
+    """Return what may change the bits of a result: the adapter, its driver, and the version."""
+    return {
+        "adapter": renderer.info.name,
+        "driver": renderer.info.driver_info or renderer.info.driver,
+        "version": installed_version(),
+    }
+
+
+def ranking(grid: Grid) -> tuple[int, ...]:
+    """Return the axes from the one whose steps run the most passes to the one with the fewest.
+
+    The sum of all passes is smallest if axes with more passes for a step are slower, whatever their
+    numbers of values. Proof: let two adjacent axes a, b have n_a, n_b values and c_a, c_b passes
+    for a step. With a as the slower one, the cost is c_a (n_a - 1) + n_a c_b (n_b - 1). This is
+    less than for the other order exactly if c_a > c_b.
+    """
+    costs = [0] * len(grid.axes)
+    if sum(len(axis) > 1 for axis in grid.axes) > 1:
+        # From both corners, since an axis may have no effect at one of them, such as a field of the
+        # blur while the bloom is off.
+        for backwards in (False, True):
+            steps = list(walk(grid.shape, backwards=backwards))
+            names = _core.dry_run(_planned(grid, [index for _, index in steps]))
+            for (stepped, _), ran in zip(steps, names, strict=True):
+                if stepped is not None:
+                    costs[stepped] += len(ran)
+    return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
+
+
+def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
+    """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
+    points = [grid.point(index) for index in path]
+    sources = {place: grid.source.for_core(place) for place in {point.place for point in points}}
+    return tuple(
+        (sources[point.place], _core.plan(sources[point.place], point.settings, None))
+        for point in points
+    )
+
+
+class PassCounter:
+    """Counts the passes of a grid's points if each were rendered alone."""
+
+    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
+        self._grid = grid
+        self._structural = layout.structural
+        self._renderer = renderer
+        self._known: dict[Index, int] = {}
+
+    def alone(self, index: Index) -> int:
+        """Return the number of passes of a point on a new renderer.
+
+        As in `Frames.timings`, without fused passes.
+        """
+        key = tuple(index[number] for number in self._structural)
+        if key not in self._known:
+            self._known[key] = _graph_of(self._grid, self._renderer, index)[1]
+        return self._known[key]
+
+
+def _graph_of(
+    grid: Grid, renderer: Renderer, index: Index
+) -> tuple[Mapping[str, Framebuffer], int]:
+    """Return the framebuffers and the passes of a point that is rendered alone."""
+    point = grid.point(index)
+    found = grid.source.plan(renderer, point.settings, point.place).framebuffers
+    wanted = grid.wanted
+    names = None if wanted == "all" else tuple(name for name in wanted if name in found)
+    source = grid.source.for_core(point.place)
+    alone = _core.plan(source, point.settings, names)
+    return found, len({name for name, *_ in alone.passes})
+
+
+def _survey(grid: Grid, renderer: Renderer) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
+    """Return the framebuffers to keep, and the axes that change the set of framebuffers or passes.
+
+    Plans every value of every axis from the first and from the last corner of the grid, then every
+    combination along the axes that change something. Nothing is rendered.
+    """
+    first = tuple(0 for _ in grid.axes)
+    structural: set[int] = set()
+    for corner in {first, tuple(count - 1 for count in grid.shape)}:
+        basis = _graph_of(grid, renderer, corner)
+        for number, axis in enumerate(grid.axes):
+            for place in range(len(axis)):
+                index = (*corner[:number], place, *corner[number + 1 :])
+                if index != corner and _graph_of(grid, renderer, index) != basis:
+                    structural.add(number)
+                    break
+    expected = _graph_of(grid, renderer, first)[0]
+    names = tuple(expected) if grid.framebuffers == "all" else grid.framebuffers
+    ranges = (range(len(axis)) if i in structural else (0,) for i, axis in enumerate(grid.axes))
+    promoted: dict[str, Framebuffer] = dict(expected)
+    for index in itertools.product(*ranges):
+        found = _graph_of(grid, renderer, index)[0]
+        if grid.framebuffers == "all" and set(found) != set(expected):
+            names = tuple(sorted(set(found) ^ set(expected)))
+        for name in (name for name in names if name in expected or name in found):
+            common = _common(promoted.get(name), found.get(name))
+            if common is None:
+                _refuse(grid, name, (first, expected.get(name)), (index, found.get(name)))
+            else:
+                promoted[name] = common
+    for name in names:
+        if name not in expected:
+            raise ValueError(f"framebuffers: there is no {name!r} here, only {', '.join(expected)}")
+    return {name: promoted[name] for name in names}, tuple(sorted(structural))
+
+
+def _common(one: Framebuffer | None, other: Framebuffer | None) -> Framebuffer | None:
+    """Return a framebuffer that can hold both: floats of the larger dtype; None if there is none.
+
+    uint8 and floats have no common one, since a level is not the same value as a float.
+    """
+    if one is None or other is None or one[0] != other[0]:
+        return None
+    if one[1] != other[1] and "u" in (one[1].kind, other[1].kind):
+        return None
+    return one[0], np.promote_types(one[1], other[1])
+
+
+def _refuse(
+    grid: Grid,
+    name: str,
+    *places: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
+) -> None:
+    """Raise ValueError for a framebuffer that is not the same at two points."""
+    (first, _), (second, _) = places
+    varied = [number for number, place in enumerate(second) if place != first[number]]
+    names = " and ".join(grid.axes[number].name for number in varied)
+    told = []
+    for index, found in places:
+        where = ", ".join(f"{grid.axes[i].name}={grid.axes[i].label(index[i])}" for i in varied)
+        what = f"{found[0]} {found[1]}" if found else "not there"
+        told.append(f"{what} at {where}")
+    raise ValueError(
+        f"axes: {name} changes its shape or dtype along {names}: {'; '.join(told)}; request "
+        "framebuffers that are the same at all points, or make a grid for each"
+    )
+
+
+def _frame_variables(
+    framebuffers: Mapping[str, Framebuffer],
+) -> dict[str, Variable]:
+    if not framebuffers:
+        return {}
+    # Only the shapes are used. Memory that is never touched costs nothing.
+    shapes = {name: np.empty(shape, dtype) for name, (shape, dtype) in framebuffers.items()}
+    dims = dimensions(shapes)
+    lead = leading(shapes)
+    found = {}
+    for name, array in shapes.items():
+        scale = ", 255 being 1" if array.dtype == np.uint8 else ""
+        kind = "Depth" if array.ndim == 2 else "Framebuffer"
+        attributes = {
+            "long_name": name,
+            "units": "1",
+            "description": f"{kind} {name}{scale}" + (", the picture" * (name == lead == "final")),
+        }
+        found[name] = Variable(dims[name], array.shape, array.dtype, attributes)
+    return found
+
+
+def _sample(grid: Grid, renderer: Renderer) -> Frames:
+    """Render the first point."""
+    first = tuple(0 for _ in grid.axes)
+    ((_, frames),) = visit(renderer, grid.source, [grid.point(first)], grid.wanted)
+    return frames
+
+
+def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
+    """Return a reduction of frames. A comparing reduction compares them with themselves."""
+    reduction = grid.reduce[name]
+    if name in grid.references() and isinstance(reduction, Comparing):
+        reduction = dataclasses.replace(reduction, against=frames[reduction.framebuffer])
+    return checked_value(name, reduction(frames))
+
+
+def checked_value(name: str, value: Any) -> NDArray[Any]:
+    """Convert the value of a reduction to an array of numbers."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"reduce: {name}: {value!r} is not a number or an array of numbers")
+    # One dtype per kind of number, so that all points of a variable have the same.
+    widest = {"b": np.bool_, "i": np.int64, "u": np.uint64, "f": np.float64}[array.dtype.kind]
+    return array.astype(widest)
+
+
+def _reduction_variable(
+    name: str, reduction: Callable[[Frames], Any], value: NDArray[Any]
+) -> tuple[Variable, dict[str, tuple[NDArray[Any], Mapping[str, str]]]]:
+    own = getattr(reduction, "dims", ())
+    if len(own) != value.ndim:
+        own = tuple(f"dim_{number}" for number in range(value.ndim))
+    dims = tuple(f"{name}_{dim}" for dim in own)
+    attributes = {"long_name": name, "units": str(getattr(reduction, "units", "1"))}
+    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
+    if isinstance(reduction, Reduction):
+        attributes["description"] = reduction.description
+        for dim, values in reduction.coordinates.items():
+            coordinates[f"{name}_{dim}"] = (values, {"long_name": dim, "units": "pixel"})
+    return Variable(dims, value.shape, value.dtype, attributes), coordinates
+
+
+def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
+    """Return the attributes of the grid's Dataset."""
+    facts = {key: value for key, value in grid.source.description.items() if key != "images"}
+    return {
+        "adapter": layout.adapter,
+        "driver": layout.driver,
+        "version": layout.version,
+        "axes": json.dumps([axis.name for axis in grid.axes]),
+        "settings": json.dumps(grid.remaining_settings),
+        "source": json.dumps({key: value for key, value in facts.items() if key != "sha256"}),
+    }

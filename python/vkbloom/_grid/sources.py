@@ -1,0 +1,266 @@
+"""The source of a grid: a scene, an image or several images."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from vkbloom import _core
+from vkbloom._checks import (
+    check_emission,
+    check_framebuffers,
+    check_image,
+    check_mask,
+    check_size,
+    check_time,
+)
+from vkbloom._grid.order import Index
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.requests import IMAGES_AHEAD, Request
+from vkbloom._renderer.sources import image_source, is_image, scene_source
+from vkbloom._settings.settings import Settings, check_shading
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from vkbloom._renderer.plans import Plan
+    from vkbloom._scene import Scene
+    from vkbloom._settings.settings import Shading
+
+__all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
+
+_SCENE_SIZE = (1280, 720)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a grid: its index, its settings, and the image's number or the time."""
+
+    index: Index
+    settings: Settings
+    place: float
+
+
+def visit(
+    renderer: Renderer,
+    source: ImageSource | SceneSource,
+    points: Iterable[Point],
+    framebuffers: str | Sequence[str],
+) -> Iterator[tuple[Index, Frames]]:
+    """Render points in the given order."""
+    drawn: deque[Index] = deque()
+
+    def work() -> Iterator[Request]:
+        for point in points:
+            drawn.append(point.index)
+            yield Request(source.on(renderer, point.place), point.settings)
+
+    for frames in renderer._run_work(work(), check_framebuffers(framebuffers)):
+        yield drawn.popleft(), frames
+
+
+class ImageSource:
+    """One image, or several images of the same shape, which share a mask and an emission."""
+
+    has_time = False
+    #: The place of points without an image axis.
+    place = 0.0
+
+    def __init__(
+        self,
+        images: Sequence[NDArray[Any] | Image],
+        labels: tuple[Any, ...] = (),
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> None:
+        self.images = tuple(images)
+        self.labels = labels
+        self.mask = mask
+        self.emission = emission
+        #: Images on a renderer's device by place, the latest last.
+        self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The device is not sent to other processes.
+        return type(self), (self.images, self.labels, self.mask, self.emission)
+
+    def on(self, renderer: Renderer, place: float) -> _core.Source:
+        """Return an image on a renderer's device. The latest images are kept there."""
+        image = self.images[int(place)]
+        if isinstance(image, Image):
+            return self.for_core(place)
+        core, held = self._uploaded
+        if core is not renderer._core:
+            core, held = self._uploaded = renderer._core, {}
+        if int(place) not in held:
+            spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
+            held[int(place)] = core.upload(self.for_core(place), spare, True)
+        return held[int(place)]
+
+    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+        """Return the plan of an image."""
+        return renderer.plan(self.images[int(place)], settings)
+
+    def for_core(self, place: float) -> _core.Source:
+        """Return the core's Source of an image."""
+        return image_source(self.images[int(place)], self.mask, self.emission)
+
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """The identity of the source: shapes, dtypes and digests."""
+        given = {"mask": self.mask, "emission": self.emission}
+        return {
+            "kind": "image",
+            "images": [_described(image) for image in self.images if not isinstance(image, Image)],
+            **{name: _described(array) for name, array in given.items() if array is not None},
+        }
+
+
+def _described(array: NDArray[Any]) -> dict[str, Any]:
+    return {"shape": list(array.shape), "dtype": array.dtype.name, "sha256": digest(array)}
+
+
+class SceneSource:
+    """A scene, rendered at one size in one shading."""
+
+    has_time = True
+    labels: tuple[Any, ...] = ()
+
+    def __init__(
+        self, scene: Scene, size: tuple[int, int], shading: Shading, time: float = 0.0
+    ) -> None:
+        self.scene = scene
+        self.size = size
+        self.shading: Shading = shading
+        self.place = time
+        self._latest: tuple[float, _core.Source] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.scene, self.size, self.shading, self.place)
+
+    def on(self, renderer: Renderer, place: float) -> _core.Source:
+        """Return the scene at a time. The renderer keeps its data on the device."""
+        # One object for each time, so that requests of the same time share submissions.
+        if self._latest is None or self._latest[0] != place:
+            self._latest = place, self.for_core(place)
+        return self._latest[1]
+
+    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+        """Return the plan of the scene."""
+        return renderer.plan(self.scene, settings, self.size, shading=self.shading)
+
+    def for_core(self, place: float) -> _core.Source:
+        """Return the core's Source of the scene at a time."""
+        return scene_source(self.scene, self.size, self.shading, place)
+
+    @functools.cached_property
+    def description(self) -> dict[str, Any]:
+        """The identity of the source: size, shading, time and a digest of the scene."""
+        return {
+            "kind": "scene",
+            "sha256": digest(self.scene),
+            "size": list(self.size),
+            "shading": self.shading,
+            "time": self.place,
+        }
+
+
+Source: TypeAlias = ImageSource | SceneSource
+
+
+def read_source(
+    source: object,
+    size: tuple[int, int] | None,
+    shading: str,
+    time: float,
+    *,
+    mask: object = None,
+    emission: object = None,
+) -> Source:
+    """Check the source of a grid."""
+    from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    given = {"mask": mask, "emission": emission}
+    if isinstance(source, Scene):
+        for name, array in given.items():
+            if array is not None:
+                raise ValueError(f"{name}: the source is a scene; leave the argument out")
+        frame = check_size("size", size or _SCENE_SIZE)
+        return SceneSource(source, frame, check_shading(shading), check_time(time))
+    for name, is_given in (
+        ("size", size is not None),
+        ("shading", check_shading(shading) != "forward"),
+        ("time", check_time(time) != 0.0),
+    ):
+        if is_given:
+            raise ValueError(f"{name}: the source is not a scene; leave the argument out")
+    if is_image(source):
+        return _image_source([_checked(source)], (), **given)
+    labels: list[Any]
+    if isinstance(source, Mapping):
+        images, labels = list(source.values()), [str(label) for label in source]
+    elif isinstance(source, list | tuple):
+        images, labels = list(source), list(range(len(source)))
+    else:
+        raise TypeError(
+            f"source: {type(source).__name__} is not a Scene, an image or a list of images"
+        )
+    if not images:
+        raise ValueError("source: the list of images is empty")
+    return _image_source([_checked(image) for image in images], tuple(labels), **given)
+
+
+def _image_source(
+    images: list[NDArray[Any] | Image], labels: tuple[Any, ...], mask: object, emission: object
+) -> ImageSource:
+    """Return the source; a mask and an emission must fit each of the images."""
+    if mask is None and emission is None:
+        return ImageSource(images, labels)
+    held_mask = held_emission = None
+    for image in images:
+        # Refuses one that is uploaded.
+        image_source(image, mask, emission)
+        assert not isinstance(image, Image)
+        if mask is not None:
+            held_mask = check_mask(mask, (image.shape[0], image.shape[1]))
+        if emission is not None:
+            held_emission = check_emission(emission, image)
+    return ImageSource(images, labels, held_mask, held_emission)
+
+
+def _checked(image: object) -> NDArray[Any] | Image:
+    return image if isinstance(image, Image) else check_image(image, "source")
+
+
+def digest(value: object) -> str:
+    """Return the SHA-256 of plain values, arrays, and dataclasses and sequences of them."""
+    found = hashlib.sha256()
+
+    def add(part: object) -> None:
+        if isinstance(part, np.ndarray):
+            found.update(f"{part.dtype.str}{part.shape}".encode())
+            found.update(np.ascontiguousarray(part).data)
+        elif dataclasses.is_dataclass(part):
+            for field in dataclasses.fields(part):
+                # Fields that are not arguments, such as a serial number, are not content.
+                if field.init:
+                    found.update(f"{field.name}:".encode())
+                    add(getattr(part, field.name))
+        elif isinstance(part, tuple | list):
+            found.update(f"[{len(part)}]".encode())
+            for item in part:
+                add(item)
+        else:
+            found.update(repr(part).encode())
+
+    add(value)
+    return found.hexdigest()

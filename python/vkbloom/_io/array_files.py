@@ -1,0 +1,394 @@
+"""Image files as arrays: `vkbloom.read` and `vkbloom.write`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_index, import_extra, native_order
+from vkbloom._io import displayed, image_reading, safe_writing
+from vkbloom._io.alpha import divided, hidden_notes, multiplied
+from vkbloom._io.displayed import Saved, check_saved
+from vkbloom._io.expansion import check_expansion
+from vkbloom._io.image_writing import BITS, as_numbers, check_quality, described_as, put
+from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, is_exr
+
+__all__ = ["has_straight", "premultiplied", "read", "write"]
+
+FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
+
+_ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
+# The file's number types for floats, in order of preference, by the requested bits.
+_FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
+    None: ("half", "float", "uint8"),
+    **BITS,
+}
+# Metadata that `read` adds about the file. The other entries are attributes, which can be written.
+_FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
+
+
+@overload
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = ...,
+    subimage: int = ...,
+    premultiplied: bool = ...,
+    expand: float | None = ...,
+    metadata: Literal[False] = ...,
+) -> NDArray[Any]: ...
+@overload
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = ...,
+    subimage: int = ...,
+    premultiplied: bool = ...,
+    expand: float | None = ...,
+    metadata: Literal[True],
+) -> tuple[NDArray[Any], dict[str, Any]]: ...
+@checked
+def read(
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    subimage: int = 0,
+    premultiplied: bool = False,
+    expand: float | None = None,
+    metadata: bool = False,
+) -> NDArray[Any] | tuple[NDArray[Any], dict[str, Any]]:
+    """Read an image file as linear light, ready for `Renderer.apply`.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file of any format that OpenImageIO reads: PNG, JPEG, OpenEXR, Radiance HDR, TIFF and
+        others.
+    layer : str, optional
+        The layer of an OpenEXR file, such as ``"ViewLayer.Combined"``: the channels ``layer.R``,
+        ``layer.G`` and so on. Not needed for files with one layer.
+    subimage : int, default 0
+        The part of a file with several parts, from 0.
+    premultiplied : bool, default False
+        Whether to return colours multiplied by alpha. Some files have them multiplied, others not.
+        By default multiplied ones are divided, except where alpha is 0. Flames and glows in OpenEXR
+        files have colours with an alpha of 0: read them with ``premultiplied=True``.
+    expand : float, optional
+        What highlights of files of integers are expanded up to, 1 to 1024. A photograph has no
+        values above 1: everything bright is clipped there. Expanded, its lights are brighter than
+        its white walls, and can glow. None and 1: they stay as they are; so do files of floats.
+        ``presets["photo"]`` is made for 4.
+    metadata : bool, default False
+        Whether to also return the file's metadata.
+
+    Returns
+    -------
+    array : ndarray, shape (H, W, 3) or (H, W, 4)
+        Top row first and upright; a grey image has three equal colours. Files of 8 and 16 bit
+        integers become float32 of linear Rec. 709 colours. They are decoded as the file states (by
+        a cICP chunk, an ICC profile or a gamma), otherwise from sRGB. They are not clipped: colours
+        outside of Rec. 709 have negative components. Half becomes float16 and float becomes
+        float32, with unchanged values.
+    metadata : dict
+        Only with ``metadata=True``. The file's attributes by OpenImageIO's names ("chromaticities",
+        "XResolution", "Exif:LensModel", ...), which `write` accepts; "numbers" (the number type in
+        the file, such as "uint8"), "colour" (the colour space from which colours were decoded),
+        "alpha" ("straight", "premultiplied", or None without alpha), "parts" (the names of the
+        parts) and "notes" (assumptions).
+
+    Raises
+    ------
+    OSError
+        The file does not exist or cannot be opened. The error names it.
+    ValueError
+        The file is damaged or not an image; it has no such part or layer; or it has several layers
+        and `layer` is missing (the message lists them). The error names the file.
+    ModuleNotFoundError
+        OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+    See Also
+    --------
+    write : Writes image files. Renderer.apply : Accepts the array.
+
+    Notes
+    -----
+    Profiles and colour spaces are converted with OpenColorIO's built-in configuration, which is
+    part of OpenImageIO. Only profiles with a matrix and curves are used. With others (CMYK, grey,
+    tables) the colours are decoded as sRGB, and "notes" says so. A cICP chunk with PQ gives 1 for
+    203 cd/m2, and one with HLG gives 1 for the signal 0.75, as `write` has it; such files are not
+    expanded.
+
+    `expand` maps m = max(r, g, b) above the knee a = 0.8 to a + (m - a) / (1 - k (m - a)), with
+    k = 1 / (1 - a) - 1 / (expand - a), and multiplies the colour by the ratio. Up to 0.8 (the level
+    231 of 255 in sRGB) nothing changes, and 1 becomes `expand`.
+
+    Examples
+    --------
+    >>> photo = vkbloom.read("photo.jpg", expand=4)                         # doctest: +SKIP
+    >>> with vkbloom.Renderer() as renderer:                                # doctest: +SKIP
+    ...     final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
+    >>> vkbloom.write("bloom.jpg", final, quality=95)                       # doctest: +SKIP
+    """
+    check_name(path)
+    subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
+    check_expansion(expand)
+    stored = image_reading.load(path, subimage, layer)
+    try:
+        picture = image_reading.decode(stored, expand=expand)
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)}: {error}") from error
+    pixels = picture.pixels
+    has_alpha = pixels.shape[2] == 4
+    if has_alpha and picture.stored.associated is not premultiplied:
+        pixels = multiplied(pixels) if premultiplied else divided(pixels)
+    if not metadata:
+        return pixels
+    hidden = 0.0 if premultiplied else picture.hidden
+    facts: dict[str, Any] = {
+        name: _plain(value) for name, (_, value) in picture.stored.attributes.items()
+    }
+    facts.update(
+        numbers=picture.numbers,
+        colour=picture.colour,
+        alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
+        parts=stored.parts,
+        notes=(*picture.notes, *hidden_notes(hidden, picture.visible)),
+    )
+    return pixels, facts
+
+
+def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> None:
+    """Raise ValueError for conversions of `write` that the values cannot have."""
+    is_float, encoding = values.dtype.kind == "f", saved.curve
+    if encoding is not None and (encoding not in _ENCODINGS or not is_float):
+        raise ValueError(
+            f"encoding: {encoding!r} is not one of {', '.join(_ENCODINGS)}"
+            if is_float
+            else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
+        )
+    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
+        own = 8 * values.dtype.itemsize
+        if bits != own or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    check_saved(saved)
+    needs_three = saved.view is not None or saved.primaries != "rec709"
+    if needs_three and (not is_float or values.shape[2] < 3):
+        raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
+
+
+@checked
+def write(
+    path: str | os.PathLike[str],
+    array: NDArray[Any],
+    *,
+    encoding: FileEncoding | None = None,
+    bits: int | None = None,
+    quality: int | None = None,
+    premultiplied: bool = False,
+    primaries: str = "rec709",
+    view: str | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write an array to an image file.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file name with an extension that OpenImageIO writes. The file is first written under
+        another name. An existing file is replaced when the new one is complete.
+    array : ndarray, shape (H, W), (H, W, 1), (H, W, 2), (H, W, 3) or (H, W, 4)
+        Grey, grey with alpha, RGB or RGBA. uint8 and uint16 are written unchanged. Floats are
+        linear light: encoded in files of integers (PNG, JPEG, ...), unchanged in files of floats
+        (OpenEXR, Radiance HDR, TIFF). Files of integers end at 1: colours with a component above 1
+        are divided by their largest component, which keeps their hue; negative ones become 0.
+    encoding : {"srgb", "gamma22", "linear", "pq", "hlg", "none"}, optional
+        The curve of the file's colours, for floats. Default: "srgb" for files of integers and
+        "linear" for files of floats. "pq" and "hlg" are those of Rec. ITU-R BT.2100, with 203
+        cd/m2 for a value of 1, as in `Settings`. "none": the values are encoded already, such as
+        those of a `final` with an `encoding`.
+    bits : {8, 16, 32}, optional
+        Size of a number in the file, for floats. Default: 8 in files of integers, and that of the
+        array's dtype in files of floats.
+    quality : int, optional
+        Quality of JPEG, WebP and JPEG XL, 1 to 100. Colours are not subsampled, unless the metadata
+        contain a subsampling.
+    premultiplied : bool, default False
+        Whether the array's colours are multiplied by alpha. OpenEXR files have multiplied colours,
+        other formats straight ones. Colours are converted if needed.
+    primaries : {"rec709", "rec2020", "p3"}
+        Primaries of the file. Linear floats of Rec. 709 are converted to them by OpenColorIO; with
+        the encoding "none" they only name the colours. PNG has them in a cICP chunk, OpenEXR as
+        chromaticities; other formats are refused.
+    view : str, optional
+        A view of OpenColorIO's built-in configuration, such as "ACES 2.0 - SDR 100 nits
+        (Rec.709)", of the first display that has it, or "DISPLAY/VIEW". It replaces `encoding`
+        and `primaries`, and needs linear floats and a file of integers. The error for an unknown
+        one lists all.
+    metadata : mapping of str to object, optional
+        Metadata from `read`, or attributes by OpenImageIO's names: text, numbers, or sequences of
+        them.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    TypeError
+        The array's dtype is not uint8, uint16 or a float.
+    ValueError
+        The array's shape or an argument is not one of the above; or the format cannot store the
+        array: JPEG, GIF and Radiance HDR have no alpha, OpenEXR has no integers.
+    OSError
+        The file cannot be written. The error names it, and no partial file is left.
+    ModuleNotFoundError
+        OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+    See Also
+    --------
+    read : Reads image files. Frames.save : Every framebuffer, with settings and timings.
+
+    Notes
+    -----
+    `read` returns colours with the primaries of Rec. 709. A Display P3 photograph that is read and
+    written as PNG keeps its colours with ``primaries="p3"``; without it, colours outside of Rec.
+    709 are clipped. OpenEXR keeps them as negative components. "pq" and "hlg" need 16 bits to show
+    no bands.
+
+    Examples
+    --------
+    >>> vkbloom.write("ramp.png", np.linspace(0, 1, 256 * 64 * 3, dtype=np.float32)
+    ...               .reshape(64, 256, 3), bits=16)                        # doctest: +SKIP
+    """
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    target = Path(check_name(path))
+    values = _checked(array)
+    is_float = values.dtype.kind == "f"
+    saved = Saved(encoding, primaries, view)
+    _check_conversions(values, saved, bits)
+    safe_writing.check_extension(oiio, target.suffix)
+    check_quality(target, quality)
+    with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
+        numbers = _numbers(oiio, values, bits, temporary, target)
+        is_integer = numbers.startswith("uint")
+        if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
+            values = divided(values) if premultiplied else multiplied(values)
+        if view is not None and not is_integer:
+            raise ValueError(f"view: {target} has linear floats; write a file of integers")
+        picture = Picture.of_values(values, numbers, None, _typed(oiio, metadata or {}))
+        if is_float:
+            curve = encoding or ("srgb" if is_integer else "linear")
+            values, what = displayed.converted(oiio, values, saved, curve, is_integer=is_integer)
+            picture = described_as(oiio, picture, target, what)
+        put(
+            oiio,
+            as_numbers(values, numbers),
+            picture,
+            temporary,
+            target,
+            attributes={} if quality is None else {"CompressionQuality": quality},
+        )
+    return target
+
+
+def _checked(array: NDArray[Any]) -> NDArray[Any]:
+    """Return the array as (H, W, C), after a check of its shape and dtype."""
+    try:
+        values = np.asarray(array)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"array: an array is needed; NumPy: {error}") from None
+    if values.dtype.name not in (*PIXEL_TYPES, "float64"):
+        raise TypeError(
+            f"array: dtype {values.dtype} is not one of uint8, uint16, float16, float32, float64"
+        )
+    if values.ndim == 2:
+        values = values[:, :, None]
+    if values.ndim != 3 or not 1 <= values.shape[2] <= 4 or 0 in values.shape:
+        raise ValueError(
+            f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
+        )
+    return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
+
+
+def _numbers(
+    oiio: ModuleType, values: NDArray[Any], bits: int | None, temporary: Path, target: Path
+) -> str:
+    """Return OpenImageIO's name of the number type to write."""
+    own = PIXEL_TYPES[values.dtype.name]
+    wanted: Sequence[str] = [own]
+    if values.dtype.kind == "f":
+        wanted = [*dict.fromkeys((own, *_FLOATS[None]))] if bits is None else _FLOATS[bits]
+    channels = values.shape[2]
+    writer = oiio.ImageOutput.create(str(temporary))
+    kind = writer.format_name()
+    if channels in (2, 4) and not safe_writing.has_alpha(writer):
+        raise ValueError(f"{target}: {kind} has no alpha; write array[..., :{channels - 1}]")
+    for numbers in wanted:
+        if safe_writing.holds(oiio, temporary, channels, numbers):
+            return numbers
+    if values.dtype.kind == "u" and safe_writing.holds(oiio, temporary, channels, "float"):
+        raise ValueError(
+            f"{target}: {kind} holds floats, not {values.dtype}; write linear floats, as "
+            "vkbloom.read gives them"
+        )
+    if channels < 3:
+        raise ValueError(
+            f"{target}: {kind} cannot hold {channels} channels of {' or '.join(wanted)}; write "
+            "np.repeat(array[..., :1], 3, axis=2)"
+        )
+    raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
+
+
+def has_straight(picture: Picture) -> bool:
+    """Whether a picture's file has alpha, and colours that are not multiplied by it."""
+    return picture.pixels.shape[2] == 4 and not picture.stored.associated
+
+
+def premultiplied(picture: Picture) -> Picture:
+    """Return a picture whose colours are multiplied by alpha, if there is one."""
+    if not has_straight(picture):
+        return picture
+    return replace(picture, pixels=multiplied(picture.pixels), hidden=0.0)
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute's value as a str, a number, bytes or a tuple of numbers."""
+    if isinstance(value, np.ndarray):
+        return value.tobytes() if value.dtype == np.uint8 else tuple(value.tolist())
+    return value
+
+
+def _typed(oiio: ModuleType, metadata: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Return attributes with OpenImageIO's types."""
+    typed: dict[str, tuple[Any, Any]] = {}
+    for name, value in metadata.items():
+        if name in _FACTS:
+            continue
+        match value:
+            case str():
+                typed[name] = oiio.TypeDesc("string"), value
+            case bytes():
+                array = np.frombuffer(value, np.uint8)
+                typed[name] = oiio.TypeDesc(f"uint8[{len(array)}]"), array
+            case int() | np.integer():
+                typed[name] = oiio.TypeDesc("int"), int(value)
+            case float() | np.floating():
+                typed[name] = oiio.TypeDesc("float"), float(value)
+            case tuple() | list() | np.ndarray():
+                numbers = np.asarray(value)
+                if numbers.ndim != 1 or numbers.dtype.kind not in "iuf" or not numbers.size:
+                    raise TypeError(f"metadata: {name!r} is {value!r}, neither text nor numbers")
+                kind = "float" if numbers.dtype.kind == "f" else "int"
+                typed[name] = oiio.TypeDesc(f"{kind}[{numbers.size}]"), tuple(numbers.tolist())
+            case _:
+                raise TypeError(f"metadata: {name!r} is {value!r}, neither text nor numbers")
+    return typed

@@ -1,0 +1,271 @@
+"""Colours for displays: other primaries, the curves PQ and HLG, and views of OpenColorIO."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import import_extra
+from vkbloom._io.hdr_curves import ENCODERS
+from vkbloom._io.images import SPACES
+from vkbloom._io.srgb import encode_srgb
+
+__all__ = [
+    "HDR_CURVES",
+    "PRIMARIES",
+    "Attributes",
+    "Saved",
+    "check_primaries",
+    "check_saved",
+    "converted",
+    "encoded",
+    "from_primaries",
+    "has_hdr_curve",
+    "is_hdr",
+    "of_code_points",
+    "scaled_to_1",
+    "with_names",
+]
+
+#: A file's attributes by OpenImageIO's names, each with its type and value.
+Attributes = Mapping[str, tuple[Any, Any]]
+
+_CONFIGURATION: Final = "ocio://default"
+#: Linear spaces of the built-in configuration.
+PRIMARIES: Final[Mapping[str, str]] = {
+    "rec709": SPACES["linear"],
+    "rec2020": "lin_rec2020_scene",
+    "p3": "lin_p3d65_scene",
+}
+# Of a view: the space of what it gets, no look, and colours that alpha does not divide.
+_FROM_LINEAR: Final = (PRIMARIES["rec709"], "", False)
+# Code points of Rec. ITU-T H.273, for primaries and for curves; 2 is an unknown curve.
+_PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
+_CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
+#: Curves for displays of HDR.
+HDR_CURVES: Final = ("pq", "hlg")
+# Of files, in addition: the curve of Rec. ITU-R BT.709, which BT.601 and BT.2020 have, too.
+_READ_CURVES: Final = {
+    **{point: curve for curve, point in _CURVE_POINTS.items() if curve != "none"},
+    **dict.fromkeys((1, 6, 14, 15), "rec709"),
+}
+# Curves that readers know or assume without code points.
+_PLAIN: Final = ("linear", "srgb", "gamma22", "none")
+# Curves whose values end at 1 in files of integers.
+_ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
+# Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
+_CHROMATICITIES: Final = {
+    "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
+    "rec2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+}
+# Code points of the built-in displays; the others have none.
+_DISPLAYS: Final[Mapping[str, tuple[int, int]]] = {
+    "sRGB - Display": (1, 13),
+    "Gamma 2.2 Rec.709 - Display": (1, 4),
+    "Display P3 - Display": (12, 13),
+    "Rec.1886 Rec.709 - Display": (1, 1),
+    "Rec.2100-PQ - Display": (9, 16),
+    "ST2084-P3-D65 - Display": (12, 16),
+}
+
+
+class Saved(NamedTuple):
+    """What the colours of a file are to be.
+
+    - `curve`: None: "srgb" for integers and "linear" for floats.
+    - `view`: A view instead of a curve and primaries.
+    """
+
+    curve: str | None = None
+    primaries: str = "rec709"
+    view: str | None = None
+
+
+def check_primaries(primaries: str) -> None:
+    """Raise ValueError for unknown primaries."""
+    if primaries not in PRIMARIES:
+        raise ValueError(f"primaries: {primaries!r} is not one of {', '.join(PRIMARIES)}")
+
+
+def check_saved(saved: Saved) -> None:
+    """Raise ValueError for primaries and views that do not exist or do not go together."""
+    check_primaries(saved.primaries)
+    if saved.view is None:
+        return
+    if saved != Saved(view=saved.view):
+        raise ValueError("view: it has its own encoding and primaries; leave them out")
+    _display_of(import_extra("OpenImageIO", "images", "Views"), saved.view)
+
+
+def has_hdr_curve(points: Sequence[int] | None) -> bool:
+    """Whether code points of a file have the curve PQ or HLG."""
+    return points is not None and points[1] in (_CURVE_POINTS[curve] for curve in HDR_CURVES)
+
+
+def is_hdr(saved: Saved) -> bool:
+    """Whether a file is for HDR displays, and needs more than 8 bits."""
+    if saved.view is None:
+        return saved.curve in HDR_CURVES
+    oiio = import_extra("OpenImageIO", "images", "Views")
+    return has_hdr_curve(_DISPLAYS.get(_display_of(oiio, saved.view)[0]))
+
+
+def converted(
+    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
+) -> tuple[NDArray[Any], tuple[str, str] | str]:
+    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
+
+    - `curve`: That of `saved`, or the file's own.
+    - `is_integer`: Whether the file ends at 1, so that colours above it are `scaled_to_1`.
+    - Returns: The values, and their primaries and curve or their display. With the curve "none"
+      values do not change.
+    """
+    if saved.view is not None:
+        display, view = _display_of(oiio, saved.view)
+        made = oiio.ImageBufAlgo.ociodisplay(
+            _colours_of(oiio, values), display, view, *_FROM_LINEAR, colorconfig=_CONFIGURATION
+        )
+        return _with_colours(values, made), display
+    if curve != "none" and saved.primaries != "rec709":
+        values = _between(oiio, values, "rec709", saved.primaries).astype(values.dtype)
+    if is_integer and curve in _ENDING_AT_1:
+        values = scaled_to_1(values)
+    return encoded(values, curve), (saved.primaries, curve)
+
+
+def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
+    """Return linear floats (H, W, C), colours with a component above 1 divided by the largest one.
+
+    A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
+    problem", IEEE Transactions on Image Processing 12(12), 2003. A clip of each component makes
+    bright orange yellow, and cream white.
+    """
+    count = values.shape[2] - (values.shape[2] in (2, 4))
+    peak = values[:, :, :count].max(axis=2, keepdims=True)
+    is_over = np.isfinite(peak) & (peak > 1)
+    if not is_over.any():
+        return values
+    # (Half floats are divided as single ones, so that only the result is rounded, to levels.)
+    made = values.astype(np.result_type(values.dtype, np.float32))
+    made[:, :, :count] /= np.where(is_over, peak, values.dtype.type(1))
+    return made
+
+
+def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:
+    """Return linear colours (H, W, 3 or 4) of these primaries in those of Rec. 709."""
+    if primaries == "rec709":
+        return colours.astype(np.float32, copy=False)
+    oiio = import_extra("OpenImageIO", "images", "Converting colours")
+    return _between(oiio, colours, primaries, "rec709")
+
+
+def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
+    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
+
+    - `curve`: "none" and "linear" return the values themselves.
+    - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
+    """
+    if curve in ("none", "linear"):
+        return values
+    made = values.astype(np.float32)
+    colours = made[:, :, : made.shape[2] - (made.shape[2] in (2, 4))]
+    if curve == "srgb":
+        colours[:] = encode_srgb(colours)
+    elif curve in ENCODERS:
+        colours[:] = ENCODERS[curve](colours)
+    else:
+        colours[:] = np.maximum(colours, 0) ** np.float32(1 / 2.2)
+    return made
+
+
+def with_names(
+    oiio: ModuleType, attributes: Attributes, target: Path, what: tuple[str, str] | str
+) -> tuple[bool, Attributes]:
+    """Return attributes by which a file names its colours.
+
+    - `attributes`: Those that it gets anyway.
+    - `what`: Primaries and curve, or a display. ValueError: the format cannot name them.
+    - Returns: Whether the curve alone describes the colours, and the attributes.
+    """
+    if isinstance(what, str):
+        points, name, curve = _DISPLAYS.get(what), what, ""
+    else:
+        curve = what[1]
+        points, name = (_PRIMARY_POINTS[what[0]], _CURVE_POINTS[curve]), " and ".join(what)
+        if what[0] == "rec709" and curve in _PLAIN:
+            return True, attributes
+    writer = oiio.ImageOutput.create(target.name)
+    kind = writer.format_name()
+    # A profile of the source would name other colours.
+    kept = {name: value for name, value in attributes.items() if name != "ICCProfile"}
+    if kind == "openexr" and curve in ("linear", "none"):
+        numbers = oiio.TypeDesc("float[8]"), _CHROMATICITIES[what[0]]
+        return False, {**kept, "chromaticities": numbers}
+    if points is None:
+        known = ", ".join(_DISPLAYS)
+        raise ValueError(f"view: files cannot name the colours of {name}; take one of {known}")
+    if writer.supports("cicp"):
+        named: dict[str, tuple[Any, Any]] = {"CICP": (oiio.TypeDesc("int[4]"), (*points, 0, 1))}
+        if points != _DISPLAYS["sRGB - Display"]:
+            # Without a space, OpenImageIO adds chunks of sRGB. It has no name for some spaces.
+            named["oiio:ColorSpace"] = (oiio.TypeDesc("string"), "unknown")
+        return False, {**kept, **named}
+    if points == _DISPLAYS["sRGB - Display"]:
+        return False, kept
+    cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
+    raise ValueError(f"{target}: {kind} cannot name the colours {name}; {cure}")
+
+
+def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
+    """Return primaries and curve of a file's code points; None: one of them is not known."""
+    primaries = [name for name, point in _PRIMARY_POINTS.items() if point == points[0]]
+    curve = _READ_CURVES.get(points[1])
+    return (primaries[0], curve) if primaries and curve else None
+
+
+@functools.cache
+def _views(oiio: ModuleType) -> list[tuple[str, str]]:
+    """Return all displays with their views; listing them takes 70 ms."""
+    config = oiio.ColorConfig(_CONFIGURATION)
+    return [
+        (shown, one) for shown in config.getDisplayNames() for one in config.getViewNames(shown)
+    ]
+
+
+def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
+    """Return display and view of "VIEW", of the first display that has it, or "DISPLAY/VIEW"."""
+    for pair in _views(oiio):
+        if view in (pair[1], "/".join(pair)):
+            return pair
+    listed = ", ".join("/".join(pair) for pair in _views(oiio))
+    raise ValueError(f"view: {view!r} is not a view of OpenColorIO's configuration: {listed}")
+
+
+def _between(oiio: ModuleType, values: NDArray[Any], old: str, new: str) -> NDArray[np.float32]:
+    made = oiio.ImageBufAlgo.colorconvert(
+        _colours_of(oiio, values),
+        PRIMARIES[old],
+        PRIMARIES[new],
+        False,
+        colorconfig=_CONFIGURATION,
+    )
+    return _with_colours(values, made)
+
+
+def _colours_of(oiio: ModuleType, values: NDArray[Any]) -> Any:
+    return oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
+
+
+def _with_colours(values: NDArray[Any], colours: Any) -> NDArray[np.float32]:
+    if colours.has_error:
+        raise ValueError(" ".join(colours.geterror().split()))
+    made = values.astype(np.float32)
+    made[:, :, :3] = colours.get_pixels()
+    return made

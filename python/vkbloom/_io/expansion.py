@@ -1,0 +1,56 @@
+"""Expand the highlights of an image of integers, whose values end at 1, so that they can glow."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import as_float
+
+__all__ = ["KNEE", "PHOTO_EXPANSION", "check_expansion", "expanded"]
+
+#: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
+KNEE: Final = 0.8
+#: What the command line expands photographs to for the preset "photo".
+PHOTO_EXPANSION: Final = 4.0
+_LARGEST: Final = 1024.0
+
+
+def check_expansion(expand: float | None) -> float:
+    """Return the value that 1 becomes; None is 1."""
+    if expand is None:
+        return 1.0
+    value = as_float("expand", expand)
+    if not 1 <= value <= _LARGEST or math.isnan(value):
+        raise ValueError(f"expand: {expand!r} is out of range, 1 to {_LARGEST:g}")
+    return value
+
+
+def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
+    """Return an image whose highlights reach up to `expand`, with the hue of each pixel.
+
+    With m = max(r, g, b), limited to 1, the knee a and the expansion E:
+
+        m' = a + (m - a) / (1 - k (m - a)) for m > a, with k = 1 / (1 - a) - 1 / (E - a)
+
+    and the colour is multiplied by m' / m. It is the inverse of
+
+        m = a + (m' - a) / (1 + k (m' - a)),
+
+    which compresses a..E to a..1: Reinhard et al., "Photographic Tone Reproduction for Digital
+    Images", SIGGRAPH 2002, above a knee, where both have the slope 1.
+    """
+    limit = check_expansion(expand)
+    if limit == 1:
+        return image
+    colours = image[:, :, :3]
+    peak = np.clip(colours.max(axis=2, keepdims=True), KNEE, 1)
+    over = peak - image.dtype.type(KNEE)
+    steepness = 1 / (1 - KNEE) - 1 / (limit - KNEE)
+    factor = (KNEE + over / (1 - steepness * over)) / peak
+    found = image.copy()
+    found[:, :, :3] *= factor.astype(image.dtype)
+    return found

@@ -1,0 +1,484 @@
+"""Read image files, and decode them to the linear values that bloom is computed from."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from vkbloom._checks import import_extra
+from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
+from vkbloom._io.colour import LAB, linear
+from vkbloom._io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
+from vkbloom._io.displayed import has_hdr_curve, of_code_points
+from vkbloom._io.expansion import expanded
+from vkbloom._io.images import (
+    DTYPES,
+    SPACES,
+    Colour,
+    Picture,
+    StoredImage,
+    check_name,
+    complete,
+    failure_of,
+    is_kept,
+    warnings_of,
+)
+from vkbloom._io.png_gamma import png_gamma
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+__all__ = [
+    "check_plausible",
+    "chosen_part",
+    "decode",
+    "decode_file",
+    "describe",
+    "is_photograph",
+    "listed_parts",
+    "load",
+    "of_layer",
+    "opened",
+    "points_of",
+    "readable_extensions",
+    "size_of",
+    "specials_note",
+]
+
+_LARGEST_SIDE: Final = 65536
+# Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
+_LARGEST_AREA: Final = 1 << 28
+# Above this size in bytes, the pixels must be plausible for the size of the file. Deflate, which
+# PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
+_LARGE: Final = 1 << 28
+_LARGEST_RATIO: Final = 4096
+# OpenImageIO's names of channels of which a file does not say what they are.
+_UNNAMED: Final = re.compile(r"channel\d+\Z|\Z")
+# The code point of an unspecified curve.
+_UNSPECIFIED: Final = 2
+# The most parts that are listed. Some files have thousands, and each takes time.
+_MAX_PARTS: Final = 100
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
+    """Open an image file; the context closes it."""
+    oiio = import_extra("OpenImageIO", "images", purpose)
+    name = check_name(path)
+    # OpenImageIO reports missing and damaged files alike; this raises the system's own reason.
+    with open(name, "rb"):
+        pass
+    if name.lower().endswith(".npy"):
+        raise ValueError(
+            f"{name}: is a NumPy array, not an image; write it as one: "
+            f"vkbloom.write('image.exr', numpy.load({name!r}))"
+        )
+    # Otherwise OpenImageIO multiplies straight colours by alpha.
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    with padded(name) as file:
+        reader = oiio.ImageInput.open(file, plain)
+    reason = failure_of(oiio) if reader is None else ""
+    if _is_lab(reader, reason):
+        # libtiff converts to 8 bits without adapting the white of D50, or does not convert.
+        plain.attribute("oiio:RawColor", 1)
+        reader = oiio.ImageInput.open(name, plain)
+    if reader is None:
+        reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
+        raise ValueError(f"{name}: is not a readable image: {reason}")
+    try:
+        yield reader
+    finally:
+        failure_of(reader)
+        reader.close()
+
+
+def _is_lab(reader: OpenImageIO.ImageInput | None, reason: str) -> bool:
+    """Whether a file has L*, a* and b*, or may have; `reason`: why it cannot be opened."""
+    if reader is None:
+        return "PhotometricInterpretation" in reason
+    return reader.spec().get_string_attribute("tiff:ColorSpace") in LAB
+
+
+def readable_extensions() -> set[str]:
+    """Return the extensions of the formats that can be read, such as ".png"."""
+    oiio = import_extra("OpenImageIO", "images", "Reading images")
+    # "openexr:exr,sxr,mxr;png:png;..."
+    formats = oiio.get_string_attribute("input_format_list").split(",")
+    listed = oiio.get_string_attribute("extension_list").split(";")
+    pairs = (one.partition(":") for one in listed)
+    return {f".{word}" for name, _, words in pairs if name in formats for word in words.split(",")}
+
+
+def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
+    """Raise ValueError if a file is far too short for the pixels that its header claims."""
+    size = spec.image_bytes()
+    if size > max(_LARGE, _LARGEST_RATIO * os.path.getsize(path)):
+        raise ValueError(
+            f"{os.fspath(path)}: damaged: {os.path.getsize(path)} bytes cannot hold "
+            f"{spec.width} x {spec.height} pixels"
+        )
+
+
+def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = None) -> StoredImage:
+    """Read an image file."""
+    with opened(path, "Reading images") as reader:
+        return _read(reader, os.fspath(path), subimage, layer)
+
+
+def _read(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
+) -> StoredImage:
+    subimage, spec = chosen_part(reader, name, subimage, layer)
+    stored_as = str(spec.format)
+    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    left, top = min(spec.x, display[0]), min(spec.y, display[1])
+    width, height = _covered(spec)
+    dtype = DTYPES[stored_as]
+    wanted = stored_as if stored_as != "double" else "float"
+    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
+    notes = warnings_of(reader, name)
+    pixels = np.asarray(complete(data, reader, name), dtype).reshape(
+        spec.height, spec.width, spec.nchannels
+    )
+    pixels = in_order(pixels, reader.format_name(), name)
+    if pixels.shape[:2] != (height, width):
+        row, column = spec.y - top, spec.x - left
+        whole = np.zeros((height, width, spec.nchannels), dtype)
+        whole[row : row + spec.height, column : column + spec.width] = pixels
+        pixels = whole
+    described = describe(reader, name)
+    described = replace(described, pixels=pixels, notes=(*described.notes, *notes))
+    described = of_layer(described, spec, layer)
+    pixels = described.pixels
+    orientation = spec.get_int_attribute("Orientation", 1)
+    if orientation != 1:
+        x, y = display[0] - left, display[1] - top
+        pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
+        left, top = 0, 0
+        display = (0, 0, pixels.shape[1], pixels.shape[0])
+    return replace(
+        described,
+        pixels=np.ascontiguousarray(pixels),
+        origin=(left, top),
+        display=display,
+    )
+
+
+def chosen_part(
+    reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
+) -> tuple[int, OpenImageIO.ImageSpec]:
+    """Make the part to read the current one, and return its number and what it is."""
+    if layer is not None:
+        subimage = _part_with(reader, name, subimage, layer)
+    if subimage < 0 or not _seek(reader, subimage):
+        count = 0
+        while _seek(reader, count):
+            count += 1
+        raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
+    spec = reader.spec()
+    if spec.width < 1 or spec.height < 1:
+        more = f"; subimage {subimage + 1} is another" if _seek(reader, subimage + 1) else ""
+        raise ValueError(f"{name}: there are no pixels in this part of the file{more}")
+    spec.attribute(
+        "Orientation",
+        orientation_of(name, reader.format_name(), spec.getattribute("Orientation")),
+    )
+    if spec.deep or spec.depth > 1:
+        raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
+    if str(spec.format) not in DTYPES:
+        raise ValueError(
+            f"{name}: numbers of {spec.format} are not supported; use unsigned integers of 8 or 16 "
+            "bits, or floats"
+        )
+    width, height = _covered(spec)
+    if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
+        raise ValueError(
+            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
+            f"{_LARGEST_AREA} in all"
+        )
+    check_plausible(spec, name)
+    return subimage, spec
+
+
+def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the size of the area of the data window and the display window."""
+    right = max(spec.x + spec.width, spec.full_x + spec.full_width)
+    bottom = max(spec.y + spec.height, spec.full_y + spec.full_height)
+    return right - min(spec.x, spec.full_x), bottom - min(spec.y, spec.full_y)
+
+
+def size_of(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+    """Return the width and the height of what `load` returns, before it is turned."""
+    if spec.get_int_attribute("Orientation", 1) != 1:
+        return spec.full_width, spec.full_height
+    return _covered(spec)
+
+
+def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None) -> StoredImage:
+    """Return an image with a layer's channels alone, by their names in it; None: all."""
+    if layer is None:
+        return stored
+    own = [index for index, of in enumerate(_layers(spec)) if of == layer]
+    return replace(
+        stored,
+        pixels=stored.pixels[:, :, own],
+        channels=tuple(stored.channels[index].rpartition(".")[2] for index in own),
+        numbers=tuple(stored.numbers[index] for index in own),
+    )
+
+
+def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
+    """Return the description of a file's current part; this may change the current part."""
+    notes = warnings_of(reader, name)
+    spec = reader.spec()
+    space, gamma = _stated_curve(reader, spec, name)
+    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
+    points, known = spec.getattribute("CICP"), points_of(spec)
+    if points is not None and known is None and points[1] != _UNSPECIFIED:
+        listed = " ".join(map(str, points))
+        notes.append(f"the code points {listed} of its colours are not known, and are ignored")
+    # Before the reader goes to other parts.
+    found = StoredImage(
+        pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
+        channels=tuple(
+            "" if channel == "A" and meaning is Meaning.NONE else channel
+            for channel in channels_of(spec, kind)
+        ),
+        numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
+        origin=(spec.x, spec.y),
+        display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
+        associated=meaning is Meaning.MULTIPLIED,
+        space=space,
+        gamma=gamma,
+        attributes={
+            attribute.name: (attribute.type, attribute.value)
+            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
+            if is_kept(attribute.name)
+        },
+        profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
+        code_points=known,
+        is_ultra_hdr=_is_ultra_hdr(reader, spec),
+        notes=tuple(notes),
+    )
+    return replace(found, parts=tuple(_parts(reader)))
+
+
+def _late_attributes(kind: str, name: str) -> Iterator[Any]:
+    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
+    if kind != "png" or (exif := late_exif(name)) is None:
+        return
+    with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        file.write(exif)
+        file.flush()
+        # Damaged metadata do not matter to the pixels.
+        with suppress(ValueError), opened(file.name, "Reading images") as reader:
+            yield from reader.spec().extra_attribs
+
+
+def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
+    """Return the code points of a file's colours, if it has them and they are known."""
+    points = spec.getattribute("CICP")
+    if points is not None and spec.nchannels < 3:
+        # Grey has no primaries.
+        points = (1, *points[1:])
+    return None if points is None or of_code_points(points) is None else tuple(points)
+
+
+def _is_ultra_hdr(reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec) -> bool:
+    """Whether OpenImageIO applies the gain map of a JPEG file."""
+    return reader.format_name() == "jpeg" and str(spec.format) == "half"
+
+
+def is_photograph(reader: OpenImageIO.ImageInput) -> bool:
+    """Whether a file holds integers for SDR, if only in its base image."""
+    spec = reader.spec()
+    is_integer = str(spec.format) in ("uint8", "uint16") and not has_hdr_curve(points_of(spec))
+    return is_integer or _is_ultra_hdr(reader, spec)
+
+
+def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
+    """Make a part the current one, if there is such a part."""
+    is_there: bool = reader.seek_subimage(subimage, 0)
+    if not is_there:
+        # Some readers leave an error, which would be taken for damaged pixels.
+        failure_of(reader)
+    return is_there
+
+
+def _stated_curve(
+    reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec, name: str
+) -> tuple[str, float | None]:
+    """Return a file's colour space and exponent, if it states them."""
+    space = spec.get_string_attribute("oiio:ColorSpace")
+    if reader.format_name() != "png":
+        return space, spec.get_float_attribute("oiio:Gamma", 0.0) or None
+    gamma = png_gamma(name)
+    # OpenImageIO takes an exponent of 0, which PNG does not allow, as linear.
+    is_stated = gamma is not None or points_of(spec) is not None
+    return space if is_stated else SPACES["srgb"], gamma
+
+
+def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
+    """Return the layer of each channel: the prefix of its name, or else the name of the part."""
+    part = spec.get_string_attribute("oiio:subimagename")
+    return [name.rpartition(".")[0] or part for name in spec.channelnames]
+
+
+def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str) -> int:
+    """Return the first part, from `subimage` on, that has a layer."""
+    found: dict[str, None] = {}
+    for index in range(max(subimage, 0), subimage + _MAX_PARTS):
+        if not _seek(reader, index):
+            break
+        layers = _layers(reader.spec())
+        if layer in layers:
+            return index
+        found.update(dict.fromkeys(filter(None, layers)))
+    listed = f"its layers are {', '.join(found)}" if found else "it has no named layers"
+    raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
+
+
+def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
+    for index in range(_MAX_PARTS):
+        if not _seek(reader, index):
+            return
+        yield reader.spec().get_string_attribute("oiio:subimagename")
+
+
+def listed_parts(stored: StoredImage) -> str:
+    """Return the parts of a file in words."""
+    names = ", ".join(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
+    return f"parts {names}" if names else f"{len(stored.parts)} parts"
+
+
+def specials_note(nan: int, infinite: int) -> str | None:
+    """Return a note about values that are not finite; None: there are none."""
+    if not nan and not infinite:
+        return None
+    return (
+        f"has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, and stay in "
+        "the picture"
+    )
+
+
+def decode(
+    stored: StoredImage,
+    colour: Colour | None = None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
+) -> Picture:
+    """Decode a stored image to a picture of linear values.
+
+    - `colour`: The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's
+      built-in configuration, such as "ACEScg". Default: floats are linear; integers have the space
+      that the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
+    - `expand`: What highlights of integer files are expanded up to.
+    - Returns: float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer
+      files, or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor
+      divided by alpha.
+    """
+    if raw and colour is not None:
+        raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
+    chosen, left_out = _chosen_channels(stored.channels)
+    values = stored.pixels[:, :, chosen]
+    kinds = {stored.numbers[index] for index in chosen}
+    numbers = kinds.pop() if len(kinds) == 1 else "float"
+    if raw and numbers != "uint8":
+        raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
+    if numbers == "half":
+        # OpenImageIO reads all channels as float if one channel is float.
+        values = values.astype(np.float16, copy=False)
+    notes = [*stored.notes]
+    if left_out:
+        notes.append(f"left out the channels {', '.join(left_out)}")
+    grey = len(chosen) < 3
+    if grey:
+        values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
+    has_alpha = values.shape[2] == 4
+    taken_as = ""
+    if not raw:
+        if stored.associated and has_alpha and values.dtype.kind == "u":
+            # 16 bits hold the quotients of 8 bits.
+            scale = 65535 // np.iinfo(values.dtype).max
+            values = divided(values.astype(np.uint16) * np.uint16(scale))
+            stored = replace(stored, associated=False)
+        taken_as, values, said = linear(values, stored, colour)
+        notes += said
+        is_hdr = colour is None and has_hdr_curve(stored.code_points)
+        if numbers in ("uint8", "uint16") and not is_hdr:
+            values = expanded(values, expand)
+        stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
+    hidden = visible = 0.0
+    if has_alpha and not stored.associated:
+        hidden, visible = light_of(values)
+    return Picture(
+        pixels=np.ascontiguousarray(values),
+        encoding=None if raw else "linear",
+        numbers=numbers,
+        grey=grey,
+        stored=stored,
+        notes=tuple(notes),
+        colour=taken_as,
+        hidden=hidden,
+        visible=visible,
+    )
+
+
+def decode_file(
+    stored: StoredImage,
+    file: str,
+    colour: Colour | None,
+    *,
+    raw: bool = False,
+    expand: float | None = None,
+) -> Picture:
+    """Decode an image as `decode` does; a ValueError names the file."""
+    try:
+        return decode(stored, colour, raw=raw, expand=expand)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
+    """Return the indices of the colour and alpha channels, and the names of the other channels."""
+    layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
+    # If all channels have the same layer, its name is not needed.
+    plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
+    places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
+    alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
+    if {"R", "G", "B"} <= places.keys():
+        chosen = [places["R"], places["G"], places["B"], *alpha]
+    elif len([name for name in names if name and not _UNNAMED.match(name)]) == 1 + len(alpha):
+        grey = [index for index in range(len(names)) if index not in alpha]
+        chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]
+    elif len(layers) > 1:
+        raise ValueError(
+            f"the layers are {', '.join(filter(None, layers))}; name one as the layer to read"
+        )
+    else:
+        raise ValueError(
+            f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
+            "alpha"
+        )
+    return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
+
+
+def _attributes_of_linear(
+    stored: StoredImage, taken_as: str, colour: Colour | None
+) -> dict[str, tuple[Any, Any]]:
+    """Return the attributes without those that describe the colours before the conversion."""
+    lost = set()
+    if taken_as != "srgb":
+        lost.add("ICCProfile")
+    if colour not in (None, "linear", "srgb"):
+        lost.add("chromaticities")
+    return {name: value for name, value in stored.attributes.items() if name not in lost}

@@ -1,0 +1,401 @@
+"""Write pictures to image files, converted to a number type and channels of the format."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_index, import_extra
+from vkbloom._io import displayed, safe_writing
+from vkbloom._io.displayed import Saved
+from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, is_exr
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+__all__ = [
+    "BITS",
+    "as_numbers",
+    "check_bits",
+    "check_quality",
+    "check_writable",
+    "is_straight",
+    "put",
+    "save",
+]
+
+# Number types to write, in order of preference, by the number type of the picture. For floats
+# uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
+_PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {
+    "uint8": ("uint8", "float", "half", "uint16"),
+    "uint16": ("uint16", "float", "half", "uint8"),
+    "half": ("half", "float", "uint8", "uint16"),
+    "float": ("float", "half", "uint8", "uint16"),
+    "double": ("float", "half", "uint8", "uint16"),
+}
+# Those of files that hold linear light.
+_FLOATS: Final = ("half", "float", "double")
+# What HDR curves need, whatever the picture has.
+_DEEP: Final = ("uint16", "half", "float", "uint8")
+#: Number types to write, in order of preference, by the size of a number.
+BITS: Final[Mapping[int | None, tuple[str, ...]]] = {
+    8: ("uint8",),
+    16: ("uint16", "half"),
+    32: ("float",),
+}
+# OpenImageIO's names of the formats that have a quality, 1 to 100.
+_LOSSY: Final = ("jpeg", "webp", "jpegxl")
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Check that a file's extension belongs to a format that can be written."""
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    safe_writing.check_extension(oiio, Path(path).suffix)
+
+
+def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
+    """Check that a file's format has a quality of compression, if one is given.
+
+    `quality`: 1 to 100; None: the format's own.
+    """
+    if quality is None:
+        return
+    check_index("quality", quality, 1, 100)
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    kind = oiio.ImageOutput.create(f"image{Path(path).suffix}").format_name()
+    if kind not in _LOSSY:
+        raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
+
+
+def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
+    """Return whether readers of a file expect alpha, and colours that are not multiplied by it.
+
+    `is_associated`: Whether the picture has multiplied colours, which TIFF can record.
+    """
+    file = Path(path)
+    if is_exr(file) or (is_associated and file.suffix.lower() in (".tif", ".tiff")):
+        return False
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    return bool(oiio.ImageOutput.create(f"image{file.suffix}").supports("alpha"))
+
+
+def check_bits(path: str | os.PathLike[str], bits: int | None) -> None:
+    """Check that a file's format has numbers of a size, if one is given."""
+    if bits is None:
+        return
+    if bits not in BITS:
+        raise ValueError(f"bits: {bits!r} is not one of {', '.join(map(str, BITS))}")
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    with tempfile.TemporaryDirectory() as folder:
+        tried = Path(folder, f"image{Path(path).suffix}")
+        if not any(safe_writing.holds(oiio, tried, 3, numbers) for numbers in BITS[bits]):
+            kind = oiio.ImageOutput.create(tried.name).format_name()
+            raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
+
+
+def save(
+    picture: Picture,
+    path: str | os.PathLike[str],
+    saved: Saved | None = None,
+    attributes: Mapping[str, str] | None = None,
+    quality: int | None = None,
+    *,
+    bits: int | None = None,
+) -> tuple[str, ...]:
+    """Write a picture to a file, with its own number type or the closest one of the format.
+
+    Grey pictures are written with one channel if the format supports it, else as RGB. Data and
+    display windows are kept if the format has them, else pixels outside the display window are cut
+    off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
+
+    `saved`: The colours in the file, for linear pictures. With HDR curves, files of integers have
+    16 bits where the format has them.
+    `bits`: Size of a number. None: that of the picture, or the closest one of the format.
+    """
+    saved = saved or Saved()
+    if saved != Saved() and picture.encoding != "linear":
+        raise ValueError(
+            f"colour: {saved.view or saved.curve or saved.primaries!r} needs a linear picture; "
+            f"this one is {picture.encoding}"
+        )
+    displayed.check_saved(saved)
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    target = Path(path)
+    safe_writing.check_extension(oiio, target.suffix)
+    check_quality(target, quality)
+    added = {} if quality is None else {"CompressionQuality": quality}
+    with safe_writing.replacing(oiio, target, picture.values.nbytes) as temporary:
+        return _write(
+            oiio,
+            picture,
+            saved,
+            temporary,
+            target,
+            attributes={**(attributes or {}), **added},
+            bits=bits,
+        )
+
+
+def _write(
+    oiio: ModuleType,
+    picture: Picture,
+    saved: Saved,
+    temporary: Path,
+    target: Path,
+    *,
+    attributes: Mapping[str, str | int],
+    bits: int | None,
+) -> tuple[str, ...]:
+    picture = in_colour(picture, saved)
+    writer = oiio.ImageOutput.create(str(temporary))
+    is_hdr = displayed.is_hdr(saved)
+    layout = chosen_layout(oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits)
+    values, described, notes = prepared(oiio, picture, layout, saved, target)
+    put(oiio, values, described, temporary, target, attributes=attributes)
+    return notes
+
+
+def in_colour(picture: Picture, saved: Saved) -> Picture:
+    """Return a grey picture with three channels, where a view or other primaries need them."""
+    needs_three = saved.view is not None or saved.primaries != "rec709"
+    return dataclasses.replace(picture, grey=False) if needs_three else picture
+
+
+def prepared(
+    oiio: ModuleType,
+    picture: Picture,
+    layout: tuple[int, str],
+    saved: Saved,
+    target: Path,
+) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:
+    """Return the values to write in a layout, what describes them, and notes about losses."""
+    channels, numbers = layout
+    values = next(one for one in _layouts(picture, True) if one.shape[2] == channels)
+    integer = numbers.startswith("uint")
+    has_alpha = channels in (2, 4)
+    notes = _losses(picture, target, values, has_alpha, integer)
+    if picture.encoding is None:
+        return as_numbers(values, numbers), picture, tuple(notes)
+    what: tuple[str, str] | str = ("rec709", picture.encoding)
+    is_shown = saved.view is not None or displayed.is_hdr(saved)
+    if picture.encoding == "linear":
+        if integer and not is_shown and picture.numbers in _FLOATS and _is_above_1(picture.pixels):
+            notes.append(
+                f"{target} has integers: values above 1 are clipped; --tonemap aces or --view "
+                "keeps them apart"
+            )
+        if saved.view is not None and not integer:
+            raise ValueError(f"view: {target} has linear floats; write a file of integers")
+        curve = saved.curve or ("srgb" if integer else "linear")
+        values, what = displayed.converted(oiio, values, saved, curve, is_integer=integer)
+    try:
+        described = described_as(oiio, picture, target, what)
+    except ValueError as error:
+        if picture.encoding == "linear":
+            raise
+        # The settings made these colours, not the file's options.
+        described = dataclasses.replace(picture, encoding=None)
+        notes.append(str(error))
+    return as_numbers(values, numbers), described, tuple(notes)
+
+
+def _is_above_1(pixels: NDArray[Any]) -> bool:
+    """Whether colours are above 1, also after the rounding of half floats."""
+    colours = pixels[:, :, :3]
+    return bool((colours[np.isfinite(colours)] > 1.001).any())
+
+
+def described_as(
+    oiio: ModuleType, picture: Picture, target: Path, what: tuple[str, str] | str
+) -> Picture:
+    """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
+    is_plain, attributes = displayed.with_names(oiio, picture.stored.attributes, target, what)
+    stored = dataclasses.replace(picture.stored, attributes=attributes)
+    if is_plain:
+        curve: Any = None if what[1] == "none" else what[1]
+        return dataclasses.replace(picture, encoding=curve, stored=stored)
+    return dataclasses.replace(picture, encoding=None, stored=dataclasses.replace(stored, space=""))
+
+
+def put(
+    oiio: ModuleType,
+    values: NDArray[Any],
+    picture: Picture,
+    temporary: Path,
+    target: Path,
+    *,
+    attributes: Mapping[str, str | int],
+) -> None:
+    """Write values unchanged into a temporary file.
+
+    `values`: ndarray, shape (H, W, C); 1 to 4 channels of a dtype that the format supports.
+    """
+    writer = oiio.ImageOutput.create(str(temporary))
+    stored = picture.stored
+    x, y, width, height = stored.display
+    if not writer.supports("displaywindow"):
+        row, column = y - stored.origin[1], x - stored.origin[0]
+        values = values[row : row + height, column : column + width]
+    spec = spec_of(
+        oiio,
+        writer,
+        values.shape,
+        values.dtype,
+        picture=picture,
+        target=target,
+        attributes=attributes,
+    )
+    is_written = (
+        writer.open(str(temporary), spec)
+        and writer.write_image(np.ascontiguousarray(values))
+        and writer.close()
+    )
+    # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
+    is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
+    if not is_written:
+        raise safe_writing.write_error(writer, temporary, target)
+    # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
+    writer.geterror()
+
+
+def spec_of(
+    oiio: ModuleType,
+    writer: OpenImageIO.ImageOutput,
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any],
+    *,
+    picture: Picture,
+    target: Path,
+    attributes: Mapping[str, str | int],
+) -> OpenImageIO.ImageSpec:
+    """Return the description of a file with values of this shape and dtype, as for `put`."""
+    stored = picture.stored
+    height, width, channels = shape
+    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(width, height, channels, PIXEL_TYPES[dtype.name])
+    if channels < 3:
+        has_alpha = channels == 2
+        spec.channelnames = ("Y", "A")[:channels]
+        spec.alpha_channel = 1 if has_alpha else -1
+    if writer.supports("displaywindow"):
+        spec.x, spec.y = stored.origin
+        spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
+    _describe(spec, picture, writer.format_name(), target)
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    return spec
+
+
+def chosen_layout(
+    oiio: ModuleType,
+    picture: Picture,
+    writer: OpenImageIO.ImageOutput,
+    temporary: Path,
+    target: Path,
+    *,
+    is_hdr: bool,
+    bits: int | None,
+) -> tuple[int, str]:
+    """Return the closest number of channels and number type that the format supports.
+
+    `is_hdr`: The curve needs more than 8 bits.
+    `bits`: Size of a number, as for `save`.
+    """
+    wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
+    if bits is not None:
+        wanted = BITS[bits]
+    for values in _layouts(picture, safe_writing.has_alpha(writer)):
+        for numbers in wanted:
+            if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
+                return values.shape[2], numbers
+    raise ValueError(
+        f"{target}: {writer.format_name()} cannot hold this picture; use another format"
+    )
+
+
+def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
+    layouts = [picture.values, picture.pixels] if picture.grey else [picture.pixels]
+    if with_alpha:
+        yield from layouts
+    if picture.pixels.shape[2] == 4:
+        yield from (layout[:, :, :-1] for layout in layouts)
+    elif not with_alpha:
+        yield from layouts
+
+
+def _losses(
+    picture: Picture, target: Path, values: NDArray[Any], has_alpha: bool, integer: bool
+) -> list[str]:
+    """Return notes about information that the file loses or that readers interpret differently."""
+    notes: list[str] = []
+    is_float = values.dtype.kind == "f"
+    if picture.pixels.shape[2] == 4:
+        opaque = 1.0 if is_float else np.iinfo(values.dtype).max
+        is_opaque = bool((picture.pixels[:, :, 3] == opaque).all())
+        suffix = target.suffix.lower()
+        # A TIFF file records which of the two it has.
+        associated = (suffix == ".exr") if suffix not in (".tif", ".tiff") else None
+        if not has_alpha and not is_opaque:
+            notes.append(f"{target} cannot hold alpha, which is not 1 everywhere")
+        elif has_alpha and not is_opaque and associated is (not picture.stored.associated):
+            notes.append(
+                f"colours and alpha are written to {target} unchanged, but its readers expect "
+                f"colours {'' if associated else 'not '}multiplied by alpha"
+            )
+    if integer and is_float and not np.isfinite(values).all():
+        notes.append(f"{target} has integers: NaN is written as 0, infinity as 1")
+    return notes
+
+
+def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
+    """Return values as numbers of a file; for integers 1 becomes the largest value."""
+    dtype = DTYPES[numbers]
+    if values.dtype.kind == "u":
+        if values.dtype == dtype:
+            return values
+        values = values / np.float32(np.iinfo(values.dtype).max)
+    if dtype.kind == "f":
+        return values.astype(dtype, copy=False)
+    clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
+    integers: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    return integers
+
+
+def _describe(
+    spec: OpenImageIO.ImageSpec, picture: Picture, format_name: str, target: Path
+) -> None:
+    """Set the attributes that describe a file's colours, alpha and pixels."""
+    to_exr = is_exr(target)
+    stored, encoding = picture.stored, picture.encoding
+    # OpenImageIO has no names for PQ and HLG with the primaries of Rec. 709.
+    space = stored.space if encoding is None else SPACES.get(encoding, "")
+    # OpenEXR files are linear by definition, and another attribute has their primaries.
+    if space and not (to_exr and encoding == "linear"):
+        spec.attribute("oiio:ColorSpace", space)
+    # Otherwise OpenImageIO divides by alpha for formats with straight colours. TIFF can record
+    # either.
+    is_tiff = target.suffix.lower() in (".tif", ".tiff")
+    if not to_exr and not (is_tiff and stored.associated):
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+    is_jpeg = format_name == "jpeg"
+    if is_jpeg and spec.nchannels == 3:
+        # No subsampling of colours, unless the picture's attributes contain one.
+        spec.attribute("jpeg:subsampling", "4:4:4")
+    for name, (kind, value) in stored.attributes.items():
+        # A profile describes encoded colours, not those of a picture that was written linear.
+        if name == "ICCProfile" and encoding not in ("srgb", None):
+            continue
+        if name.startswith("jpeg:") and not is_jpeg:
+            continue
+        if isinstance(value, int):
+            # OpenImageIO's Python module sets integers of 32 bits; Exif has 16 (ISO, flash).
+            spec.attribute(name, value)
+        else:
+            spec.attribute(name, kind, value)

@@ -1,0 +1,296 @@
+"""Write image files safely: completely or not at all, in a format that keeps the values.
+
+A file is written to a temporary file beside it, which is renamed when it is complete:
+
+1. `check_extension` before anything is written
+2. `reserve` the temporary file; `holds` tests on it what the format supports
+3. write it; `write_error` converts a failure of OpenImageIO
+4. `check_complete`, then `put_in_place`
+5. `remove` the temporary file if it still exists
+
+`replacing` does steps 2, 4 and 5 for one file, and `writing` also closes a writer for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
+
+import numpy as np
+
+from vkbloom._io.containers import padded
+from vkbloom._io.images import check_name, failure_of
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+__all__ = [
+    "Steps",
+    "check_complete",
+    "check_extension",
+    "has_alpha",
+    "holds",
+    "is_stream",
+    "is_temporary",
+    "put_in_place",
+    "remove",
+    "replacing",
+    "reserve",
+    "write_error",
+    "write_file",
+    "writing",
+]
+
+#: A writer of OpenImageIO, its file, and a check of the results of its calls.
+Steps: TypeAlias = tuple[Any, Path, Callable[[bool], None]]
+
+# Formats of OpenImageIO that discard the picture or print it on the terminal.
+_FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
+
+# Formats that OpenImageIO has only where it is built with a library.
+_MISSING: Final = dict.fromkeys(
+    (".avif", ".heic", ".heif"), "libheif; PNG can name PQ, HLG and primaries, too"
+)
+
+_LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
+_READ_BYTES: Final = 64 << 20  # bytes read at a time
+_TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
+_TRIED: Final = 32  # pixels on a side that every format can have
+_ZEROS: Final = 1 << 20  # bytes written at a time
+
+# Temporary files of this process.
+_unfinished: set[Path] = set()
+
+
+def check_extension(oiio: ModuleType, suffix: str) -> None:
+    """Check that an extension belongs to a format that can be written."""
+    writer = oiio.ImageOutput.create(f"image{suffix}")
+    if writer is None:
+        oiio.geterror()
+    if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:
+        reason = _MISSING.get(suffix.lower())
+        raise ValueError(
+            f"path: {suffix!r} is not the extension of a writable image format"
+            + (f": this OpenImageIO is built without {reason}" if reason else "")
+        )
+
+
+def reserve(file: Path, size: int) -> Path:
+    """Create a temporary file beside a file, and allocate its disk space.
+
+    A failure here has the system's own reason, which OpenImageIO does not report. On a full disk,
+    OpenImageIO's JPEG writer would end the process, and its WebP writer would not return.
+
+    `size`: Bytes of the pixels.
+    """
+    return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
+
+
+def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
+    """Return whether a format keeps alpha. OpenImageIO says so of GIF, and writes it opaque."""
+    return writer.supports("alpha") != 0 and writer.format_name() != "gif"
+
+
+def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
+    """Return whether a format supports a number of channels and a number type.
+
+    OpenImageIO knows this only for a complete file: a small one is written and opened again.
+    """
+    spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
+    writer = oiio.ImageOutput.create(str(temporary))
+    is_kept = False
+    if writer.open(str(temporary), spec):
+        opened = writer.spec()
+        is_written = writer.write_image(np.zeros((_TRIED, _TRIED, channels), np.float32))
+        is_written = writer.close() and is_written
+        is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
+    # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
+    writer.geterror()
+    if is_kept:
+        reader = oiio.ImageInput.open(str(temporary))
+        # FITS takes halves for another type. OpenImageIO needs 128 bytes of JPEG XL.
+        is_kept = reader is None or str(reader.spec().format) == numbers
+        failure_of(oiio)
+    return is_kept
+
+
+def write_error(writer: OpenImageIO.ImageOutput, temporary: Path, file: Path) -> OSError:
+    """Convert a writer's error to an exception."""
+    reason = failure_of(writer).replace(str(temporary), file.name) or "not written"
+    return OSError(errno.EIO, reason, str(file))
+
+
+def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
+    """Check a written file by reading it: some writers (PNG, Targa) do not notice a full disk."""
+    reason = _unreadable(oiio, temporary)
+    if reason is None:
+        return
+    reason = reason.replace(str(temporary), file.name)
+    if shutil.disk_usage(temporary.parent).free < _LARGEST_HEADER:
+        raise OSError(errno.ENOSPC, f"not written completely: {reason}", str(file))
+    # Some formats cannot hold a few pixels, or OpenImageIO cannot read such files.
+    raise OSError(
+        errno.EIO, f"cannot be read after writing: {reason}; try another format", str(file)
+    )
+
+
+def put_in_place(temporary: Path, file: Path) -> None:
+    """Rename a temporary file to its final name, with the permissions of the file it replaces.
+
+    The content is written to a pipe or a device, which is not replaced.
+    """
+    target = _link_target(file)
+    if is_stream(target):
+        try:
+            with temporary.open("rb") as content, file.open("wb") as stream:
+                shutil.copyfileobj(content, stream)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        temporary.unlink()
+        return
+    with contextlib.suppress(OSError):
+        shutil.copymode(target, temporary)
+    try:
+        temporary.replace(target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+@contextlib.contextmanager
+def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
+    """Yield a temporary file to be written in place of a file.
+
+    At the end of the block it is checked and renamed. If the block raises, it is removed.
+    """
+    temporary = reserve(file, size)
+    try:
+        yield temporary
+        check_complete(oiio, temporary, file)
+        put_in_place(temporary, file)
+    finally:
+        remove(temporary)
+
+
+@contextlib.contextmanager
+def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
+    """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it."""
+    with replacing(oiio, file, 0) as temporary:
+        writer: Any = oiio.ImageOutput.create(str(temporary))
+
+        def check(done: bool) -> None:
+            if not done:
+                raise write_error(writer, temporary, file)
+
+        try:
+            yield writer, temporary, check
+            check(writer.close())
+        finally:
+            # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
+            writer.geterror()
+
+
+def write_file(file: Path, content: bytes) -> None:
+    """Write a file atomically."""
+    temporary = _filled(file, lambda stream: stream.write(content))
+    try:
+        put_in_place(temporary, file)
+    finally:
+        remove(temporary)
+
+
+def remove(*files: Path) -> None:
+    """Remove temporary files that still exist; without arguments, all of this process."""
+    for temporary in files or [*_unfinished]:
+        temporary.unlink(missing_ok=True)
+        _unfinished.discard(temporary)
+
+
+def is_stream(path: str | os.PathLike[str]) -> bool:
+    """Return whether a name is that of a pipe, a socket or a device."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def is_temporary(path: Path) -> bool:
+    """Return whether a file is one that a process writes before it is renamed."""
+    return path.name.startswith(_TEMPORARY)
+
+
+def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
+    """Create a temporary file beside a file and fill it; remove it if that fails."""
+    check_name(file)
+    target = _link_target(file)
+    folder = Path(tempfile.gettempdir()) if is_stream(target) else target.parent
+    temporary = folder / f"{_TEMPORARY}{os.urandom(8).hex()}{file.suffix}"
+    _unfinished.add(temporary)
+    try:
+        with temporary.open("xb") as stream:
+            fill(stream)
+    except BaseException as error:
+        # BaseException includes Ctrl-C, which may arrive while a large file is written.
+        with contextlib.suppress(OSError):
+            remove(temporary)
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror, str(file)) from error
+        raise
+    return temporary
+
+
+def _allocate(stream: BinaryIO, size: int) -> None:
+    """Allocate disk space for a new file; write zeros if the system cannot allocate."""
+    if hasattr(os, "posix_fallocate"):
+        try:
+            os.posix_fallocate(stream.fileno(), 0, size)
+            return
+        except OSError as error:
+            # musl's error if the file system cannot allocate; glibc writes zeros itself.
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                raise
+    for start in range(0, size, _ZEROS):
+        stream.write(bytes(min(_ZEROS, size - start)))
+
+
+def _link_target(file: Path) -> Path:
+    """Follow symbolic links: the file they point to is written, and the link is kept."""
+    try:
+        return Path(os.path.realpath(file))
+    except OSError as error:
+        # The current folder has been removed.
+        raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+def _unreadable(oiio: ModuleType, file: Path) -> str | None:
+    """Return why a file cannot be read; None: it can."""
+    with padded(file) as name:
+        reader = oiio.ImageInput.open(name)
+    if reader is None:
+        return failure_of(oiio) or "unknown format"
+    spec = reader.spec()
+    # Some rows at a time, so that large files are not completely in memory.
+    rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
+    place, bottom = (0, 0), spec.y + spec.height
+    readable = (
+        reader.read_image(*place, 0, spec.nchannels, spec.format) is not None
+        if spec.tile_width
+        else all(
+            reader.read_scanlines(
+                *place, y, min(y + rows, bottom), 0, 0, spec.nchannels, spec.format
+            )
+            is not None
+            for y in range(spec.y, bottom, rows)
+        )
+    )
+    reason = failure_of(reader) or "the pixels are missing"
+    reader.close()
+    return None if readable else reason

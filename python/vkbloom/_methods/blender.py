@@ -1,0 +1,184 @@
+"""The Glare node of Blender's compositor."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_floats, check_number
+from vkbloom._core_kernel import CoreKernel
+from vkbloom._methods.blender_kernels import core_kernel_of, kernel_of, kernel_sides
+from vkbloom._methods.convolution import PSFLike, read_psf
+from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
+Quality = Literal["high", "medium", "low"]
+Version = Literal["5.0", "4.3"]
+
+
+def _read_tint(tint: Any) -> tuple[float, ...]:
+    return _read_numbers("tint", tint, 3, 65504.0)
+
+
+def _read_position(position: Any) -> tuple[float, ...]:
+    return _read_numbers("sun_position", position, 2, 16.0)
+
+
+def _read_numbers(name: str, values: Sequence[float], count: int, most: float) -> tuple[float, ...]:
+    numbers = check_floats(name, values)
+    if len(numbers) != count:
+        raise ValueError(f"{name}: {numbers!r} is not {count} numbers")
+    for number in numbers:
+        check_number(name, number, 0 if count == 3 else -most, most)
+    return numbers
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BlenderGlare(Settings):
+    """The Glare node of Blender 5.0, as its compositor runs it on a CPU.
+
+    ``glow`` is the node's output Highlights, `intensity` times ``bloom`` its Glare, ``final`` its
+    Image.
+
+    Parameters
+    ----------
+    type : {"bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"}
+        What is made of the highlights.
+    quality : {"high", "medium", "low"}
+        The glare is computed from the frame's size, half or a quarter of it, rounded up.
+    threshold : float or None
+        Brightest channel from which a colour glows.
+    smoothness : float
+        Width of the soft parts of the threshold and of the maximum, 0 to 1.
+    maximum : float or None
+        Largest brightness above the threshold, 0 to 65504. None: no limit.
+    composite : {"add"}
+        max(0, image) + glare.
+    intensity : float
+        The node's strength, 0 to 1.
+    saturation : float
+        Factor of the glare's saturation, 0 to 16.
+    tint : (float, float, float)
+        Factors of the glare's channels, 0 to 65504.
+    size : float
+        Size of "bloom", "fog_glow" and "sun_beams" as a share of the frame, 0 to 1.
+    streaks : int
+        Number of streaks, 1 to 16.
+    streaks_angle : float
+        Angle of the first streak in degrees, -360 to 360. A streak's light is on the side opposite
+        to its angle, so that one of 0 is to the left of a light.
+    iterations : int
+        Length of "streaks" and "simple_star", and number of "ghosts", 2 to 5.
+    fade : float
+        What a streak or a star keeps with the distance, 0.75 to 1.
+    color_modulation : float
+        Strength of the colours of "streaks" and "ghosts", 0 to 1.
+    diagonal : bool
+        Whether the rays of "simple_star" are diagonals.
+    sun_position : (float, float)
+        Source of "sun_beams" as shares of the sides from the lower left, -16 to 16.
+    jitter : float
+        Share of the samples of "sun_beams" that is left out, 0 to 1. The others are at random.
+    kernel : PSF, array-like, shape (h, w) or (h, w, 3), or None
+        The image of "kernel", in pixels of the glare; None: a point. The glare of a point is the
+        image turned by 180 degrees, as in Blender.
+    version : {"5.0", "4.3"}
+        "4.3" has the kernel that "fog_glow" had before Blender 4.4.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    See Also
+    --------
+    presets : "blender_bloom" and the others.
+    Streaks, Ghosts : The same rays with any bloom.
+
+    Notes
+    -----
+    All types start from the highlights. In "medium" and "low" a pixel of these is the mean of 2 x 2
+    or 4 x 4 pixels, rows counted from the bottom, the last repeated. With v the brightest channel
+    of a colour c, the highlight is c (v' - threshold) / v, or 0 if v <= 0, with
+    v' = smooth_min(smooth_max(v, threshold), threshold + maximum). smooth_min(a, b) is
+    min(a, b) - h^2 k / 4 with h = max(1 - abs(a - b) / k, 0), and smooth_max is its mirror image. k
+    is the smoothness, but not more than the distance of the end from 0 and from the other end.
+
+    - "bloom": n = floor(log2(size * shorter side)) levels, at least one. Each has half the size of
+      the one before, floored, by the 13 taps of `Pyramid`. For ``down_1``, the four taps of each
+      group are weighted by 1 / (1 + brightest channel). up_k = down_k + tent(up_k+1) with a tent of
+      one pixel of the larger level, and the glare is up_0 / n.
+    - "streaks": iteration i of a ray is (t_0 + f t_1 + f^2 t_2 + f^3 t_3) / 2 with taps 4^i pixels
+      apart and f = fade^(4^i). Two channels of each but t_0 are multiplied by
+      1 - color_modulation^(i + 1). The sum of the rays is divided by 6 - iterations.
+    - "ghosts": the highlights are blurred by Gaussians of a radius of 16 and 32 pixels (a third of
+      it is the standard deviation), scaled by 2.13 and -0.97 and added up. Each of the iterations
+      but one adds four scaled images of the sum so far.
+    - "fog_glow": the convolution with Spencer's function of daylight, for a field of view of
+      180 - 170 size^(1/3) degrees over the longer side. The kernel's sum over all places of
+      Blender's Fourier transform is 1.
+    - "simple_star": along two lines, iteration i replaces each pixel in turn by
+      (1 - fade) c + fade (p + n) / 2 with the pixels p and n that are i places before and after it,
+      forwards from the left and from below, then backwards.
+    - "sun_beams": the mean of the pixels towards the sun, at most size times the diagonal, with
+      the weights (1 - place / number)^2.
+    - "kernel": the convolution with an image, each channel divided by its sum.
+
+    The glare is enlarged bilinearly. Its saturation s = (max - min) / max becomes
+    clamp(saturation * s, 0, 1), so that a negative channel becomes 0, and it is multiplied by the
+    tint.
+
+    Source: the formulas of the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
+    node_composite_glare.cc, confirmed by Blender 5.0.1 (``docs/engines.md``).
+
+    Examples
+    --------
+    >>> vkbloom.BlenderGlare(size=0.25).size
+    0.25
+    >>> vkbloom.BlenderGlare(type="streaks", streaks=6, streaks_angle=15).streaks
+    6
+    """
+
+    method: ClassVar[str] = "blender"
+    published: ClassVar[bool] = True
+    #: `glow` is the node's output Highlights.
+    glow_note: ClassVar[str] = ""
+
+    threshold: float | None = 1.0
+    knee: float = no_knee("blender")
+    composite: Composite = choice_field("composite", ("add",))
+    intensity: float = number_field("intensity", range=(0, 1))
+    format: BloomFormat | None = "rgba16float"
+    # On the command line, --size is the size of a frame, --version the program's, and --streaks a
+    # stage of glare.
+    type: GlareType = choice_field("type", option="glare-type")
+    quality: Quality = choice_field("quality", option="glare-quality")
+    smoothness: float = number_field("smoothness")
+    maximum: float | None = number_field("maximum", default=None, slider=(0, 20))
+    saturation: float = number_field("saturation", slider=(0, 1))
+    tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
+    size: float = number_field("size", option="glare-size")
+    streaks: int = number_field("streaks", option="glare-streaks")
+    streaks_angle: float = number_field("streaks_angle", unit="degree")
+    iterations: int = number_field("iterations", default=3, range=(2, 5))
+    fade: float = number_field("fade")
+    color_modulation: float = number_field("color_modulation")
+    diagonal: bool = flag_field("diagonal")
+    sun_position: tuple[float, ...] = value_field((0.5, 0.5), read=_read_position)
+    jitter: float = number_field("jitter")
+    kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
+    version: Version = choice_field("version", ("5.0", "4.3"), option="blender-version")
+
+    def kernel_pixels(self, buffers: tuple[int, int]) -> NDArray[np.float64]:
+        """Return the kernel of fog glow or of an image, (h, w, 3), with its point in the middle."""
+        return kernel_of(self, buffers)
+
+    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
+        """Return the kernel as the core reads it."""
+        return core_kernel_of(self, buffers)
+
+    def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
+        """Return the kernel's width and height, without the kernel."""
+        return kernel_sides(self, buffers)

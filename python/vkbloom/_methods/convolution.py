@@ -1,0 +1,201 @@
+"""Bloom by convolution with a point-spread function."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vkbloom._array_cache import kept
+from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.settings import Settings
+from vkbloom.psf import _kernel_cache as kernel_cache
+from vkbloom.psf._base import PSF
+from vkbloom.psf._eye import spencer
+from vkbloom.psf._resampling import box_resample
+from vkbloom.psf._sampled import samples
+
+__all__ = ["Boundary", "Convolution", "PSFLike", "read_psf"]
+
+Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
+#: The types of a kernel: a function, the result of its `to_dict`, or an array.
+PSFLike = PSF | Mapping[str, Any] | ArrayLike
+
+
+def read_psf(psf: Any) -> PSF:
+    """Return a point-spread function, also of a stored one or an array."""
+    if isinstance(psf, PSF):
+        return psf
+    if isinstance(psf, Mapping):
+        return PSF.from_dict(psf)
+    if isinstance(psf, str):
+        raise TypeError(
+            f"psf: {psf!r} is not a function or an array; call one of vkbloom.psf, such as "
+            "vkbloom.psf.spencer()"
+        )
+    try:
+        return samples(psf)
+    except (TypeError, ValueError) as error:
+        raise type(error)(str(error).replace("values:", "psf:", 1)) from None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Convolution(Settings):
+    """A convolution with a point-spread function, by Fourier transforms.
+
+    Parameters
+    ----------
+    psf : PSF, or array-like, shape (h, w) or (h, w, 3)
+        The point-spread function; by default `vkbloom.psf.spencer`. An array is copied to float32
+        and becomes a `vkbloom.psf.samples`. Its point is at [h // 2, w // 2].
+    normalize : bool
+        Whether each channel of the kernel is divided by its sum.
+    boundary : {"zero", "edge", "wrap", "wrap_x"}
+        The texels outside of the bloom buffers. "zero": black. "edge": the nearest texel. "wrap":
+        the buffers are repeated. "wrap_x": repeated along x and "edge" along y, for panoramas.
+    pixels_per_degree : float or None
+        Scale of functions whose unit is "degree". None: the frame's longer side spans 50 degrees.
+    kernel_size : (int, int) or None
+        Width and height of the kernel in pixels of ``final``. None: the own size of an array;
+        otherwise (2 W - 1, 2 H - 1) for a frame of W x H, so that the light of every pixel reaches
+        every other pixel.
+    **settings
+        The fields of `Settings`.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range. `Renderer.plan` and its callers raise it if `normalize` is
+        True and the sum of a channel is not above 0.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    vkbloom.psf : The point-spread functions.
+    Pyramid : A wide blur that takes less time.
+
+    Notes
+    -----
+    bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. The framebuffer
+    ``kernel`` is K in pixels of the bloom buffers. If these have another size than the frame, K is
+    resampled by area. The computation uses single floats for every format of the bloom buffers.
+    Values are limited to -1e28..1e28.
+
+    Examples
+    --------
+    >>> image = np.zeros((9, 9, 3), np.float32)
+    >>> image[4, 4] = 1
+    >>> cross = [[0, 1, 0], [1, 4, 1], [0, 1, 0]]
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Convolution(cross))
+    >>> list(frames)
+    ['glow', 'kernel', 'bloom', 'final']
+    >>> frames["bloom"][4, 3:6, 0].round(3)
+    array([0.125, 0.5  , 0.125], dtype=float32)
+    """
+
+    method: ClassVar[str] = "convolution"
+
+    psf: PSFLike = dataclasses.field(
+        default=spencer(), kw_only=False, metadata={"kind": "psf", "read": read_psf}
+    )
+    normalize: bool = True
+    boundary: Boundary = choice_field("boundary")
+    pixels_per_degree: float | None = number_field(default=None, range=(0, math.inf))
+    kernel_size: tuple[int, int] | None = None
+
+    @property
+    def prefilter(self) -> tuple[float, float, float]:
+        """min, max and mult of the prefilter of `vkbloom.psf.unreal`.
+
+        Before the convolution, a luminance L above min becomes min(mult (L - min) + min, max).
+        There is no prefilter if min is above max.
+        """
+        none = (1.0, 0.0, 1.0)
+        return cast("tuple[float, float, float]", getattr(self.psf, "prefilter", none))
+
+    def kernel(
+        self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the kernel for a frame.
+
+        Parameters
+        ----------
+        frame : (int, int)
+            Width and height of ``final``.
+        buffers : (int, int), optional
+            Width and height of the bloom buffers. Default: the frame's.
+
+        Returns
+        -------
+        ndarray of float64, shape (h, w, 3)
+            The kernel in pixels of the bloom buffers.
+
+        Raises
+        ------
+        ValueError
+            A channel's sum is not above 0, and `normalize` is True.
+        """
+        return _kernel(self._shape, frame, buffers or frame)
+
+    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
+        """Return the kernel as the core reads it."""
+        return _core_kernel(self._shape, frame, buffers)._replace(prefilter=self.prefilter)
+
+    def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
+        """Return estimates of the kernel's width and height, without the kernel."""
+        sides = self.kernel_size or tuple(2 * side - 1 for side in frame)
+        if self.kernel_size is None and isinstance(self.psf, samples):
+            height, width = np.shape(self.psf.values.array)[:2]
+            sides = width, height
+        width, height = (
+            max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
+        )
+        return width, height
+
+    @property
+    def _shape(self) -> Convolution:
+        """The settings with defaults in the fields that do not change the kernel."""
+        return Convolution(
+            self.psf,
+            normalize=self.normalize,
+            pixels_per_degree=self.pixels_per_degree,
+            kernel_size=self.kernel_size,
+        )
+
+
+def _kernel(
+    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
+) -> NDArray[np.float64]:
+    kernel = cast("PSF", settings.psf).kernel(
+        frame, settings.kernel_size, settings.pixels_per_degree
+    )
+    if buffers != frame:
+        scale = buffers[1] / frame[1], buffers[0] / frame[0]
+        kernel = box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)
+    if settings.normalize:
+        sums = kernel.sum(axis=(0, 1))
+        for name, total in zip(("red", "green", "blue"), sums, strict=True):
+            if not total > 0:
+                raise ValueError(
+                    f"psf: the sum of its {name} is {total:g}, not above 0; use normalize=False"
+                )
+        kernel = kernel / sums
+    return kernel
+
+
+@kept
+def _core_kernel(
+    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
+) -> CoreKernel:
+    what = settings.psf, settings.normalize, settings.pixels_per_degree, settings.kernel_size
+    return kernel_cache.find_or_make(
+        ("convolution", *what, frame, buffers),
+        lambda: core_kernel(_kernel(settings, frame, buffers)),
+    )

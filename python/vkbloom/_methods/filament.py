@@ -1,0 +1,70 @@
+"""Filament's bloom."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FilamentBloom(Settings):
+    """Filament's bloom at its low quality, the default one.
+
+    Parameters
+    ----------
+    resolution : int
+        Height of ``down_0`` before it is floored to a multiple of 16, 16 to 2048.
+    levels : int
+        Number of levels, 1 to 12; at most floor(log2(resolution)) + 1.
+    highlight : float
+        Brightness towards which bright colours are compressed, 10 to 65504. Used only with a
+        threshold.
+    threshold : float or None
+        Filament's is 1 or off. With a threshold, fireflies are filtered, too.
+    composite : {"add"}
+    intensity : float
+        Filament's strength, 0 to 1.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    See Also
+    --------
+    presets : "filament".
+
+    Notes
+    -----
+    The width of ``down_0`` follows from the aspect of the frame, floored to a multiple of 16, at
+    most 16384 or the adapter's limit. While ``down_0`` is less than half of the frame in width or
+    height, the frame is halved first. All
+    these steps are a bilinear sample of the image convolved with (1 2 1)^2 / 16. The first one
+    includes the threshold: its four bilinear taps are weighted by 1 / (1 + brightest channel);
+    then c = max(0, c - threshold); then c / (1 + brightest channel of c / highlight). Each further
+    level has half the size, floored, by 3 x 3 taps 1.761629 texels apart, the outer ones with a
+    weight of 7.46602 / 32 along an axis. If a side of the level above is odd, it is reduced by the
+    13 taps of `Pyramid`. up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level;
+    ``bloom`` is one bilinear sample of up_0, divided by the number of levels.
+
+    Source: google/filament: bloomDownsample2x.mat @ 9f62dc2f2f53, bloomDownsample9.mat and
+    bloomDownsample.mat @ 523a261b1052, bloomUpsample.mat @ 9f62dc2f2f53,
+    filament/src/PostProcessManager.cpp @ 003e5005713c, include/filament/Options.h @ 2fac13e154fb.
+
+    Examples
+    --------
+    >>> vkbloom.FilamentBloom(levels=7).threshold
+    1.0
+    """
+
+    method: ClassVar[str] = "filament"
+    published: ClassVar[bool] = True
+
+    threshold: float | None = 1.0
+    knee: float = no_knee("filament")
+    composite: Composite = choice_field("composite", ("add",))
+    intensity: float = number_field("intensity", default=0.1, range=(0, 1))
+    format: BloomFormat | None = "rgba16float"
+    levels: int = number_field("levels", range=(1, 12))
+    resolution: int = number_field("resolution", unit="pixel", slider=(16, 1024))
+    highlight: float = number_field("highlight", slider=(10, 5000))

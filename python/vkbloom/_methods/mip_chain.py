@@ -1,0 +1,141 @@
+"""Chains of levels: the pyramid, whose levels are added, and dual Kawase."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import ClassVar
+
+from vkbloom._checks import check_floats
+from vkbloom._settings.fields import flag_field, number_field
+from vkbloom._settings.settings import Settings
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Pyramid(Settings):
+    """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
+
+    Parameters
+    ----------
+    levels : int
+        Number of levels, 1 to 16. ``down_0`` has half of the bloom size, each next level half of
+        the previous one, floored and at least 1. The chain ends before a level of 1 x 1, unless
+        that is the first.
+    radius : float
+        Distance of the tent's taps in texels of the smaller level, 0 to 16.
+    firefly_filter : bool
+        In the first downsample the five 2 x 2 groups are weighted by 1 / (1 + luminance of the
+        group's mean) and renormalized.
+    level_weights : sequence of float or None
+        As many finite numbers w_0, w_1, ... as `levels`; they may be negative. If the chain ends
+        early, only the first ones are used. None: the mean of the levels.
+    scale_x, scale_y : float
+        Factors of the distances of all taps, 0 to 16. scale_x=4 stretches the bloom along x, as an
+        anamorphic lens does.
+    **settings
+        The fields of `Settings`.
+
+    See Also
+    --------
+    DualKawase : A chain without additions.
+    BevyBloom, KinoBloom, FilamentBloom, UrpBloom, HdrpBloom : Pyramids of engines.
+
+    Notes
+    -----
+    Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
+    2 texels away 0.0625 each; four diagonals 2 texels away 0.03125 each. Upsample: (1 2 1)^2 / 16,
+    up_k = down_k + tent(up_k+1). ``bloom`` is tent(up_0) at every pixel of ``final``, divided by
+    the number of levels, so that a flat image keeps its value. In "rgba8unorm", whose largest value
+    is 1, the images up_k hold the mean of their levels instead of the sum; the bloom is the same.
+
+    With weights up_k = w_k down_k + tent(up_k+1), where the smallest level is w_N-1 down_N-1, and
+    ``bloom`` = tent(up_0) is not divided: a flat image becomes the sum of the weights. In
+    "rgba8unorm" up_k is divided by the sum of the weights' sizes, ``|w_k|`` + ... + ``|w_N-1|``.
+
+    The taps are whole texels apart. If a side of the bloom buffers is odd, they skip texels in the
+    middle of ``down_0``: a pixel of light there loses nearly all of its bloom, and a small moving
+    light flickers. An even `bloom_size`, such as the next larger one, avoids this.
+
+    Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
+    SIGGRAPH 2014.
+
+    Examples
+    --------
+    >>> image = np.zeros((32, 32, 3), np.float16)
+    >>> image[16, 16] = 100
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=3, composite="mix"))
+    >>> list(frames)
+    ['glow', 'down_0', 'down_1', 'down_2', 'up_1', 'up_0', 'bloom', 'final']
+    >>> frames["down_2"].shape
+    (4, 4, 4)
+    """
+
+    method: ClassVar[str] = "pyramid"
+
+    levels: int = number_field("levels", slider=(1, 10))
+    radius: float = number_field("radius", unit="texel", slider=(0, 4))
+    firefly_filter: bool = flag_field("firefly_filter")
+    level_weights: tuple[float, ...] | None = None
+    scale_x: float = number_field("scale_x", slider=(0, 8))
+    scale_y: float = number_field("scale_y", slider=(0, 8))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.level_weights is not None:
+            weights = check_level_weights(self.level_weights, self.levels)
+            object.__setattr__(self, "level_weights", weights)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DualKawase(Settings):
+    """A chain of halved images: downsampled with 5 taps, upsampled with 8, nothing added.
+
+    Parameters
+    ----------
+    levels : int
+        Number of levels, 1 to 16; their sizes are those of `Pyramid`.
+    offset : float
+        Factor of the distances of all taps, 0 to 16.
+    **settings
+        The fields of `Settings`.
+
+    See Also
+    --------
+    Pyramid : A chain whose levels are added.
+
+    Notes
+    -----
+    Downsample: (4 c + the four diagonals at half a texel of the source) / 8. Upsample: (the four
+    axials at one texel of the smaller level + 2 times the four diagonals at half a texel of it)
+    / 12.
+
+    The diagonals of `offset` 1 cover all texels only if each side of the image is twice that of the
+    level. Otherwise they skip some, and a small moving light flickers. A `bloom_size` whose sides
+    are multiples of 2^levels avoids this.
+
+    Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
+
+    Examples
+    --------
+    >>> image = np.full((16, 16, 3), 0.25, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.DualKawase(levels=2))
+    >>> bool(np.allclose(frames["bloom"][..., :3], 0.25, atol=1e-5))
+    True
+    """
+
+    method: ClassVar[str] = "dual_kawase"
+
+    levels: int = number_field("levels", default=4, slider=(1, 10))
+    offset: float = number_field("offset", slider=(0, 8))
+
+
+def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:
+    """Return the weights as floats; TypeError or ValueError unless they are `count` numbers."""
+    numbers = check_floats("level_weights", weights)
+    if len(numbers) != count:
+        raise ValueError(
+            f"level_weights: {len(numbers)} weights are out of range, {count}, one for each level"
+        )
+    return numbers

@@ -1,0 +1,65 @@
+"""The bloom of pygfx."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PygfxBloom(Settings):
+    """The PhysicalBasedBloomPass of pygfx.
+
+    Parameters
+    ----------
+    levels : int
+        Number of levels, 1 to 16; at most floor(log2(longer side of down_0)) + 1.
+    filter_radius : float
+        Distance of the tent's taps as a share of the width, 0 to 1.
+    karis_average : bool
+        Whether ``down_0`` is the mean of the five groups, weighted by 1 / (1 + luminance) only. A
+        luminance may be negative; a mean that is not finite is 0.
+    threshold : None
+        pygfx has none.
+    composite : {"mix"}
+    intensity : float
+        The strength of pygfx, 0 to 1.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    See Also
+    --------
+    presets : "pygfx".
+
+    Notes
+    -----
+    ``down_0`` has half the size of the frame, each next level half of the one before, floored, by
+    the 13 taps of `Pyramid`. Negative values become 0. up_k = down_k + tent(up_k+1). The taps of
+    the tent are `filter_radius` of the smaller level's width apart along both axes. ``bloom`` is
+    one bilinear sample of up_0, the sum of the levels.
+
+    The stock renderer's buffers have the format "rgba8unorm-srgb"; ``glow`` is then its frame.
+
+    Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c, confirmed by pygfx 0.17.0
+    (``docs/engines.md``).
+
+    Examples
+    --------
+    >>> vkbloom.PygfxBloom().levels
+    6
+    """
+
+    method: ClassVar[str] = "pygfx"
+    published: ClassVar[bool] = True
+
+    threshold: float | None = value_field(None, fixed="pygfx has no threshold")
+    knee: float = no_knee("pygfx")
+    composite: Composite = choice_field("composite", ("mix",))
+    intensity: float = number_field("intensity", default=0.04, range=(0, 1))
+    format: BloomFormat | None = "rgba16float"
+    levels: int = number_field("levels", slider=(1, 10))
+    filter_radius: float = number_field("filter_radius", slider=(0, 0.05))
+    karis_average: bool = flag_field("karis_average")

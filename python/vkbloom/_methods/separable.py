@@ -1,0 +1,164 @@
+"""The separable blur of the forward and deferred systems."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import operator
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+from vkbloom import _core
+from vkbloom._argument_types import checked
+from vkbloom._checks import as_float, check_floats
+from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.settings import Settings
+
+Texel = Literal["own", "x"]
+
+#: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
+TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
+
+
+def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
+    weights = check_floats("weights", values)
+    if not 1 <= len(weights) <= _core.MAX_WEIGHTS:
+        raise ValueError(
+            f"weights: {len(weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
+        )
+    return weights
+
+
+def _check_layers(values: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
+    try:
+        pairs = tuple(tuple(layer) for layer in values)
+    except TypeError:
+        raise TypeError(
+            f"layers: {values!r} is not a sequence of pairs (scale, strength)"
+        ) from None
+    layers = tuple(check_floats("layers", layer) for layer in pairs)
+    if not 1 <= len(layers) <= _core.MAX_LAYERS:
+        raise ValueError(f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}")
+    if any(len(layer) != 2 for layer in layers):
+        raise ValueError(f"layers: {values!r} is not a sequence of pairs (scale, strength)")
+    if any(not 0 <= number <= 16 for layer in layers for number in layer):
+        raise ValueError(f"layers: {values!r} has a number out of range, 0 to 16")
+    return layers
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Separable(Settings):
+    """A blur by a symmetric kernel, first vertical, then horizontal.
+
+    One pass computes w0 c(0) + strength * sum of w_i (c(+i) + c(-i)) over i = 1..n. Its taps are
+    ``blur_scale`` texels of the bloom buffer apart, filtered bilinearly and clamped to the edge.
+    All passes but the last run at the size of the bloom buffers; the last is evaluated at every
+    pixel of ``final``.
+
+    Parameters
+    ----------
+    blur_scale : float
+        Distance of the taps in texels, 0 to 16.
+    blur_strength : float
+        Factor of all taps except the centre, 0 to 16.
+    weights : sequence of float
+        Half-kernel w0..wn, 1 to 65 of them.
+    loops : int
+        How often the vertical and horizontal passes are repeated, 1 to 16 times.
+    layers : sequence of (float, float)
+        (scale, strength), 1 to 8 of them, each number 0 to 16. Each layer is a complete blur at
+        blur_scale * scale; the blurs are added with their strengths.
+    first_tap : {1, 0}
+        First index of the sum, 0 or 1. 0: the sum includes the centre, whose weight becomes
+        w0 (1 + 2 strength).
+    texel : {"own", "x"}
+        Step of the vertical pass. "own": 1 / height of the texture; "x": 1 / width, as in the
+        horizontal pass.
+    direct : bool
+        Whether to apply the kernel as one pass of N x N taps instead of two of N.
+    **settings
+        The fields of `Settings`.
+
+    See Also
+    --------
+    gaussian_weights : Makes `weights`.
+    Pyramid, DualKawase : Methods for wide blurs.
+
+    Notes
+    -----
+    Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(1.0), blur_strength=1.0)
+    >>> image = np.zeros((9, 9, 4), np.float32)
+    >>> image[4, 4] = 1
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     bloom = renderer.apply(image, settings)["bloom"]
+    >>> bloom[4, 1:8, 0].round(3)
+    array([0.002, 0.022, 0.097, 0.159, 0.097, 0.022, 0.002], dtype=float32)
+    """
+
+    method: ClassVar[str] = "separable"
+
+    blur_scale: float = number_field("blur_scale", unit="texel", slider=(0.1, 2))
+    blur_strength: float = number_field("blur_strength", slider=(0, 4))
+    weights: tuple[float, ...] = value_field(TUTORIAL, read=_check_weights)
+    loops: int = number_field("loops", slider=(1, 8))
+    layers: tuple[tuple[float, float], ...] = value_field(((1.0, 1.0),), read=_check_layers)
+    first_tap: int = number_field("first_tap")
+    texel: Texel = choice_field("texel")
+    direct: bool = flag_field("direct")
+
+
+@checked
+def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
+    """Make a normalized Gaussian half-kernel.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation in taps, above 0.
+    radius : int, optional
+        Number of taps on each side, 0 to 64. Default: ceil(3 sigma), at most 64.
+
+    Returns
+    -------
+    tuple of float
+        w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
+        w0 + 2 (w1 + ... + w_radius) = 1.
+
+    Raises
+    ------
+    ValueError
+        `sigma` or `radius` is out of range.
+    TypeError
+        `sigma` is not a number, or `radius` not an integer.
+
+    See Also
+    --------
+    Separable : Takes the weights.
+
+    Examples
+    --------
+    >>> weights = vkbloom.gaussian_weights(1.0, radius=2)
+    >>> [round(weight, 4) for weight in weights]
+    [0.4026, 0.2442, 0.0545]
+    """
+    limit = _core.MAX_WEIGHTS - 1
+    deviation = as_float("sigma", sigma)
+    if not 0 < deviation < math.inf:
+        raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
+    if radius is None:
+        radius = math.ceil(min(3 * deviation, limit))
+    try:
+        radius = operator.index(radius)
+    except TypeError:
+        raise TypeError(f"radius: {radius!r} is not an integer") from None
+    if not 0 <= radius <= limit:
+        raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
+    # A product becomes infinity where the operator ** would raise OverflowError.
+    distances = [tap / deviation for tap in range(radius + 1)]
+    weights = [math.exp(-0.5 * distance * distance) for distance in distances]
+    total = weights[0] + 2 * sum(weights[1:])
+    return tuple(weight / total for weight in weights)

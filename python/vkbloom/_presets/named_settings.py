@@ -1,0 +1,181 @@
+"""Settings under their published names.
+
+``docs/presets.md`` has the source and the formula of each, and the differences from its source.
+"""
+
+# ruff: noqa: PLW0108  a method is imported when a preset of it is asked for
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from vkbloom._settings.registry import METHODS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from types import ModuleType
+
+    from vkbloom._settings.settings import Settings
+
+
+class Preset(NamedTuple):
+    """Settings, what they look like, and whose they are.
+
+    - `make`: Returns the settings. So a process imports only the methods of those that it asks for.
+    """
+
+    make: Callable[[], Settings]
+    what: str
+    whose: str
+
+
+def _psf() -> ModuleType:
+    from vkbloom import psf  # noqa: PLC0415  costs start-up time
+
+    return psf
+
+
+#: The presets by name.
+PRESETS: Final[Mapping[str, Preset]] = {
+    "tutorial": Preset(
+        lambda: METHODS["separable"](),
+        "nine taps across and down, in small buffers",
+        "the forward system",
+    ),
+    "outline": Preset(
+        lambda: METHODS["separable"](first_tap=0, texel="x"),
+        "the same, with a loop that starts at the centre, and steps of a texel of the width",
+        "the outline system",
+    ),
+    "deferred": Preset(
+        lambda: METHODS["separable"](
+            weights=(0.175713, 0.121703, 0.065984, 0.028002, 0.0093),
+            loops=3,
+            blur_scale=1.1,
+            blur_strength=1.5,
+        ),
+        "nine weights with a sum below 1, in three loops",
+        "the deferred HDR system",
+    ),
+    "jimenez2014": Preset(
+        lambda: METHODS["pyramid"](
+            levels=6, radius=1.0, firefly_filter=True, composite="mix", intensity=0.04
+        ),
+        "six levels with a filter of fireflies, mixed in with 0.04",
+        "Jimenez, SIGGRAPH 2014; levels of LearnOpenGL @ a545a703f958",
+    ),
+    # In KWin, the six strengths with four iterations have evenly spaced offsets, 3 to 8.
+    "dual_kawase": Preset(
+        lambda: METHODS["dual_kawase"](levels=4, offset=3 + 5 / 6),
+        "one wide blur of the complete picture",
+        "Bjorge, SIGGRAPH 2015; KDE/kwin @ 00a2faf64fbf, the tenth strength",
+    ),
+    "bevy_natural": Preset(
+        lambda: METHODS["bevy"](),
+        "a soft glow of the complete picture, which keeps its energy",
+        "Bevy 0.19, Bloom::NATURAL (bevyengine/bevy @ b56fc29d3016)",
+    ),
+    "kino": Preset(
+        lambda: METHODS["kino"](),
+        "a wide glow above a soft threshold",
+        "keijiro/KinoBloom @ 0a04c43fa47d",
+    ),
+    "filament": Preset(
+        lambda: METHODS["filament"](),
+        "a faint, wide glow of what is above 1, at low quality",
+        "google/filament, Options.h @ 2fac13e154fb",
+    ),
+    "unity_urp": Preset(
+        lambda: METHODS["urp"](),
+        "a narrow glow above a soft threshold, with the intensity 1",
+        "Unity URP, Bloom.cs @ a085de35f86e",
+    ),
+    "unity_hdrp": Preset(
+        lambda: METHODS["hdrp"](),
+        "a glow of the complete picture, with Unity's intensity 0.2",
+        "Unity HDRP, Bloom.cs @ 2084a9d19159",
+    ),
+    "threejs_unreal": Preset(
+        lambda: METHODS["unreal"](),
+        "five Gaussians of the complete picture, strength 1, threshold 0",
+        "mrdoob/three.js, UnrealBloomPass since #31528 and #32517",
+    ),
+    "godot_4_5": Preset(
+        lambda: METHODS["godot"](
+            level_weights=(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
+            intensity=0.8,
+            composite="soft_light",
+        ),
+        "two levels of what is above 1, as soft light",
+        "Godot up to 4.5, copy.glsl @ 0a5efd02df51",
+    ),
+    "godot_4_6": Preset(
+        lambda: METHODS["godot"](),
+        "three levels of what is above 1",
+        "Godot from 4.6, copy.glsl @ 0a5efd02df51",
+    ),
+    "blender_bloom": Preset(
+        lambda: METHODS["blender"](),
+        "a wide, smooth glow of what is above 1",
+        "Blender 5.0, Glare node, Bloom, High",
+    ),
+    "blender_ghosts": Preset(
+        lambda: METHODS["blender"](type="ghosts"),
+        "reflections in a lens of what is above 1",
+        "Blender 5.0, Glare node, Ghosts, High",
+    ),
+    "blender_streaks": Preset(
+        lambda: METHODS["blender"](type="streaks"),
+        "stars of four streaks of what is above 1",
+        "Blender 5.0, Glare node, Streaks, High",
+    ),
+    "blender_simple_star": Preset(
+        lambda: METHODS["blender"](type="simple_star"),
+        "small diagonal stars of what is above 1",
+        "Blender 5.0, Glare node, Simple Star, High",
+    ),
+    "blender_sun_beams": Preset(
+        lambda: METHODS["blender"](type="sun_beams"),
+        "beams from the centre of what is above 1",
+        "Blender 5.0, Glare node, Sun Beams, High",
+    ),
+    "pygfx": Preset(
+        lambda: METHODS["pygfx"](),
+        "six levels of the complete picture, added up, mixed in with 0.04",
+        "pygfx/pygfx, bloom.py @ f5f8f72c",
+    ),
+    "spencer_photopic": Preset(
+        lambda: METHODS["convolution"](_psf().spencer(), composite="mix"),
+        "the glare of an eye by day",
+        "Spencer et al., SIGGRAPH 1995",
+    ),
+    "blender_fog_glow": Preset(
+        lambda: METHODS["blender"](type="fog_glow"),
+        "a fog around what is above 1",
+        "Blender 5.0, Glare node, Fog Glow, High",
+    ),
+    # Not normalized, because the sums of the channels are the kernel's tint.
+    "unreal_convolution": Preset(
+        lambda: METHODS["convolution"](
+            _psf().unreal(_psf().aperture(_psf().iris(blades=6))),
+            normalize=False,
+            composite="mix",
+        ),
+        "a star of six rays whose centre keeps its energy",
+        "Unreal Engine's convolution bloom; the kernel of iris_6",
+    ),
+    "camera_lens": Preset(
+        lambda: METHODS["convolution"](_psf().harvey_shack(), composite="mix", intensity=0.025),
+        "the 2.5 % of the light that a lens of 14 surfaces scatters",
+        "Ritt, Sensors 20(21):6308, 2020",
+    ),
+    "iris_6": Preset(
+        lambda: METHODS["convolution"](_psf().aperture(_psf().iris(blades=6)), composite="mix"),
+        "diffraction at an iris of six blades at f/8",
+        "physical optics",
+    ),
+    "photo": Preset(
+        lambda: METHODS["bevy"](composite="add", threshold=1.0, knee=0.5),
+        "a soft glow of highlights that --expand makes brighter; nothing becomes darker",
+        "vkbloom, for pictures without values above 1; Bevy's chain",
+    ),
+}

@@ -1,0 +1,1 @@
+"""The renderer: devices, sources, requests, plans and framebuffers."""

@@ -1,0 +1,170 @@
+"""Batches on the device: as layers of one image, so that each pass runs once for many images."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections import deque
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vkbloom import _core
+from vkbloom._renderer.device_arrays import DeviceArray, memory_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from vkbloom._renderer.device_arrays import ImportedArray
+    from vkbloom._renderer.frames import Frames
+    from vkbloom._renderer.requests import PendingSubmissions
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["Batches"]
+
+#: The most bytes of images on the device, half of what the core keeps.
+BYTES = 128 << 20
+#: The most layers, which every device has.
+LAYERS = 256
+#: With fewer, large images are taken one by one: each of them keeps the device busy.
+LEAST = 4
+#: Submissions that are pending while the caller takes the frames of another one.
+AHEAD = 2
+#: Between the results of images, whose arrays begin at multiples of it (vkb_layer_stride).
+ALIGNMENT = 256
+
+
+class _Part(NamedTuple):
+    """Images from `first` on that were submitted together.
+
+    `frames`: Of those that are not yielded yet, in reverse; complete after the submission.
+    """
+
+    submission: _core.Submission
+    first: int
+    layers: int
+    outputs: tuple[tuple[str, tuple[int, ...], str, int, _core.Exported], ...]
+    frames: list[Frames]
+
+    def arrays(self, layer: int) -> dict[str, Any]:
+        """Return the framebuffers of one image."""
+        return {
+            name: DeviceArray(memory, shape, dtype, layer * stride)
+            for name, shape, dtype, stride, memory in self.outputs
+        }
+
+
+class Batches:
+    """The batches of a renderer. Keeps the last plan: of small images it takes long to make."""
+
+    def __init__(self, core: _core.Renderer, ends: PendingSubmissions) -> None:
+        self._core = core
+        self._pending = ends
+        self._last: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
+        self._size: tuple[Settings, tuple[Any, ...], int] | None = None
+
+    def forget(self) -> None:
+        """Release the plan."""
+        self._last = None
+
+    def run(
+        self,
+        batch: ImportedArray,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+        frames: Callable[[Settings, dict[str, Any]], Frames],
+        rest: Callable[[int], Iterator[Frames]],
+    ) -> Iterator[Frames]:
+        """Yield the Frames of each image.
+
+        `frames`: Makes them of their arrays.
+        `rest`: Yields them one by one from an image on. It is called where images have no layers,
+        or where the device has too little memory for many of them.
+        """
+        count = batch.shape[0]
+        layers = self._layers(batch, settings)
+        pending: deque[_Part] = deque()
+        submitted = done = 0
+        try:
+            while done < count:
+                while layers and submitted < count and len(pending) < AHEAD:
+                    # All parts have the same number of images, so that they use the same memory.
+                    first = min(submitted, count - layers)
+                    try:
+                        part = self._submit(batch, first, layers, settings, names)
+                    except _core.ValidationError:
+                        raise
+                    except (_core.Error, ValueError):
+                        layers = 0
+                        break
+                    for layer in reversed(range(submitted - first, layers)):
+                        # While the device works.
+                        part.frames.append(frames(settings, part.arrays(layer)))
+                    pending.append(part)
+                    submitted = first + layers
+                    del part
+                if not pending:
+                    yield from rest(done)
+                    return
+                part = pending.popleft()
+                done = part.first + part.layers
+                end = self._pending.add(part.submission)
+                if not part.submission.ordered:
+                    end.come()
+                while part.frames:
+                    # Yielded frames are not kept, so that the caller is their only owner.
+                    layer = part.layers - len(part.frames)
+                    part.frames[-1]._finish_later(functools.partial(end.of_layer, layer))
+                    yield part.frames.pop()
+                del part
+        finally:
+            pending.clear()
+
+    def _layers(self, batch: ImportedArray, settings: Settings) -> int:
+        """Return how many images are taken together; 0: they are taken one by one."""
+        count, kind = batch.shape[0], (batch.shape[1:], batch.dtype)
+        if settings._has_state or count < LEAST:
+            return 0
+        if self._size is None or self._size[:2] != (settings, kind):
+            one = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
+            self._size = settings, kind, one.image_size
+        parts = math.ceil(count / max(1, min(LAYERS, BYTES // self._size[2])))
+        layers = math.ceil(count / parts)
+        return layers if layers >= LEAST else 0
+
+    def _submit(
+        self,
+        batch: ImportedArray,
+        first: int,
+        layers: int,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+    ) -> _Part:
+        source = _core.image_source(batch.layers(first, layers))
+        if (
+            self._last is None
+            or self._last[:2] != (settings, names)
+            or not self._last[2].is_of_image(source)
+        ):
+            self._last = settings, names, self._core.plan(source, settings, names)
+        plan = self._last[2]
+        outputs = tuple(
+            [
+                (
+                    name,
+                    shape,
+                    dtype,
+                    _stride(shape, dtype),
+                    memory_for(self._core, layers * _stride(shape, dtype)),
+                )
+                for name, shape, dtype in plan.outputs
+            ]
+        )
+        arrays = tuple([memory for *_, memory in outputs])
+        self._pending.wait()
+        return _Part(self._core.run(source, (plan,), (arrays,)), first, layers, outputs, [])
+
+
+def _stride(shape: tuple[int, ...], dtype: str) -> int:
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    return -(-size // ALIGNMENT) * ALIGNMENT

@@ -1,0 +1,219 @@
+"""The default renderer of the process, and a bloom in one call."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import threading
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._renderer.device_arrays import Device
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.renderer import SCENE_SIZE, Renderer
+from vkbloom._settings.registry import presets
+from vkbloom._settings.settings import Settings, Shading, check_settings
+
+if TYPE_CHECKING:
+    from vkbloom._scene import Scene
+
+__all__ = ["apply", "default_renderer", "render"]
+
+
+class _Default:
+    """The renderer that calls without one use; a forked child and a closed one get a new one."""
+
+    def __init__(self) -> None:
+        self.renderer: Renderer | None = None
+        self.lock = threading.Lock()
+
+    def get(self) -> Renderer:
+        with self.lock:
+            if self.renderer is None or self.renderer.closed:
+                self.renderer = Renderer()
+            return self.renderer
+
+    def close(self) -> None:
+        with self.lock:
+            if self.renderer is not None:
+                self.renderer.close()
+
+
+_DEFAULT: Final = _Default()
+atexit.register(_DEFAULT.close)
+if hasattr(os, "register_at_fork"):
+    # The parent's device is not usable in the child, and another thread may have held the lock.
+    os.register_at_fork(after_in_child=_DEFAULT.__init__)  # type: ignore[misc]
+
+
+def default_renderer() -> Renderer:
+    """Return the renderer that functions use where no renderer is given.
+
+    Returns
+    -------
+    Renderer
+        ``Renderer()``, opened at the first use and closed at exit. A forked child opens its own. If
+        it was closed, the next call opens another one.
+
+    Raises
+    ------
+    AdapterNotFoundError, Error, ValueError
+        As for `Renderer`.
+
+    See Also
+    --------
+    apply, render : Use it.
+
+    Examples
+    --------
+    >>> vkbloom.default_renderer() is vkbloom.default_renderer()
+    True
+    """
+    return _DEFAULT.get()
+
+
+@checked
+def apply(
+    image: NDArray[Any] | Image | str | os.PathLike[str],
+    settings: Settings | str | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+    framebuffers: Literal["all"] | str | Sequence[str] = "all",
+    out: Mapping[str, Any] | None = None,
+    device: Device | None = None,
+    renderer: Renderer | None = None,
+    **fields: Any,
+) -> Frames:
+    """Add bloom to an image or to the image of a file.
+
+    Parameters
+    ----------
+    image : ndarray, Image, str or path-like
+        As for `Renderer.apply`; or the path of an image file, which is read as by the command
+        ``vkbloom apply``.
+    settings : Settings or str, optional
+        Settings, or the name of a preset. Default: ``presets["bevy_natural"]``. For a file of
+        integers, such as a photograph, ``presets["photo"]``, with its highlights expanded to 4.
+    mask, emission, framebuffers, out, device
+        As for `Renderer.apply`.
+    renderer : Renderer, optional
+        Default: `default_renderer`.
+    **fields
+        Fields of the settings that are changed, as by `Settings.replace`.
+
+    Returns
+    -------
+    Frames
+        As of `Renderer.apply`.
+
+    Raises
+    ------
+    ValueError, TypeError, Error
+        As for `Renderer.apply`; or the settings have no such field.
+    OSError
+        The file cannot be read.
+
+    See Also
+    --------
+    render : The same for a scene.
+    read : Reads a file.
+
+    Examples
+    --------
+    >>> image = np.zeros((16, 16, 3), np.float32)
+    >>> image[8, 8] = 100
+    >>> vkbloom.apply(image, "kino", threshold=1)["bloom"].shape
+    (16, 16, 4)
+    """
+    if isinstance(image, str | os.PathLike):
+        image, settings = _read(image, settings)
+    chosen = check_settings(settings, of_image=True)
+    return (renderer or default_renderer()).apply(
+        image,
+        chosen.replace(**fields) if fields else chosen,
+        mask=mask,
+        emission=emission,
+        framebuffers=framebuffers,
+        out=out,
+        device=device,
+    )
+
+
+def _read(
+    path: str | os.PathLike[str], settings: Settings | str | None
+) -> tuple[NDArray[Any], Settings | str | None]:
+    """Return the image of a file, and the settings: by default those for its type."""
+    from vkbloom._io.array_files import read  # noqa: PLC0415  needs OpenImageIO
+    from vkbloom._io.expansion import PHOTO_EXPANSION, expanded  # noqa: PLC0415
+
+    image, facts = read(path, metadata=True)
+    if not facts["numbers"].startswith("uint"):
+        return image, settings
+    photo = presets["photo"]
+    chosen = photo if settings is None else check_settings(settings)
+    return expanded(image, PHOTO_EXPANSION) if chosen == photo else image, chosen
+
+
+@checked
+def render(
+    scene: Scene,
+    settings: Settings | str | None = None,
+    size: tuple[int, int] = SCENE_SIZE,
+    *,
+    shading: Shading = "forward",
+    time: float = 0.0,
+    framebuffers: Literal["all"] | str | Sequence[str] = "all",
+    out: Mapping[str, Any] | None = None,
+    device: Device | None = None,
+    renderer: Renderer | None = None,
+    **fields: Any,
+) -> Frames:
+    """Render a scene with its bloom.
+
+    Parameters
+    ----------
+    scene, size, shading, time, framebuffers, out, device
+        As for `Renderer.render`.
+    settings : Settings or str, optional
+        Settings, or the name of a preset. Default: ``presets["tutorial"]``.
+    renderer : Renderer, optional
+        Default: `default_renderer`.
+    **fields
+        Fields of the settings that are changed, as by `Settings.replace`.
+
+    Returns
+    -------
+    Frames
+        As of `Renderer.render`.
+
+    Raises
+    ------
+    ValueError, TypeError, Error
+        As for `Renderer.render`; or the settings have no such field.
+
+    See Also
+    --------
+    apply : The same for an image.
+
+    Examples
+    --------
+    >>> frames = vkbloom.render(vkbloom.Scene.ufo(), size=(64, 48), bloom_size=(32, 32))
+    >>> frames["final"].shape
+    (48, 64, 4)
+    """
+    chosen = check_settings(settings)
+    return (renderer or default_renderer()).render(
+        scene,
+        chosen.replace(**fields) if fields else chosen,
+        size,
+        shading=shading,
+        time=time,
+        framebuffers=framebuffers,
+        out=out,
+        device=device,
+    )

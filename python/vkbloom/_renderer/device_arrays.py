@@ -1,0 +1,493 @@
+"""Arrays on the device: images of other libraries on a GPU, and framebuffers that stay there."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
+
+import numpy as np
+
+from vkbloom import _core
+from vkbloom._checks import on_another_device
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+__all__ = [
+    "Destination",
+    "Device",
+    "DeviceArray",
+    "ImportedArray",
+    "fill",
+    "likeness",
+    "memory_for",
+    "merged",
+    "on_cuda",
+    "on_host",
+    "place_of",
+    "placed",
+    "take",
+]
+
+#: Where framebuffers are wanted.
+Device = Literal["host", "device"]
+#: Where framebuffers go: arrays of NumPy; the same as a `DeviceArray`; memory that CUDA shares.
+Destination = Literal["host", "viewed", "cuda"]
+
+# DLPack's types of devices and elements.
+_CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
+_UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
+_DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
+_CODES = {"u": _UINT, "f": _FLOAT}
+_FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
+# CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
+_LEGACY = 1
+# More elements than any memory has.
+_MOST = 1 << 48
+
+
+class DeviceArray:
+    """A framebuffer that stays on the renderer's device.
+
+    Other libraries take it without a copy: ``torch.from_dlpack(array)``,
+    ``cupy.from_dlpack(array)`` and ``jax.dlpack.from_dlpack(array)``. It stays valid after the
+    renderer is closed. Its memory is used again when this object and all arrays that were made of
+    it are gone, and when the GPU has done all work that it had been given until then. The
+    framebuffers of a batch lie in the same memory.
+
+    On a CPU adapter the device's memory is the host's: NumPy and the libraries above view it there.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (H, W, C), or (H, W) for depth.
+    dtype : numpy.dtype
+
+    See Also
+    --------
+    Renderer.apply : Its argument `device`.
+
+    Examples
+    --------
+    >>> image = np.full((16, 24, 3), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     final = renderer.apply(image, device="device")["final"]
+    >>> final.shape, final.dtype
+    ((16, 24, 3), dtype('float32'))
+    >>> np.from_dlpack(final).shape
+    (16, 24, 3)
+    """
+
+    def __init__(
+        self,
+        memory: _core.Exported | NDArray[Any],
+        shape: tuple[int, ...],
+        dtype: str,
+        offset: int = 0,
+    ) -> None:
+        self._memory = memory
+        self._offset = offset  # in the memory of a batch
+        self.shape = tuple(shape)
+        self.dtype = np.dtype(dtype)
+
+    @property
+    def ndim(self) -> int:
+        """The number of dimensions."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """The number of elements."""
+        return math.prod(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of all elements."""
+        return self.size * self.dtype.itemsize
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __repr__(self) -> str:
+        place = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
+        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {place}>"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
+
+    def numpy(self) -> NDArray[Any]:
+        """Return a copy in the host's memory.
+
+        Returns
+        -------
+        ndarray
+
+        Raises
+        ------
+        Error
+            CUDA failed.
+
+        See Also
+        --------
+        numpy.from_dlpack : A view, on a CPU adapter.
+
+        Examples
+        --------
+        >>> image = np.full((16, 24, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     final = renderer.apply(image, device="device")["final"]
+        >>> final.numpy().shape
+        (16, 24, 3)
+        """
+        if isinstance(self._memory, np.ndarray):
+            return self._memory.copy()
+        array = np.empty(self.shape, self.dtype)
+        self._memory.read(array, self._offset)
+        return array
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return a copy in the host's memory; ``copy=False`` is a ValueError."""
+        if copy is False:
+            raise ValueError("DeviceArray: NumPy cannot view it; use copy=None")
+        array = self.numpy()
+        return array if dtype is None else array.astype(dtype, copy=False)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """Return DLPack's type and number of the device."""
+        if isinstance(self._memory, np.ndarray):
+            return _CPU, 0
+        return _CUDA, self._memory.ordinal
+
+    def __dlpack__(
+        self,
+        *,
+        stream: int | None = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any:
+        """Return a capsule of DLPack.
+
+        `stream`: The consumer's, which waits for the framebuffer; None: CUDA's default stream. -1,
+        no stream: this call waits.
+        `max_version`: At least (1, 0) gives a capsule of DLPack 1, otherwise one of 0.
+        `dl_device`: This device, or (1, 0) for a copy on the host.
+        `copy`: True gives a copy.
+        """
+        here = self.__dlpack_device__()
+        wanted = here if dl_device is None else (int(dl_device[0]), int(dl_device[1]))
+        if wanted not in (here, (_CPU, 0)):
+            raise BufferError(f"dl_device: {wanted} is neither the array's, {here}, nor the host")
+        if here[0] == _CPU or wanted[0] == _CPU:
+            if here[0] != _CPU and copy is False:
+                raise BufferError("copy: False is not possible from the device to the host")
+            # NumPy's own argument `copy` came later than its capsules.
+            array = self.numpy() if copy or here[0] != _CPU else np.asarray(self._memory)
+            options: dict[str, Any] = {} if max_version is None else {"max_version": max_version}
+            return array.__dlpack__(**options)
+        if stream is not None and not isinstance(stream, int):
+            raise TypeError(f"stream: {stream!r} is not a number")
+        if stream == 0:
+            raise ValueError("stream: 0 is ambiguous; 1 is CUDA's default stream, 2 a thread's")
+        memory, offset = self._memory, self._offset
+        assert not isinstance(memory, np.ndarray)
+        if copy:
+            memory, offset = memory.clone(self.nbytes, offset), 0
+        if stream == -1:
+            memory.complete()
+        versioned_capsule = max_version is not None and max_version[0] >= 1
+        return memory.capsule(
+            self.shape,
+            _CODES[self.dtype.kind],
+            8 * self.dtype.itemsize,
+            versioned_capsule,
+            offset,
+            _LEGACY if stream is None else max(stream, 0),
+        )
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        """The array for Numba and others, version 3."""
+        if isinstance(self._memory, np.ndarray):
+            raise AttributeError("__cuda_array_interface__: the array is on the host")
+        # Not every consumer looks at the stream, so none is left to wait for.
+        self._memory.complete()
+        return {
+            "shape": self.shape,
+            "typestr": self.dtype.str,
+            "data": (self._memory.address + self._offset, False),
+            "strides": None,
+            "stream": None,
+            "version": 3,
+        }
+
+
+def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
+    """Return images as batches: those that follow one another in the same memory are one."""
+    batches: list[tuple[DeviceArray, int]] = []
+    for image in images:
+        if batches:
+            first, count = batches[-1]
+            same = first._memory is image._memory and first.shape == image.shape
+            after = first._offset + count * first.nbytes
+            if same and first.dtype == image.dtype and after == image._offset:
+                batches[-1] = first, count + 1
+                continue
+        batches.append((image, 1))
+    return [
+        DeviceArray(first._memory, (count, *first.shape), first.dtype.name, first._offset)
+        for first, count in batches
+    ]
+
+
+def on_host(array: Any) -> NDArray[Any]:
+    """Return a framebuffer as an array of NumPy, copied if it is on the device."""
+    return array.numpy() if isinstance(array, DeviceArray) else array
+
+
+def place_of(array: object) -> Destination:
+    """Return where a framebuffer is."""
+    if not isinstance(array, DeviceArray):
+        return "host"
+    return "viewed" if isinstance(array._memory, np.ndarray) else "cuda"
+
+
+def _require_no_capture() -> None:
+    """Raise Error if PyTorch captures a CUDA graph in this thread, before that becomes invalid.
+
+    Memory of arrays is used again when all streams have done their work, which CUDA tells of no
+    context that captures. It does not tell of captures either.
+    """
+    torch = sys.modules.get("torch")
+    if torch is None or not torch.cuda.is_initialized():
+        return
+    if torch.cuda.is_current_stream_capturing():
+        raise _core.Error(
+            "CUDA graph: PyTorch's stream is being captured, and the renderer's work cannot be "
+            "recorded; make the call before or after torch.cuda.graph"
+        )
+
+
+def memory_for(core: _core.Renderer, size: int) -> _core.Exported:
+    """Return memory of the device that CUDA shares, of so many bytes."""
+    _require_no_capture()
+    return core.export(size)
+
+
+def placed(
+    array: NDArray[Any], place: Destination, core: _core.Renderer
+) -> NDArray[Any] | DeviceArray:
+    """Return an array of the host as if it were a framebuffer at that place."""
+    if place == "host":
+        return array
+    memory: _core.Exported | NDArray[Any] = array
+    if place == "cuda":
+        memory = memory_for(core, array.nbytes)
+        memory.write(np.ascontiguousarray(array))
+    return DeviceArray(memory, array.shape, array.dtype.name)
+
+
+def on_cuda(image: object) -> bool:
+    """Return whether an object is an array in the memory of a GPU with CUDA."""
+    if isinstance(image, np.ndarray | DeviceArray):
+        return isinstance(image, DeviceArray) and image.__dlpack_device__()[0] == _CUDA
+    device = getattr(image, "__dlpack_device__", None)
+    if device is None:
+        return hasattr(image, "__cuda_array_interface__")
+    try:
+        kind = int(device()[0])
+    except Exception:  # whatever a foreign object raises; a later use of it tells more
+        return False
+    return kind in (_CUDA, _CUDA_MANAGED)
+
+
+def likeness(image: Any) -> NDArray[Any]:
+    """Return an array of the host with an array's shape and dtype, of undefined content."""
+    dtype = str(image.dtype).rsplit(".", 1)[-1]
+    if dtype not in _FORMATS:
+        raise TypeError(f"image: dtype {dtype} is not one of uint8, float16, float32 on the device")
+    return np.empty(tuple(image.shape), dtype)
+
+
+class _Array(NamedTuple):
+    """An array of CUDA, strides in bytes; `stream`: what the copy waits for, 0: nothing."""
+
+    owner: object
+    address: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+    stream: int
+
+
+class ImportedArray(NamedTuple):
+    """A copy of what an array spans, in memory that Vulkan shares."""
+
+    memory: _core.Exported
+    offset: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+
+    def at(self, index: int) -> ImportedArray:
+        """Return one image of a batch."""
+        offset = self.offset + index * self.strides[0]
+        return self._replace(offset=offset, shape=self.shape[1:], strides=self.strides[1:])
+
+    def image(self) -> Any:
+        """Return it as the core reads it."""
+        return self.memory, self.offset, self.shape, self.strides, _FORMATS[self.dtype]
+
+    def layers(self, first: int, count: int) -> Any:
+        """Return images of a batch from `first` on, as the core reads them together."""
+        return *self.at(first).image(), count, self.strides[0]
+
+    def numpy(self) -> NDArray[Any]:
+        """Return the array in the host's memory."""
+        low, high = _span(self.shape, self.strides, self.dtype)
+        span = np.empty(high - low, np.uint8)
+        self.memory.read(span, self.offset + low)
+        return np.ndarray(
+            self.shape, self.dtype, buffer=span.data, offset=-low, strides=self.strides
+        ).copy()
+
+
+def _span(shape: tuple[int, ...], strides: tuple[int, ...], dtype: str) -> tuple[int, int]:
+    """Return the bytes that an array touches, from its first element on."""
+    reaches = [(side - 1) * stride for side, stride in zip(shape, strides, strict=True)]
+    low = sum(min(reach, 0) for reach in reaches)
+    return low, sum(max(reach, 0) for reach in reaches) + np.dtype(dtype).itemsize
+
+
+def _check_dtype(name: str, code: int, bits: int, lanes: int) -> str:
+    if lanes == 1 and (dtype := _DTYPES.get((code, bits))):
+        return dtype
+    if (name, code, bits, lanes) == ("mask", _BOOL, 8, 1):
+        return "bool"
+    kind = {_BFLOAT: "bfloat", _COMPLEX: "complex", _UINT: "uint", _FLOAT: "float"}.get(code, "int")
+    cure = f"convert it: {name}.to(torch.float32) in PyTorch, {name}.astype('float32') elsewhere"
+    if code == _COMPLEX:
+        cure = f"take its real part or its absolute value: abs({name})"
+    raise TypeError(
+        f"{name}: dtype {kind}{bits} is not one of uint8, float16, float32 on the device; {cure}"
+    )
+
+
+def _contiguous(shape: tuple[int, ...]) -> tuple[int, ...]:
+    strides = [1]
+    for side in reversed(shape[1:]):
+        strides.insert(0, strides[0] * side)
+    return tuple(strides[: len(shape)])
+
+
+def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
+    kind, ordinal = (int(number) for number in image.__dlpack_device__())
+    if kind == _CUDA_MANAGED:
+        raise ValueError(
+            f"{name}: it is in managed (unified) memory; copy it to the device's own memory"
+        )
+    ours, _ = core.cuda()
+    if ordinal != ours:
+        raise ValueError(
+            f"{name}: it is on {core.cuda_name(ordinal)}, and the renderer is on "
+            f"{core.cuda_name(ours)}; open a renderer with the array's GPU as adapter, or move the "
+            "array"
+        )
+    capsule = core.dlpack(image)
+    address, (kind, _), (code, bits, lanes), shape, strides = _core.read_dlpack(capsule)
+    if kind != _CUDA:
+        raise ValueError(f"{name}: its DLPack capsule is of device type {kind}, not 2 (CUDA)")
+    dtype = _check_dtype(name, code, bits, lanes)
+    size = np.dtype(dtype).itemsize
+    elements = _contiguous(shape) if strides is None else strides
+    if any(abs(one) >= _MOST for one in elements):
+        # CuPy 14 divides negative strides as if they had no sign.
+        if hasattr(image, "__cuda_array_interface__"):
+            # The capsule has ordered our stream after the producer's work.
+            return _from_interface(image, name)._replace(stream=0)
+        raise ValueError(f"{name}: strides {elements} are out of range; make it contiguous")
+    # The producer has ordered our stream after its own work.
+    return _Array(capsule, address, shape, tuple(size * one for one in elements), dtype, 0)
+
+
+def _from_interface(image: Any, name: str) -> _Array:
+    about = image.__cuda_array_interface__
+    shape, typestr = tuple(about["shape"]), about["typestr"]
+    if about.get("mask") is not None:
+        raise ValueError(f"{name}: a mask of __cuda_array_interface__ is not taken")
+    try:
+        dtype = np.dtype(typestr).name if np.dtype(typestr).isnative else typestr
+    except TypeError:
+        dtype = typestr
+    if dtype not in _FORMATS:
+        raise TypeError(
+            f"{name}: dtype {dtype} is not one of uint8, float16, float32 on the device; convert "
+            f"it: {name}.astype('float32')"
+        )
+    size = np.dtype(dtype).itemsize
+    strides = about.get("strides") or tuple(size * one for one in _contiguous(shape))
+    stream = about.get("stream")
+    # Before version 3 nothing tells of a stream, so the default stream is waited for.
+    after = _LEGACY if stream is None and about.get("version", 0) < 3 else stream or 0
+    return _Array(image, about["data"][0], shape, tuple(strides), dtype, after)
+
+
+def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> None:
+    """Copy a framebuffer to the caller's array on the device, after what its producer works on."""
+    array = _from_dlpack(target, name, core) if hasattr(target, "__dlpack__") else None
+    array = array or _from_interface(target, name)
+    if (array.shape, array.dtype) != (made.shape, made.dtype.name):
+        raise ValueError(
+            f"{name} has shape {array.shape} and dtype {array.dtype}, it must have {made.shape} "
+            f"and {made.dtype}"
+        )
+    size = made.dtype.itemsize
+    if array.strides != tuple(size * one for one in _contiguous(made.shape)):
+        raise ValueError(f"{name} must be C-contiguous")
+    if isinstance(made._memory, np.ndarray):
+        raise TypeError(f"{name}: the framebuffer is on the host")
+    made._memory.copy_to(array.address, made.nbytes, array.stream, made._offset)
+
+
+def take(
+    image: Any,
+    name: str,
+    core: _core.Renderer,
+    sides: tuple[int, ...] = (3,),
+    *,
+    waits: bool = True,
+) -> ImportedArray:
+    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
+
+    `sides`: The numbers of dimensions that it may have.
+    `waits`: Until the copy is complete. Otherwise the core's `run` does that, and the array must
+    not change before.
+    """
+    _require_no_capture()
+    try:
+        core.cuda()
+    except _core.Error as error:
+        if type(error) is not _core.Error:
+            raise
+        raise TypeError(f"{on_another_device(image, name)} ({error})") from None
+    if isinstance(image, DeviceArray) or hasattr(image, "__dlpack__"):
+        array = _from_dlpack(image, name, core)
+    else:
+        array = _from_interface(image, name)
+    shape = array.shape
+    if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in (3, 4)):
+        raise ValueError(
+            f"{name}: shape {shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            + (f"; for a batch, call map({name})" if len(shape) == 4 else "")
+            + (
+                f"; move the channels last: {name}.permute(1, 2, 0)"
+                if len(shape) == 3 and shape[0] in (3, 4)
+                else ""
+            )
+        )
+    low, high = _span(shape, array.strides, array.dtype)
+    memory = core.snapshot(name, array.address + low, high - low, array.stream, waits)
+    return ImportedArray(memory, -low, shape, array.strides, array.dtype)

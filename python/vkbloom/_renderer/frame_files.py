@@ -1,0 +1,295 @@
+"""Write framebuffers to image files without loss: all files, or none if one fails."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import glob
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import import_extra, native_order
+from vkbloom._framebuffers import Framebuffers, leading
+from vkbloom._io import image_reading, safe_writing
+from vkbloom._io.displayed import HDR_CURVES, with_names
+from vkbloom._io.images import PIXEL_TYPES, check_name, complete, is_exr
+from vkbloom._settings.settings import Settings
+from vkbloom._version import installed_version
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+__all__ = ["facts_of", "load", "save", "settings_facts"]
+
+# The text before the JSON in a description.
+_DESCRIBED = ", all of it: "
+# Attributes that `_spec` writes in addition to the entries of `info`.
+_OWN = ("settings", "timings", "dtype", "framebuffer", "place")
+
+
+def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
+    """Write framebuffers to image files, as `Frames.save` documents."""
+    if not frames:
+        raise ValueError("frames: there is no framebuffer to save")
+    oiio = import_extra("OpenImageIO", "images", "Frames.save")
+    check_name(path)
+    if os.fspath(path) == "":
+        # An empty name is usually an unset shell variable, and must not mean the current folder.
+        raise ValueError("path: '' is not the name of a file or a folder; use '.' for this folder")
+    target = Path(path)
+    plan: dict[Path, list[str]]
+    if target.is_dir() or not target.suffix or os.fspath(path).endswith(("/", os.sep)):
+        target.mkdir(parents=True, exist_ok=True)
+        plan = {target / f"{name}.png": [name] for name in frames}
+    else:
+        safe_writing.check_extension(oiio, target.suffix)
+        if is_exr(target) or len(frames) == 1:
+            plan = {target: list(frames)}
+        else:
+            plan = {
+                target.with_name(f"{target.stem}_{name}{target.suffix}"): [name] for name in frames
+            }
+    # (temporary file, final file) of every reserved file.
+    files: list[tuple[Path, Path]] = []
+    try:
+        for file, names in plan.items():
+            size = sum(frames[name].nbytes for name in names)
+            files.append((safe_writing.reserve(file, size), file))
+            if not is_exr(file):
+                if _write_image(oiio, frames, names[0], *files[-1]):
+                    continue
+                safe_writing.remove(files.pop()[0])
+                beside = file.with_suffix(".exr")
+                files.append((safe_writing.reserve(beside, size), beside))
+            _write_exr(oiio, frames, names, *files[-1])
+        for temporary, file in files:
+            safe_writing.put_in_place(temporary, file)
+    finally:
+        for temporary, _ in files:
+            safe_writing.remove(temporary)
+    return [file for _, file in files]
+
+
+def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read framebuffers from files that `save` wrote, as `Frames.load` documents."""
+    found: dict[str, tuple[int, NDArray[Any], Path]] = {}
+    facts: dict[str, Any] = {}
+    target = Path(check_name(path))
+    # In a folder, files without the attributes of `save` are ignored.
+    is_one = target.is_file()
+    for file in _files_of(target):
+        for index in range(_parts_of(file)):
+            pixels, said = _stored(file, index)
+            if not is_one and not _is_of(target, file, said):
+                continue
+            try:
+                facts = {
+                    "settings": Settings.from_json(said["settings"]),
+                    "timings": json.loads(said["timings"]),
+                    "info": {
+                        name: int(text) if name in ("nan", "inf") else text
+                        for name, text in said.items()
+                        if name not in _OWN
+                    },
+                }
+                name, array = said["framebuffer"], _as_dtype(pixels, said["dtype"])
+                if name in found:
+                    raise ValueError(f"{name} is in {found[name][2]} as well; remove the older one")
+                found[name] = int(said["place"]), array, file
+            except KeyError as error:
+                raise ValueError(f"{file}: not written by Frames.save: no {error}") from error
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{file}: {error}") from error
+    if not found:
+        raise ValueError(f"{target}: not written by Frames.save: no file has its attributes")
+    ordered = sorted(found.items(), key=lambda one: one[1][0])
+    return {name: array for name, (_, array, _) in ordered}, facts
+
+
+def _parts_of(file: Path) -> int:
+    """Return the number of framebuffers in a file."""
+    return len(image_reading.load(file).parts)
+
+
+def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
+    """Return whether `save` of `target` wrote a framebuffer to this file."""
+    if "framebuffer" not in said:
+        return False
+    name = said["framebuffer"]
+    return file.stem == (name if target.is_dir() else f"{target.stem}_{name}") or (
+        file.stem == target.stem
+    )
+
+
+def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
+    """Return the pixels of a part without the padding of its window, and its attributes."""
+    with image_reading.opened(file, "Frames.load") as reader:
+        reader.seek_subimage(index, 0)
+        spec = reader.spec()
+        image_reading.check_plausible(spec, file)
+        said = _facts(spec)
+        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
+        pixels = complete(pixels, reader, file)
+    return pixels.reshape(spec.height, spec.width, spec.nchannels), said
+
+
+def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
+    """Return what vkbloom wrote into an image file: "settings" and others, as text."""
+    with image_reading.opened(path, "Reading settings") as reader:
+        return _facts(reader.spec())
+
+
+def settings_facts(settings: Settings, expand: float | None) -> dict[str, str]:
+    """Return what an image file holds of the settings that made it, for `facts_of`.
+
+    `expand`: What the highlights of the source were expanded up to.
+    """
+    facts = {
+        "Software": f"vkbloom {installed_version()}",
+        "vkbloom:settings": json.dumps(settings.to_dict()),
+    }
+    return facts if expand is None else {**facts, "vkbloom:expand": f"{expand:g}"}
+
+
+def _facts(spec: OpenImageIO.ImageSpec) -> dict[str, str]:
+    return {
+        attribute.name.removeprefix("vkbloom:"): str(attribute.value)
+        for attribute in spec.extra_attribs
+        if attribute.name.startswith("vkbloom:")
+    } or _described(spec.get_string_attribute("ImageDescription"))
+
+
+def _described(text: str) -> dict[str, str]:
+    """Return the attributes from a description, for formats without other attributes (TIFF)."""
+    with contextlib.suppress(ValueError, AttributeError):
+        return {
+            str(name): str(value)
+            for name, value in json.loads(text.partition(_DESCRIBED)[2]).items()
+        }
+    return {}
+
+
+def _files_of(path: Path) -> list[Path]:
+    """Return the files that `save` may have written for a path."""
+    if path.is_dir():
+        found = sorted(
+            file for file in path.iterdir() if file.is_file() and file.suffix in (".png", ".exr")
+        )
+    elif path.exists():
+        return [path]
+    else:
+        stem = glob.escape(path.stem)
+        found = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
+        for suffix in dict.fromkeys((path.suffix, ".exr")):
+            found += sorted(path.parent.glob(f"{stem}_*{suffix}"))
+    if not found:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    return found
+
+
+def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
+    """Return pixels in their original dtype, depth without a channel."""
+    if dtype not in ("uint8", "float16", "float32"):
+        raise ValueError(f"{dtype!r} is no dtype of a framebuffer")
+    if dtype == "uint8" and pixels.dtype != np.uint8:
+        pixels = np.rint(pixels.astype(np.float32) * 255)
+    made = pixels.astype(dtype, copy=False)
+    return made[:, :, 0] if made.shape[2] == 1 else made
+
+
+def _write_image(
+    oiio: ModuleType, frames: Framebuffers, name: str, temporary: Path, file: Path
+) -> bool:
+    """Write one framebuffer to a file of any format; False if the format cannot hold it."""
+    pixels = np.atleast_3d(frames[name])
+    writer = oiio.ImageOutput.create(str(temporary))
+    if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
+        opaque = 255 if pixels.dtype == np.uint8 else 1.0
+        if not (pixels[:, :, 3] == opaque).all():
+            return False
+        pixels = pixels[:, :, :3]
+    if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
+        return False
+    spec = _spec(oiio, frames, name, pixels, file)
+    # Otherwise OpenImageIO assumes premultiplied colours and divides them by alpha.
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    encoding = frames.settings.encoding
+    if name == "final" and encoding in HDR_CURVES and writer.supports("cicp"):
+        _, named = with_names(oiio, {}, file, ("rec709", encoding))
+        for attribute, (kind, value) in named.items():
+            spec.attribute(attribute, kind, value)
+    if not (
+        writer.open(str(temporary), spec)
+        and writer.write_image(np.ascontiguousarray(native_order(pixels)))
+        and writer.close()
+    ):
+        raise safe_writing.write_error(writer, temporary, file)
+    safe_writing.check_complete(oiio, temporary, file)
+    return True
+
+
+def _write_exr(
+    oiio: ModuleType, frames: Framebuffers, names: Iterable[str], temporary: Path, file: Path
+) -> None:
+    parts: list[NDArray[Any]] = []
+    specs: list[Any] = []
+    height, width = frames[leading(frames)].shape[:2]
+    for name in names:
+        pixels = np.atleast_3d(frames[name])
+        if pixels.dtype == np.uint8:
+            pixels = (pixels / np.float32(255)).astype(np.float16)
+        spec = _spec(oiio, frames, name, pixels, file)
+        # The name of the OpenEXR part.
+        spec.attribute("oiio:subimagename", name)
+        spec.full_width, spec.full_height = width, height
+        if pixels.shape[2] == 1:
+            spec.channelnames = ("Z",)
+            spec.z_channel = 0
+        parts.append(pixels)
+        specs.append(spec)
+    writer = oiio.ImageOutput.create(str(temporary))
+    if not writer.open(str(temporary), specs):
+        raise safe_writing.write_error(writer, temporary, file)
+    for index, (pixels, spec) in enumerate(zip(parts, specs, strict=True)):
+        if index and not writer.open(str(temporary), spec, "AppendSubimage"):
+            raise safe_writing.write_error(writer, temporary, file)
+        if not writer.write_image(np.ascontiguousarray(native_order(pixels))):
+            raise safe_writing.write_error(writer, temporary, file)
+    if not writer.close():
+        raise safe_writing.write_error(writer, temporary, file)
+
+
+def _spec(
+    oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any], file: Path
+) -> OpenImageIO.ImageSpec:
+    """Return OpenImageIO's description of an (H, W, C) array, with the origin of the frames."""
+    height, width, channels = pixels.shape
+    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
+        width, height, channels, PIXEL_TYPES[str(pixels.dtype)]
+    )
+    settings = json.dumps(frames.settings.to_dict())
+    adapter = frames.info.get("adapter", "an unnamed adapter")
+    spec.attribute("Software", f"vkbloom {frames.info.get('version', '')}".rstrip())
+    said = {
+        **{key: str(value) for key, value in frames.info.items()},
+        "settings": settings,
+        "timings": json.dumps(dict(frames.timings)),
+        "dtype": str(frames[name].dtype),
+        "framebuffer": name,
+        "place": str(list(frames).index(name)),
+    }
+    for key, value in said.items():
+        spec.attribute(f"vkbloom:{key}", value)
+    description = f"vkbloom on {adapter}, settings {settings}"
+    # TIFF and JPEG cannot store attributes with other names.
+    if file.suffix.lower() in (".tif", ".tiff", ".jpg", ".jpeg"):
+        description += _DESCRIBED + json.dumps(said)
+    spec.attribute("ImageDescription", description)
+    return spec

@@ -1,0 +1,368 @@
+"""The framebuffers that a renderer returns: by name, with timings, settings and adapter."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import import_extra
+from vkbloom._framebuffers import dimensions
+from vkbloom._renderer.device_arrays import DeviceArray, on_host
+from vkbloom._suggestions import unknown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray
+
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["Frames", "dimensions"]
+
+_IMAGE_DTYPES = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
+_CHANNELS = ("r", "g", "b", "a")
+
+
+class Frames(Mapping[str, NDArray[Any]]):
+    """Framebuffers by name, in the order of the data flow, with timings, settings and adapter.
+
+    A read-only mapping: framebuffers cannot be added, replaced or removed. The arrays are plain
+    `numpy.ndarray`, or `DeviceArray` where they stay on the device, and belong to the caller. Two
+    Frames are equal only if they are the same object; compare their arrays with
+    `numpy.array_equal`.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        Images of shape (H, W, 3) or (H, W, 4) and dtype uint8, float16 or float32; depth of
+        shape (H, W) and dtype float32. Top row first. They are not copied.
+    timings : mapping of str to float
+        Seconds on the device by pass name, for the passes that ran; NaN if the device's queue has
+        no timestamps.
+    settings : Settings
+        The settings of the request.
+    info : mapping of str to object
+        "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input;
+        "driver_sha256", where the driver is that of ``vkbloom-lavapipe``.
+
+    Raises
+    ------
+    TypeError
+        A framebuffer is not an ndarray, or its name is not a str.
+    ValueError
+        A name is not an identifier, or an array's shape or dtype is not one of the above.
+
+    See Also
+    --------
+    Renderer.apply, Renderer.render : Return Frames.
+
+    Examples
+    --------
+    >>> image = np.full((16, 24, 3), 0.5, np.float32)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
+    >>> {name: array.shape for name, array in frames.items()}
+    {'glow': (16, 24, 4), 'down_0': (8, 12, 4), 'down_1': (4, 6, 4), 'up_0': (8, 12, 4), \
+'bloom': (16, 24, 4), 'final': (16, 24, 3)}
+    >>> frames.settings.levels
+    2
+    >>> frames.info["nan"]
+    0
+    """
+
+    def __init__(
+        self,
+        arrays: Mapping[str, NDArray[Any]],
+        *,
+        timings: Mapping[str, float],
+        settings: Settings,
+        info: Mapping[str, Any],
+    ) -> None:
+        self._arrays = {name: _checked(name, array) for name, array in arrays.items()}
+        self._timings = {name: float(seconds) for name, seconds in timings.items()}
+        self._settings = settings
+        self._info = dict(info)
+        self._end: Callable[[], tuple[dict[str, float], int, int]] | None = None
+
+    def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
+        """Add what is known when the device has finished."""
+        self._timings = timings
+        self._info |= {"nan": nan, "inf": inf}
+
+    def _finish_later(self, end: Callable[[], tuple[dict[str, float], int, int]]) -> None:
+        """Call `end`, which waits and returns the arguments of `_finish`, when they are read."""
+        self._end = end
+
+    def _complete(self) -> None:
+        if (end := self._end) is not None:
+            self._finish(*end())
+            self._end = None
+
+    def _on_host(self) -> Frames:
+        """Return the same with arrays of NumPy: this object, if it has no others."""
+        if not any(isinstance(array, DeviceArray) for array in self._arrays.values()):
+            return self
+        arrays = {name: on_host(array) for name, array in self._arrays.items()}
+        return Frames(arrays, timings=self.timings, settings=self._settings, info=self.info)
+
+    @property
+    def timings(self) -> Mapping[str, float]:
+        """Seconds on the device by pass name, for the passes that ran; read-only.
+
+        NaN if the device's queue has no timestamps. Of framebuffers on a GPU this waits until they
+        are complete.
+        """
+        self._complete()
+        return MappingProxyType(self._timings)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the request."""
+        return self._settings
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Adapter, driver and version, and the numbers of "nan" and "inf" values in the input.
+
+        Of framebuffers on a GPU this waits until they are complete.
+        """
+        self._complete()
+        return self._info
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        try:
+            return self._arrays[name]
+        except KeyError:
+            raise KeyError(unknown("unknown framebuffer", name, self._arrays)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    # Mapping compares values with ==, which is ambiguous for arrays.
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return object.__hash__(self)
+
+    def __repr__(self) -> str:
+        column = max((len(name) for name in self), default=0)
+        lines = [f"Frames on {self._info.get('adapter', 'an unnamed adapter')}"]
+        lines += [
+            f"  {name:{column}}  {array.dtype!s:7}  {array.shape}" for name, array in self.items()
+        ]
+        return "\n".join(lines)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the framebuffers as one Dataset with a variable for each.
+
+        Framebuffers of the size of `final` (or, without it, of the last image) have the dimensions
+        "y" and "x". Others have "<first>_y" and "<first>_x", where <first> is the first
+        framebuffer of that size. The dimension of `final`'s channels is "channel", of another
+        number of channels "<first>_channel".
+
+        Returns
+        -------
+        xarray.Dataset
+            The coordinates of channels are "r", "g", "b" and, if there is alpha, "a". The
+            attributes contain `info`, and the settings and timings as JSON, because netCDF and
+            Zarr store only text and numbers. The variables share memory with the framebuffers.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            xarray is missing: ``pip install vkbloom[grid]``.
+
+        See Also
+        --------
+        grid : A Dataset of many settings.
+
+        Examples
+        --------
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     dataset = renderer.apply(image, vkbloom.Separable()).to_xarray()
+        >>> dataset["bloom"].dims
+        ('y', 'x', 'glow_channel')
+        >>> float(dataset["final"].sel(channel="r").mean().round(3)) > 0.5
+        True
+        """
+        import json  # noqa: PLC0415  costs start-up time
+
+        xr = import_extra("xarray", "grid", "Frames.to_xarray")
+        dims = dimensions(self)
+        host = self._on_host()
+        channels = {
+            dims[name][2]: list(_CHANNELS[: array.shape[2]])
+            for name, array in self.items()
+            if array.ndim == 3
+        }
+        dataset: xarray.Dataset = xr.Dataset(
+            {name: (dims[name], array) for name, array in host.items()},
+            coords=channels,
+            attrs={
+                **{k: v if isinstance(v, int | float) else str(v) for k, v in self.info.items()},
+                "settings": json.dumps(self._settings.to_dict()),
+                "timings": json.dumps(dict(self.timings)),
+            },
+        )
+        return dataset
+
+    @checked
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write the framebuffers to image files without loss.
+
+        ========================== ========================================================
+        path                       files
+        ========================== ========================================================
+        ``out.exr``                one multi-part OpenEXR file, one part per framebuffer
+        ``out.png``, ``out.tif``   ``out_<name>.png``; ``out.png`` if there is one only
+        a folder, or no extension  ``<name>.png`` in that folder, which is created if missing
+        ========================== ========================================================
+
+        A framebuffer that the format cannot hold is written as ``.exr`` with the same stem: float
+        images and depth beside ``out.png``, for example. If the format has no alpha, an alpha of
+        1 everywhere is left out. JPEG, WebP, GIF and Radiance HDR compress with loss.
+
+        In OpenEXR, half stays half and float stays float. 8-bit values are stored as half,
+        value / 255, and the attribute ``vkbloom:dtype`` is "uint8"; ``round(255 * value)`` gives
+        the original levels. Depth is a float channel ``Z``. All parts of a file must have the same
+        display window, which is that of `final` (without it, of the last image). Values are stored
+        without gamma and without multiplication by alpha.
+
+        If the format has such attributes, ``Software`` and ``ImageDescription`` (``Description``
+        in PNG) contain the version, the adapter and the settings, and ``vkbloom:<key>`` contains
+        each entry of `info`, and the settings and timings as JSON. In TIFF and JPEG the
+        ``ImageDescription`` contains all of it.
+
+        Parameters
+        ----------
+        path : str or path-like
+            A file name with an extension that OpenImageIO writes, or a folder. Existing files are
+            replaced; symbolic links are followed. All files are written under temporary names and
+            renamed when all are complete.
+
+        Returns
+        -------
+        list of Path
+            The written files, in the order of the framebuffers.
+
+        Raises
+        ------
+        ValueError
+            The extension is unknown, the name is not UTF-8, or there is no framebuffer.
+        OSError
+            A file cannot be written; the error names it, and no partial file is left.
+        ModuleNotFoundError
+            OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+        See Also
+        --------
+        Frames.to_xarray : One Dataset, which netCDF and Zarr can store.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> image = np.full((16, 16, 3), 100, np.uint8)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames = renderer.apply(image, vkbloom.Separable())
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in frames.save(f"{folder}/out.png")]
+        ['out_glow.png', 'out_blur_vertical.png', 'out_bloom.png', 'out_final.png']
+        """
+        from vkbloom._renderer import frame_files  # noqa: PLC0415  costs start-up time
+
+        return frame_files.save(self._on_host(), path)
+
+    @classmethod
+    @checked
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read framebuffers from files that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The argument of `save`: a file name, or a folder.
+
+        Returns
+        -------
+        Frames
+            The framebuffers in their original order and dtypes, with their settings, timings and
+            info.
+
+        Raises
+        ------
+        OSError
+            A file does not exist or cannot be opened. The error names it.
+        ValueError
+            A file is damaged; it has no settings, because `save` did not write it, or because its
+            format cannot store them (only OpenEXR, PNG, TIFF and JPEG can); or two files have the
+            same framebuffer, from two calls of `save`. The error names the file.
+        ModuleNotFoundError
+            OpenImageIO is missing: ``pip install vkbloom[images]``.
+
+        See Also
+        --------
+        save : Writes the files.
+
+        Notes
+        -----
+        Other files in a folder are ignored, and so are files with other names that start the same.
+        JPEG compresses with loss, so its values differ from the saved ones.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     files = frames.save(f"{folder}/out.png")
+        ...     again = vkbloom.Frames.load(f"{folder}/out.png")
+        >>> again.settings == frames.settings, np.array_equal(again["bloom"], frames["bloom"])
+        (True, True)
+        """
+        from vkbloom._renderer import frame_files  # noqa: PLC0415  costs start-up time
+
+        arrays, facts = frame_files.load(path)
+        return cls(arrays, **facts)
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the picture of `pictures.leading_png`; None without framebuffers."""
+        from vkbloom._views import pictures  # noqa: PLC0415  costs start-up time
+
+        return pictures.leading_png(self._on_host()) if self else None
+
+    def _repr_html_(self) -> str:
+        """Return the page of `pictures.contact_sheet_html`."""
+        from vkbloom._views import pictures  # noqa: PLC0415  costs start-up time
+
+        return pictures.contact_sheet_html(self._on_host())
+
+
+def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
+    if not isinstance(name, str):
+        raise TypeError(f"arrays: {name!r} is not a name; use a str")
+    if not name.isidentifier():
+        raise ValueError(f"arrays: {name!r} is not an identifier, as names of framebuffers must be")
+    if isinstance(array, DeviceArray):
+        return array
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"arrays[{name!r}]: {type(array).__name__} is not a NumPy array")
+    is_image = array.ndim == 3 and array.shape[2] in (3, 4) and array.dtype in _IMAGE_DTYPES
+    is_depth = array.ndim == 2 and array.dtype == np.float32
+    if not (is_image or is_depth) or array.size == 0:
+        raise ValueError(
+            f"arrays[{name!r}]: {array.dtype} of shape {array.shape} is neither an image, "
+            "(H, W, 3) or (H, W, 4) of uint8, float16 or float32, nor depth, (H, W) of float32"
+        )
+    return np.asarray(array)

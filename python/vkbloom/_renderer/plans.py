@@ -1,0 +1,192 @@
+"""Plans: the framebuffers and passes of a request, known before it is rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from vkbloom import _core
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["Pass", "Plan", "framebuffers_of"]
+
+Framebuffer = tuple[tuple[int, ...], np.dtype[Any]]
+
+
+class Pass(NamedTuple):
+    """One pass of a plan.
+
+    Attributes
+    ----------
+    name : str
+        The key of `Frames.timings`. Passes that draw into the same images, and the steps of one
+        result, have the same name and one time.
+    shader : str
+        The SPIR-V module of the shader, such as "blur_frag".
+    reads, writes : tuple of str
+        Names of images: framebuffers and intermediate images.
+    variant : str
+        The variant that this class of devices runs instead of the method's own pass. "fragment":
+        the pass itself, drawn by a fragment shader.
+
+    See Also
+    --------
+    Plan : Has the passes.
+
+    Examples
+    --------
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     plan = renderer.plan(np.zeros((16, 16, 4), np.uint8), vkbloom.Separable())
+    >>> plan.passes[0].writes
+    ('glow',)
+    """
+
+    name: str
+    shader: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    variant: str
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """The passes and framebuffers of one request: one source with one settings.
+
+    Made by `Renderer.plan`. Two plans are equal if all attributes except `passes` are equal: these
+    depend on the renderer's device.
+
+    Attributes
+    ----------
+    source : {"image", "forward", "deferred"}
+        An image, or a scene with this shading.
+    size : (int, int)
+        Width and height of the frame in pixels.
+    dtype : numpy.dtype or None
+        Of an image.
+    channels : int or None
+        Of an image: 3 or 4.
+    mask, emission : bool
+        Whether the image has one (`Renderer.upload`).
+    settings : Settings
+    framebuffers : mapping of str to (tuple of int, numpy.dtype)
+        Shape and dtype of each requested framebuffer, in the order of the data flow.
+    passes : tuple of Pass
+        In the order in which they run on a new renderer. A renderer skips passes whose results are
+        up to date.
+
+    See Also
+    --------
+    Renderer.plan
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import vkbloom
+    >>> image = np.zeros((90, 160, 4), np.float16)
+    >>> with vkbloom.Renderer() as renderer:
+    ...     plan = renderer.plan(image, vkbloom.Separable(threshold=1.0))
+    >>> list(plan.framebuffers)
+    ['glow', 'blur_vertical', 'bloom', 'final']
+    >>> plan.framebuffers["final"]
+    ((90, 160, 4), dtype('float16'))
+    >>> [one.name for one in plan.passes]
+    ['glow', 'blur_vertical', 'bloom', 'final']
+    """
+
+    source: str
+    size: tuple[int, int]
+    dtype: np.dtype[Any] | None
+    channels: int | None
+    mask: bool
+    emission: bool
+    settings: Settings
+    framebuffers: Mapping[str, Framebuffer] = field(hash=False)
+    passes: tuple[Pass, ...] = field(compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "framebuffers", MappingProxyType(dict(self.framebuffers)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        fields = {**vars(self), "framebuffers": dict(self.framebuffers)}
+        return type(self), tuple(fields.values())
+
+    def __repr__(self) -> str:
+        return (
+            f"<vkbloom.Plan of {self._title}: {len(self.passes)} passes, "
+            f"{len(self.framebuffers)} framebuffers>"
+        )
+
+    @property
+    def _title(self) -> str:
+        width, height = self.size
+        kind = f"{self.dtype} image" if self.source == "image" else f"{self.source} scene"
+        return f"{kind}, {width} x {height}, {self.settings.method}"
+
+    def to_mermaid(self) -> str:
+        """Return the passes as a Mermaid flowchart.
+
+        Returns
+        -------
+        str
+            Framebuffers are boxes with their size and dtype, other images have round corners, and
+            passes are hexagons with their shader. GitHub, JupyterLab and many editors draw it.
+
+        See Also
+        --------
+        Renderer.plan : Returns a plan.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import vkbloom
+        >>> image = np.zeros((9, 16, 3), np.float32)
+        >>> with vkbloom.Renderer() as renderer:
+        ...     plan = renderer.plan(image, vkbloom.Separable(bloom=False))
+        >>> print(plan.to_mermaid())  # doctest: +ELLIPSIS
+        flowchart LR
+            image(image)
+            final["final<br>16 x 9, float32"]
+            pass0{{"final<br>composite_..."}}
+            image --> pass0 --> final
+        """
+        images = dict.fromkeys(name for one in self.passes for name in (*one.reads, *one.writes))
+        lines = ["flowchart LR"]
+        for name in images:
+            if name in self.framebuffers:
+                shape, dtype = self.framebuffers[name]
+                lines.append(f'{name}["{name}<br>{shape[1]} x {shape[0]}, {dtype}"]')
+            else:
+                lines.append(f"{name}({name})")
+        for number, one in enumerate(self.passes):
+            lines.append(f'pass{number}{{{{"{one.name}<br>{one.shader}"}}}}')
+            reads = f"{' & '.join(one.reads)} --> " if one.reads else ""
+            lines.append(f"{reads}pass{number} --> {' & '.join(one.writes)}")
+        return "\n    ".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Return a table of the passes."""
+        import html  # noqa: PLC0415  costs start-up time
+
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(_text(part))}</td>" for part in one) + "</tr>"
+            for one in self.passes
+        )
+        head = "".join(f"<th>{name}</th>" for name in Pass._fields)
+        return (
+            f"<table><caption>{html.escape(self._title)}</caption>"
+            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        )
+
+
+def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:
+    """Return shape and dtype of each framebuffer of a plan of the core."""
+    return {name: (shape, np.dtype(dtype)) for name, shape, dtype in plan.outputs}
+
+
+def _text(part: str | tuple[str, ...]) -> str:
+    return part if isinstance(part, str) else ", ".join(part)

@@ -1,0 +1,970 @@
+"""The renderer: scenes and settings in, framebuffers out."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import re
+import weakref
+from collections import abc
+from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, cast
+
+import numpy as np
+
+from vkbloom import _core
+from vkbloom._argument_types import checked
+from vkbloom._array_cache import ArrayCache, shared
+from vkbloom._checks import check_framebuffers, check_size
+from vkbloom._renderer import requests
+from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
+from vkbloom._renderer.batches import Batches
+from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.image import Image
+from vkbloom._renderer.sources import (
+    batch_sources,
+    checked_inputs,
+    image_kind,
+    image_source,
+    is_image,
+    scene_source,
+    take_batch,
+)
+from vkbloom._settings.settings import Settings, Shading, check_settings, check_shading
+from vkbloom._suggestions import unknown
+from vkbloom._version import installed_version
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from vkbloom._renderer.plans import Plan
+    from vkbloom._scene import Scene
+
+SCENE_SIZE = (1280, 720)
+# Stands for images that are not known yet. Larger ones have more levels, of the same names but for
+# the number.
+_ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
+_NUMBER = re.compile(r"\d+")
+
+#: The renderers of this process by their numbers, which are never used again: operators of PyTorch
+#: take numbers only.
+RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
+_numbers = itertools.count(1)
+
+
+def _frame_seconds() -> float:
+    """Return how long the device may take for a frame before it counts as lost."""
+    text = os.environ.get("VKBLOOM_TIMEOUT") or "300"
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0:
+        raise ValueError(f"VKBLOOM_TIMEOUT: {text!r} is not a number of seconds above 0")
+    return seconds
+
+
+def _check_out(array: object, name: str, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"out: {name} must be an array, not {type(array).__name__}")
+    if array.shape != shape or array.dtype != np.dtype(dtype):
+        raise ValueError(
+            f"out: {name} has shape {array.shape} and dtype {array.dtype}, "
+            f"it must have {shape} and {dtype}"
+        )
+    if not array.flags.c_contiguous or not array.flags.writeable:
+        raise ValueError(f"out: {name} must be C-contiguous and writeable")
+    return array
+
+
+def _arrays_for(
+    core: _core.Renderer,
+    plan: _core.Plan,
+    out: Mapping[str, Any] | None,
+    place: requests.Destination,
+) -> tuple[NDArray[Any] | _core.Exported, ...]:
+    """Return the arrays to fill: those of `out`, and new ones.
+
+    Arrays of `out` that are on the device are filled later, from new ones that are there.
+    """
+    if out is None:
+        return requests.new_arrays(core, plan, place)
+    if not isinstance(out, abc.Mapping):
+        raise TypeError(f"out: {type(out).__name__} is not a mapping of names to arrays")
+    names = [name for name, _, _ in plan.outputs]
+    for name in out:
+        if name not in names:
+            raise ValueError(f"out: {name!r} is not among the framebuffers: {', '.join(names)}")
+    given: dict[str, NDArray[Any]] = {}
+    for name, shape, dtype in plan.outputs:
+        if name not in out or on_cuda(out[name]):
+            continue
+        array = _check_out(out[name], name, shape, dtype)
+        for other, taken in given.items():
+            # The arrays are contiguous, so it is sufficient to compare their bounds.
+            if np.may_share_memory(array, taken):
+                raise ValueError(f"out: {other} and {name} must not share memory")
+        given[name] = array
+    return tuple(
+        given[name]
+        if name in given
+        else requests.new_memory(core, shape, dtype, "cuda" if name in out else place)
+        for name, shape, dtype in plan.outputs
+    )
+
+
+def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Source]:
+    """Yield the Source of each image; a batch on the device is copied at once."""
+    if on_cuda(images):
+        yield from batch_sources(take_batch(images, core))
+        return
+    # Not by enumerate(), which keeps a reference to the image.
+    places = itertools.count()
+    for image in images:
+        source = image_source(image, core=core, name=f"images[{next(places)}]")
+        # The iterable may overwrite the array when it yields the next image.
+        del image
+        yield source
+        del source
+
+
+def _paired(
+    sources: Iterable[_core.Source], settings: Settings | Sequence[Settings]
+) -> Iterator[requests.Request]:
+    """Yield each source with its settings. Errors are raised in order."""
+    count = 0
+    state: dict[Any, Any] = {}
+    for source in sources:
+        if isinstance(settings, Settings):
+            one = settings
+        elif count < len(settings):
+            one = settings[count]
+        else:
+            raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
+        work = requests.Request(source, one._in_sequence(count, state))
+        del source
+        yield work
+        del work
+        count += 1
+    if not isinstance(settings, Settings) and count < len(settings):
+        raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
+
+
+class Renderer:
+    """A device and its pipeline, in this process until it is closed.
+
+    Parameters
+    ----------
+    adapter : str
+        "auto" (discrete, integrated, virtual, cpu, in that order), "software", "hardware", a part
+        of an adapter's name in any case, "uuid:" with a device's UUID or its beginning, or "pci:"
+        with its address ("pci:0000:3b:00.0"). The environment variable VKBLOOM_ADAPTER replaces
+        "auto". Where CUDA_VISIBLE_DEVICES is set, of NVIDIA's GPUs only the first one that it names
+        is taken, unless `adapter` is a UUID or an address. "software" is the driver of the package
+        ``vkbloom-lavapipe`` if it is installed, otherwise the system's. VKBLOOM_DRIVER selects
+        another driver by the path of its library or manifest, or "system".
+    validation : bool
+        Enables the Khronos validation layer with synchronization validation. A call that causes
+        messages raises `ValidationError` with the first one.
+
+    Attributes
+    ----------
+    closed : bool
+    info : AdapterInfo
+
+    Raises
+    ------
+    AdapterNotFoundError
+        No adapter fits. The message lists the adapters found, and what is missing or has to be
+        installed.
+    Error
+        The device cannot be set up, or the validation layer is not installed.
+    ValueError
+        `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
+        out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
+
+    See Also
+    --------
+    adapters : Lists the adapters.
+    Frames : What the calls return.
+
+    Notes
+    -----
+    A renderer is a context manager, and any thread can use it. Calls release the GIL while the
+    device works, and wait for each other. Framebuffers own their memory and stay valid when the
+    renderer is closed.
+
+    Ctrl-C, or any exception from a signal handler, ends a waiting call. The renderer can be used
+    again; closing it waits until the device has finished. A device that takes longer than 300 s for
+    a frame counts as lost; the environment variable VKBLOOM_TIMEOUT replaces this number. After a
+    fork, the parent's renderers raise ValueError in the child. The child can open its own renderer
+    if the driver supports this. NVIDIA's driver does not: start processes with multiprocessing's
+    method "spawn".
+
+    Drivers limit the number of renderers that are open at once in a process: NVIDIA's driver 580
+    refused 100. Any number can be opened one after the other.
+
+    The first renderer, or the first call of `adapters`, opens the Vulkan loader for the life of the
+    process. Drivers that are installed later, and variables such as VK_DRIVER_FILES that are set
+    later, have an effect only in new processes.
+
+    Examples
+    --------
+    >>> image = np.zeros((16, 16, 4), np.float32)
+    >>> image[8, 8] = 10
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=1.0))
+    >>> frames["bloom"].shape
+    (16, 16, 4)
+    >>> renderer.closed
+    True
+    """
+
+    @checked
+    def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
+        if not adapter:
+            raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
+        if adapter == "auto":
+            adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
+        from vkbloom._io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
+        self._core = _core.Renderer(
+            adapter,
+            bundled_driver(),
+            bool(validation),
+            os.environ.get("VKBLOOM_VARIANT") or "auto",
+            _frame_seconds(),
+            pipeline_cache.read,
+        )
+        self._driver_uuid = self._core.info[5]
+        self.info = from_core(self._core.info)
+        self._made_by = {
+            "adapter": self.info.name,
+            "driver": self.info.driver_info or self.info.driver,
+            "version": installed_version(),
+        }
+        if self.info.bundled and (sha256 := bundled_hash()):
+            self._made_by["driver_sha256"] = sha256
+        self._saved_pipelines = 0
+        self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
+        self._pending = requests.PendingSubmissions()
+        self._batches = Batches(self._core, self._pending)
+        # What map has checked last.
+        self._named: tuple[object, tuple[str, ...]] = None, ()
+        self._kept: ArrayCache | None = shared()
+        self._number = next(_numbers)
+        RENDERERS[self._number] = self
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._core.closed
+
+    def close(self) -> None:
+        """Release the device and everything on it. May be called twice.
+
+        Raises
+        ------
+        ValidationError
+            With validation: an object was not destroyed.
+
+        See Also
+        --------
+        closed : Whether it was called.
+
+        Examples
+        --------
+        >>> renderer = vkbloom.Renderer("software")
+        >>> renderer.close()
+        >>> renderer.closed
+        True
+        """
+        self._planned = self._kept = None
+        self._batches.forget()
+        try:
+            self._pending.wait()
+        except ValueError:  # the device belongs to the process that this one was forked from
+            self._pending.forget()
+        finally:
+            self._core.close()
+
+    def __reduce__(self) -> NoReturn:
+        # For copy.copy, copy.deepcopy and pickle: two objects would share one device.
+        raise TypeError("a Renderer cannot be copied or pickled; create another one")
+
+    def __enter__(self) -> Renderer:
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<vkbloom.Renderer on {self.info.summary}{', closed' if self.closed else ''}>"
+
+    def _repr_html_(self) -> str:
+        """Return the table of `display.renderer_html`."""
+        # Imported here, since only notebooks need it.
+        from vkbloom._views import display  # noqa: PLC0415
+
+        return display.renderer_html(self.info, closed=self.closed)
+
+    @checked
+    def render(
+        self,
+        scene: Scene,
+        settings: Settings | str | None = None,
+        size: tuple[int, int] = SCENE_SIZE,
+        *,
+        shading: Shading = "forward",
+        time: float = 0.0,
+        framebuffers: Literal["all"] | str | Sequence[str] = "all",
+        out: Mapping[str, Any] | None = None,
+        device: Device | None = None,
+    ) -> Frames:
+        """Render a scene with its bloom.
+
+        Parameters
+        ----------
+        scene : Scene
+        settings : Settings, optional
+            Default: ``presets["tutorial"]``, which is ``Separable()``.
+        size : (int, int)
+            Width and height of the frame in pixels.
+        shading : {"forward", "deferred"}
+            Forward: the glow mesh is drawn into its own buffers, blurred, and added to the
+            Phong-lit scene, all in 8 bits. Deferred: albedo, normal, position and brightness of the
+            visible surfaces are drawn into a G-buffer of half floats. The scene is lit from it. The
+            blurred image is the brightness: the emission of the body's materials plus the glow
+            mesh's colour times the scene's `glow_intensity`.
+        time : float
+            Time of the animation in turns, any finite number. 0 and 1 give the same frame.
+        framebuffers : "all" or sequence of str
+            Names of the requested framebuffers. Other framebuffers are rendered only if a requested
+            one depends on them. They are not read back.
+        out : mapping of str to ndarray, optional
+            Arrays to fill, by name. Arrays for the other framebuffers are allocated.
+        device : {"host", "device"}, optional
+            Where the framebuffers go: arrays of NumPy, or `DeviceArray` objects. Default: "device"
+            if an array of the source is on the GPU, else "host".
+
+        Returns
+        -------
+        Frames
+            Forward: ``glow`` (bloom buffer size, (H, W, 4)), ``glow_depth`` ((H, W) float32),
+            ``blur_vertical``, ``bloom`` (at the frame's size), ``scene`` ((H, W, 4) uint8),
+            ``depth`` ((H, W) float32) and ``final`` ((H, W, 4) uint8).
+
+            Deferred, at the frame's size except for the blur: ``albedo``, ``normal``, ``position``
+            (both in view space), ``brightness`` (all (H, W, 4) float16), ``depth``,
+            ``blur_vertical``, ``bloom``, ``scene`` ((H, W, 4) float16, light plus brightness) and
+            ``final`` ((H, W, 4) uint8). Pixels of the sky or of the empty background have a normal
+            of 0, and their albedo is the colour.
+
+            With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
+            bloom buffers, and the glow mesh is left out.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range, an array of `out` does not fit, or the renderer is closed.
+        TypeError
+            An argument has the wrong type.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. The renderer can be used again unless the device is lost.
+
+        See Also
+        --------
+        sweep : Many settings.
+        apply : The same for an image.
+        plan : The framebuffers of a call.
+
+        Notes
+        -----
+        A pass runs only if its inputs, its settings or its size have changed since its last run.
+        The ``timings`` of the result name the passes that ran.
+
+        Examples
+        --------
+        >>> settings = vkbloom.Separable(bloom_size=(32, 32))
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     scene = vkbloom.Scene.ufo()
+        ...     frames = renderer.render(scene, settings, (64, 48), framebuffers="final")
+        >>> frames["final"].shape
+        (48, 64, 4)
+        """
+        settings = check_settings(settings)
+        source = scene_source(scene, size, shading, time)
+        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device)
+
+    @checked
+    def apply(
+        self,
+        image: NDArray[Any] | Image,
+        settings: Settings | str | None = None,
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+        framebuffers: Literal["all"] | str | Sequence[str] = "all",
+        out: Mapping[str, Any] | None = None,
+        device: Device | None = None,
+    ) -> Frames:
+        """Add bloom to an image.
+
+        Parameters
+        ----------
+        image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
+            Linear light: uint8 (read as value / 255), float16 or float32; any strides. The levels
+            of a photograph are not linear: read it with `vkbloom.read`. RGB gets alpha 1; the field
+            `alpha` of the settings selects the treatment of an alpha. NaN and infinity count as 0
+            in the bloom, and stay in ``final`` at their pixels. It may be an array on the GPU with
+            `__dlpack__`, of which a copy is made there. An `Image` from `upload` is used
+            with its mask and emission.
+        settings : Settings, optional
+            Default: ``presets["bevy_natural"]``.
+        mask : ndarray, shape (H, W), optional
+            The parts that glow, 0 to 1, with the image's size: uint8 (read as value / 255), bool,
+            float16 or float32. It is reduced bilinearly like the image, and multiplies the
+            thresholded image. Published methods read it at the pixel centres of the first image
+            that they write after their threshold.
+        emission : ndarray, optional
+            An image of the same shape and dtype from which the bloom is made instead, like the glow
+            mesh in a scene. It is added to the image in ``final``.
+        framebuffers, out, device
+            As for `render`. Arrays of `out` may be on the GPU.
+
+        Returns
+        -------
+        Frames
+            ``glow`` (the thresholded image), the blur's framebuffers (``blur_vertical``; or
+            ``down_0``, ``down_1``, ... and ..., ``up_0``), ``bloom``, all (H, W, 4) in the format
+            of the bloom buffers, and ``final``, which has the image's shape and dtype. With
+            ``bloom=False`` there is only ``final``. ``info`` has the numbers of "nan" and "inf" in
+            the image and the emission.
+
+        Raises
+        ------
+        ValueError
+            The image has another shape, masked values or more pixels than the adapter allows, the
+            mask or the emission do not fit it, an argument is out of range, an array of `out` does
+            not fit, or the renderer is closed.
+        TypeError
+            The image has another dtype, or an argument another type.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. The renderer can be used again unless the device is lost.
+
+        See Also
+        --------
+        sweep, map : Many settings, or many images.
+        upload : Keeps an image on the device.
+        render : The same for a scene.
+
+        Notes
+        -----
+        An image with the same bytes as before is not uploaded again. Passes run only if their
+        inputs or settings have changed. The same is true for mask and emission.
+
+        On a CPU, passes read an image of 1 MiB or more where it is, if its layout allows this. Then
+        nothing is kept of it. If the same array comes again, it is copied, all passes run once
+        more, and from then on the paragraph above holds.
+
+        The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
+        With a mask m the result is s + i (b - m s), with an emission s + i b.
+
+        Examples
+        --------
+        There are two lamps, and the mask selects one of them:
+
+        >>> image = np.zeros((32, 64, 3), np.float32)
+        >>> image[16, 16] = image[16, 48] = 10
+        >>> mask = np.zeros((32, 64), bool)
+        >>> mask[:, :32] = True
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     glow = renderer.apply(image, vkbloom.Pyramid(threshold=1.0), mask=mask)["glow"]
+        >>> glow[16, 16, 0].item(), glow[16, 48, 0].item()
+        (10.0, 0.0)
+        """
+        settings = check_settings(settings, of_image=True)
+        self._pending.wait()
+        source = image_source(image, mask, emission, self._core, waits=False)
+        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device)
+
+    @checked
+    def map(
+        self,
+        images: Iterable[NDArray[Any] | Image],
+        settings: Settings | str | Sequence[Settings | str] | None = None,
+        *,
+        framebuffers: Literal["all"] | str | Sequence[str] = "all",
+        device: Device | None = None,
+    ) -> Iterator[Frames]:
+        """Add bloom to many images.
+
+        Parameters
+        ----------
+        images : iterable of images
+            Each as for `apply`, or a batch (N, H, W, C), which is copied at once if it is on the
+            GPU. Shapes and dtypes may differ. Each image is copied before the next one is taken, so
+            the iterable can fill one array repeatedly.
+        settings : Settings or sequence of Settings, optional
+            For all images, or one for each image. Default: ``presets["bevy_natural"]``.
+        framebuffers, device
+            As for `apply`.
+
+        Yields
+        ------
+        Frames
+            One for each image, in their order.
+
+        Raises
+        ------
+        ValueError
+            Raised by the call: the lengths of both sequences differ, or an argument is out of
+            range. Raised by the iteration: an image is not valid for `apply`, or has no settings.
+        TypeError
+            `images` is not iterable, or an argument has another type.
+
+        See Also
+        --------
+        sweep : One image with many settings.
+        upload : Keeps an image on the device.
+
+        Notes
+        -----
+        The device works on the next images while the caller uses a frame. So after the first frame,
+        the number of images taken is up to two larger than the number of yielded frames. Of a batch
+        on the GPU with one Settings, each pass runs for many images at once. An error
+        of an image or of the iterable is raised after the frames of all earlier images, and ends
+        the iteration.
+
+        Examples
+        --------
+        >>> images = (np.full((16, 24, 3), level, np.float32) for level in (0.25, 0.5, 1.0))
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     for frames in renderer.map(images, vkbloom.Pyramid(levels=2)):
+        ...         print(frames["final"].max())
+        0.5
+        1.0
+        2.0
+        """
+        names = check_framebuffers(framebuffers)
+        is_one = isinstance(images, str | bytes) or (
+            isinstance(images, np.ndarray) and images.ndim != 4
+        )
+        if (not isinstance(images, abc.Iterable) and not on_cuda(images)) or is_one:
+            raise TypeError(
+                f"images: {type(images).__name__} is not an iterable of images; for one image, "
+                "call apply or pass a list"
+            )
+        chosen: Settings | Sequence[Settings]
+        if isinstance(settings, abc.Sequence) and not isinstance(settings, str):
+            chosen = [
+                check_settings(one, f"settings[{number}]") for number, one in enumerate(settings)
+            ]
+            if isinstance(images, abc.Sized) and len(images) != len(chosen):
+                raise ValueError(
+                    f"settings: {len(chosen)} Settings do not match the {len(images)} images"
+                )
+        else:
+            chosen = check_settings(settings, of_image=True)
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        if names and not (self._named[0] is chosen and self._named[1] == names):
+            self._check_names(image_source(_ANY_IMAGE), chosen, names)
+            self._named = chosen, names
+        place = self._placed(device)
+        if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
+            return self._run_batch(images, chosen, names, place)
+        work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        return self._run_work(work, names, place, alone=True)
+
+    @checked
+    def upload(
+        self,
+        image: NDArray[Any],
+        *,
+        mask: NDArray[Any] | None = None,
+        emission: NDArray[Any] | None = None,
+    ) -> Image:
+        """Copy an image to the device, to use it in many calls.
+
+        Parameters
+        ----------
+        image : ndarray
+            As for `apply`. It may change as soon as this returns.
+        mask, emission : ndarray, optional
+            As for `apply`. They stay with the image.
+
+        Returns
+        -------
+        Image
+            This renderer accepts it in place of an array. Calls do not compare its bytes.
+
+        Raises
+        ------
+        ValueError
+            The image has another shape, or more pixels than the adapter allows, the mask or the
+            emission do not fit it; or the renderer is closed.
+        TypeError
+            The image has another dtype.
+        OutOfMemoryError, DeviceLostError, ValidationError, Error
+            The device failed. The renderer can be used again unless the device is lost.
+
+        See Also
+        --------
+        map : Many images, each copied while the device works on others.
+
+        Examples
+        --------
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
+        ...     dark, bright = (
+        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
+        ...         for exposure in (-1.0, 1.0)
+        ...     )
+        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
+        True
+        """
+        if isinstance(image, Image):
+            raise TypeError("image: the image was uploaded already; pass it to apply")
+        inputs = checked_inputs(image, mask, emission, self._core)
+        source = inputs.source()
+        shape, dtype = source.kind
+        if source.exported:
+            # It is a copy already, but for what is on the host.
+            inputs = inputs.kept()
+            return Image(inputs.source(), shape, np.dtype(dtype), inputs.named())
+        uploaded = self._core.upload(source, None, False)
+        # `vjp` reads the pixels of the image from the device.
+        named = inputs.named()
+        beside: dict[str, Any] = {
+            name: np.array(named[name]) for name in ("mask", "emission") if name in named
+        }
+        return Image(uploaded, shape, np.dtype(dtype), beside)
+
+    @checked
+    def sweep(
+        self,
+        source: Scene | NDArray[Any] | Image,
+        settings: Iterable[Settings | str],
+        *,
+        size: tuple[int, int] | None = None,
+        shading: Shading = "forward",
+        time: float = 0.0,
+        framebuffers: Literal["all"] | str | Sequence[str] = "all",
+        device: Device | None = None,
+    ) -> Iterator[Frames]:
+        """Render one scene, or add bloom to one image, with many settings.
+
+        Parameters
+        ----------
+        source : Scene or an image
+            As for `render` and `apply`. An array must not change before the last frame is taken.
+        settings : iterable of Settings
+            Names of presets are settings, too.
+        size : (int, int), optional
+            Width and height of a scene's frames. Default: (1280, 720). Not for an image.
+        shading, time
+            Of a scene, as for `render`.
+        framebuffers, device
+            As for `apply`.
+
+        Yields
+        ------
+        Frames
+            One for each of the settings, in their order; only the passes that a change of settings
+            puts out of date run.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As for `render` and `apply`; or `settings` is not an iterable of settings.
+
+        See Also
+        --------
+        map : Many images.
+        vkbloom.grid : All combinations of settings.
+
+        Notes
+        -----
+        The device works on the next settings while the caller uses a frame. So after the first
+        frame, settings are taken from the iterable before earlier frames are yielded. An error in
+        settings is raised after the frames of all earlier settings. Names of framebuffers that none
+        of the settings of a sequence has are raised by the call.
+
+        Examples
+        --------
+        >>> image = np.full((16, 16, 3), 0.5, np.float32)
+        >>> settings = [vkbloom.Pyramid(levels=2, intensity=intensity) for intensity in (0.0, 1.0)]
+        >>> with vkbloom.Renderer("software") as renderer:
+        ...     [frames["final"].max().item() for frames in renderer.sweep(image, settings)]
+        [0.5, 1.0]
+        """
+        self._pending.wait()
+        if is_image(source):
+            for name, given in (
+                ("size", size is not None),
+                ("shading", check_shading(shading) != "forward"),
+                ("time", time != 0),
+            ):
+                if given:
+                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
+            found = image_source(source, core=self._core, name="source")
+        else:
+            found = scene_source(
+                cast("Scene", source), SCENE_SIZE if size is None else size, shading, time, "source"
+            )
+        return self._run_many(found, settings, check_framebuffers(framebuffers), device)
+
+    @checked
+    def plan(
+        self,
+        source: Scene | NDArray[Any] | Image,
+        settings: Settings | str | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        shading: Shading = "forward",
+        framebuffers: Literal["all"] | str | Sequence[str] = "all",
+    ) -> Plan:
+        """Return the framebuffers and the passes of a call, without rendering.
+
+        Parameters
+        ----------
+        source : Scene or an image
+            As for `render` and `apply`.
+        settings : Settings, optional
+            Default: ``presets["bevy_natural"]`` for an image, ``presets["tutorial"]`` for a scene.
+        size : (int, int), optional
+            Width and height of a scene's frame. Default: (1280, 720). Not for an image.
+        shading : {"forward", "deferred"}
+            Of a scene.
+        framebuffers
+            As for `render`.
+
+        Returns
+        -------
+        Plan
+            The framebuffers that the call would return, with shapes and dtypes, and its passes in
+            the variants that this renderer's device would run.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range, or does not belong to the source; or the renderer is
+            closed.
+        TypeError
+            An argument has the wrong type.
+        Error
+            The device does not support the settings.
+
+        See Also
+        --------
+        render, apply : Run the plan.
+
+        Notes
+        -----
+        This makes no device call and does not wait for other threads' calls. A plan does not depend
+        on the pixels of an image or on a scene's time.
+
+        Examples
+        --------
+        >>> import vkbloom
+        >>> with vkbloom.Renderer() as renderer:
+        ...     plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Pyramid(levels=2), (640, 360))
+        >>> {name: shape for name, (shape, _) in plan.framebuffers.items() if name[:4] == "down"}
+        {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
+        """
+        from vkbloom._renderer.plans import (  # noqa: PLC0415  costs start-up time
+            Pass,
+            Plan,
+            framebuffers_of,
+        )
+
+        settings = check_settings(settings, of_image=is_image(source))
+        names = check_framebuffers(framebuffers)
+        kind: str = shading
+        dtype = channels = None
+        if is_image(source):
+            for name, is_given in (
+                ("size", size is not None),
+                ("shading", check_shading(shading) != "forward"),
+            ):
+                if is_given:
+                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
+            kind, (shape, dtype) = "image", image_kind(source, "source")
+            height, width, channels = shape
+            planned = image_source(likeness(source) if on_cuda(source) else source)
+        else:
+            width, height = check_size("size", SCENE_SIZE if size is None else size)
+            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0, "source")
+        plan = self._core.plan(planned, settings, names)
+        passes = tuple(Pass(*row[:-1]) for row in plan.passes)
+        return Plan(
+            kind,
+            (width, height),
+            dtype,
+            channels,
+            isinstance(source, Image) and source.mask,
+            isinstance(source, Image) and source.emission,
+            settings,
+            framebuffers_of(plan),
+            passes,
+        )
+
+    def _run_one(
+        self,
+        source: _core.Source,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+        out: Mapping[str, Any] | None,
+        device: Device | None,
+    ) -> Frames:
+        place = self._placed(device)(source)
+        self._pending.wait()
+        plan = self._plan_of(source, settings, names)
+        arrays = _arrays_for(self._core, plan, out, place)
+        submission = self._core.run(source, (plan,), (arrays,), True)
+        # While the device works.
+        frames = self._frames(settings, requests.named(plan, arrays, place))
+        if not out and submission.ordered:
+            frames._finish_later(self._pending.add(submission).of_request)
+            self._save_pipelines()
+            return frames
+        (timings,), counts = submission.wait()
+        for name, target in (out or {}).items():
+            if on_cuda(target):
+                fill(target, f"out: {name}", cast("DeviceArray", frames[name]), self._core)
+        return self._finished(frames, timings, (counts[0], counts[1]))
+
+    def _run_batch(
+        self,
+        images: Any,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+        place: Callable[[_core.Source], requests.Destination],
+    ) -> Iterator[Frames]:
+        self._pending.wait()
+        batch = take_batch(images, self._core)
+
+        def rest(first: int) -> Iterator[Frames]:
+            work = _paired(batch_sources(batch, first), settings)
+            return self._run_work(work, names, place, alone=True)
+
+        for frames in self._batches.run(batch, settings, names, self._frames, rest):
+            self._save_pipelines()
+            yield frames
+
+    def _placed(self, device: Device | None) -> Callable[[_core.Source], requests.Destination]:
+        """Return where the framebuffers of a source go."""
+        if device not in (None, "host", "device"):
+            raise ValueError(f"device: {device!r} is not 'host' or 'device'")
+
+        def place(source: _core.Source) -> requests.Destination:
+            if device == "host" or (device is None and not source.exported):
+                return "host"
+            # The memory of a CPU adapter is the host's.
+            return "cuda" if source.exported or self.info.type != "cpu" else "viewed"
+
+        return place
+
+    def _plan_of(
+        self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
+    ) -> _core.Plan:
+        """Return the last plan if it fits, otherwise a new one.
+
+        For small images, making a plan takes most of the time of a call.
+        """
+        if (planned := self._planned) is not None:
+            last, last_names, plan = planned
+            if last is settings and last_names == names and plan.is_of_image(source):
+                return plan
+        plan = self._core.plan(source, settings, names)
+        self._planned = None if settings._has_state else (settings, names, plan)
+        return plan
+
+    def _run_many(
+        self,
+        source: _core.Source,
+        settings: Iterable[Settings | str],
+        names: tuple[str, ...] | None,
+        device: Device | None = None,
+    ) -> Iterator[Frames]:
+        place = self._placed(device)
+        # Not a generator, so that arguments are checked at the call and not with the first frame.
+        if not isinstance(settings, abc.Iterable) or isinstance(settings, str):
+            raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
+        if self.closed:
+            raise ValueError("the renderer is closed")
+        if isinstance(settings, abc.Sequence):
+            settings = tuple(settings)
+            if names:
+                self._check_names(source, settings, names)
+        return self._run_work(
+            (
+                requests.Request(source, check_settings(one, f"settings[{number}]"))
+                for number, one in enumerate(settings)
+            ),
+            names,
+            place,
+        )
+
+    def _check_names(
+        self,
+        source: _core.Source,
+        settings: Settings | Sequence[Settings | str],
+        names: tuple[str, ...] | None,
+    ) -> None:
+        """Raise ValueError for framebuffers that none of the settings has, at any size."""
+        found: dict[str, None] = {}
+        for one in [settings] if isinstance(settings, Settings) else settings:
+            # An error of these settings is raised in their turn, after the frames of earlier ones.
+            with contextlib.suppress(_core.Error, TypeError, ValueError):
+                plan = self._core.plan(source, check_settings(one), None)
+                found.update((name, None) for name, _, _ in plan.outputs)
+        kinds = {_NUMBER.sub("#", name) for name in found}
+        for name in names or ():
+            if found and _NUMBER.sub("#", name) not in kinds:
+                raise ValueError(unknown("framebuffers: unknown framebuffer", name, found))
+
+    def _run_work(
+        self,
+        sequence: Iterable[requests.Request],
+        names: tuple[str, ...] | None,
+        place: Callable[[_core.Source], requests.Destination] = lambda _: "host",
+        *,
+        alone: bool = False,
+    ) -> Iterator[Frames]:
+        self._pending.wait()
+        results = requests.run(sequence, self._core, names, alone=alone, place=place)
+        return (self._frames_of(settings, result) for settings, result in results)
+
+    def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:
+        frames = self._frames(settings, result.arrays)
+        return self._finished(frames, result.timings, result.counts)
+
+    def _frames(self, settings: Settings, arrays: Mapping[str, NDArray[Any]]) -> Frames:
+        return Frames(arrays, timings={}, settings=settings, info=self._made_by)
+
+    def _finished(
+        self, frames: Frames, timings: dict[str, float], counts: tuple[int, int]
+    ) -> Frames:
+        self._save_pipelines()
+        frames._finish(timings, *counts)
+        return frames
+
+    def _save_pipelines(self) -> None:
+        """Write the driver's pipeline cache to disk if it has new pipelines."""
+        count = self._core.pipeline_count
+        if count != self._saved_pipelines:
+            from vkbloom._io import pipeline_cache  # noqa: PLC0415  costs start-up time
+
+            # Errors are ignored, since the cache only makes the next start faster. A ValueError
+            # means that another thread has closed the renderer.
+            with contextlib.suppress(_core.Error, ValueError):
+                pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+                self._saved_pipelines = count

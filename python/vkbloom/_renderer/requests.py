@@ -1,0 +1,393 @@
+"""Sequences of requests: several are submitted together, while the device runs others."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from vkbloom import _core
+from vkbloom._renderer.device_arrays import Destination, DeviceArray, memory_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from vkbloom._settings.settings import Settings
+
+__all__ = [
+    "Destination",
+    "PendingSubmission",
+    "PendingSubmissions",
+    "Request",
+    "Result",
+    "named",
+    "new_array",
+    "new_arrays",
+    "new_memory",
+    "run",
+    "uploaded",
+]
+
+#: The most requests in one submission.
+REQUESTS = 32
+#: The most bytes of framebuffers in one submission. A single request may have more.
+BYTES = 64 << 20
+#: The longest time of one submission. A single request may take longer. A device cannot be stopped,
+#: so closing the renderer after an interruption waits for the pending submissions.
+SECONDS = 0.25
+#: Submissions that are pending while the caller takes the frames of another one.
+AHEAD = 2
+#: The same if each request has its own image, since the next one is copied while the device works.
+IMAGES_AHEAD = 3
+
+#: Arrays of this size or more are in a renderer's pages, to which the device writes directly. For
+#: smaller arrays NumPy recycles some memory.
+LARGE_BYTES = 1 << 20
+
+
+class PendingSubmission:
+    """The end of a submission for which the host waits late, or never.
+
+    Its arrays are on a GPU, whose streams wait for them.
+    """
+
+    def __init__(self, submission: _core.Submission) -> None:
+        self._lock = threading.Lock()
+        self._submission: _core.Submission | None = submission
+        self._results: tuple[list[dict[str, float]], tuple[int, ...]] | None = None
+        self._error: Exception | None = None
+
+    def wait(self) -> tuple[list[dict[str, float]], tuple[int, ...]]:
+        """Return what the submission's `wait` returns, or raise what it raised."""
+        self.come()
+        if self._results is None:
+            assert self._error is not None
+            raise self._error
+        return self._results
+
+    def come(self) -> None:
+        """Wait, and raise what that raises, unless it was done before."""
+        with self._lock:
+            if (submission := self._submission) is None:
+                return
+            self._submission = None
+            self._error = RuntimeError("the wait for the framebuffers was interrupted")
+            try:
+                self._results = submission.wait()
+            except Exception as error:
+                self._error = error
+                raise
+
+    def of_request(self) -> tuple[dict[str, float], int, int]:
+        """Return timings and the numbers of NaNs and infinities of its only request."""
+        (timings,), (nan, inf) = self.wait()
+        return timings, nan, inf
+
+    def of_layer(self, index: int) -> tuple[dict[str, float], int, int]:
+        """Return the same of one image of a batch: its share of the times."""
+        (timings,), counts = self.wait()
+        share = {name: 2 * took / len(counts) for name, took in timings.items()}
+        return share, counts[2 * index], counts[2 * index + 1]
+
+
+class PendingSubmissions:
+    """The ends that are to come, the oldest first.
+
+    A call waits for them before it gives the GPU more to do. If CUDA copied the next image while
+    Vulkan works, the GPU would change between both after slices of 2 ms: on an H100, calls in a row
+    took 2.7 ms each instead of 0.7. So the memory of a caller who never waits is bounded, too.
+    """
+
+    def __init__(self) -> None:
+        self._pending: deque[PendingSubmission] = deque()
+
+    def add(self, submission: _core.Submission) -> PendingSubmission:
+        """Return the end of a submission."""
+        end = PendingSubmission(submission)
+        self._pending.append(end)
+        return end
+
+    def wait(self) -> None:
+        """Wait until all have come."""
+        # Another thread may take the last one between the comparison and this one's turn.
+        with contextlib.suppress(IndexError):
+            while self._pending:
+                self._pending.popleft().come()
+
+    def forget(self) -> None:
+        """Drop them, as in a forked process, which cannot wait."""
+        self._pending.clear()
+
+
+class Result(NamedTuple):
+    """The result of a request.
+
+    `counts`: The numbers of NaNs and infinities in the input.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    timings: dict[str, float]
+    counts: tuple[int, int]
+
+
+def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
+    """Return an array for a framebuffer. Its content is undefined.
+
+    A large one is in pages that its `base` owns. They are reused when the array is freed.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE_BYTES:
+        return np.empty(shape, dtype)
+    # NumPy's type hints accept only buffers of the standard library.
+    return np.ndarray(shape, dtype, buffer=core.pages(size))  # type: ignore[arg-type]
+
+
+def new_memory(
+    core: _core.Renderer, shape: tuple[int, ...], dtype: str, place: Destination
+) -> NDArray[Any] | _core.Exported:
+    """Return an array for a framebuffer, or memory on the device."""
+    if place == "cuda":
+        return memory_for(core, math.prod(shape) * np.dtype(dtype).itemsize)
+    return new_array(core, shape, dtype)
+
+
+def new_arrays(
+    core: _core.Renderer, plan: _core.Plan, place: Destination = "host"
+) -> tuple[NDArray[Any] | _core.Exported, ...]:
+    """Return an array, or memory on the device, for each of a plan's outputs."""
+    arrays: list[NDArray[Any] | _core.Exported] = []
+    # Not a generator expression, for which `core` would be a cell. CPython 3.11 leaks all arguments
+    # of a call if it cannot allocate a cell.
+    for _, shape, dtype in plan.outputs:
+        arrays.append(new_memory(core, shape, dtype, place))
+    return tuple(arrays)
+
+
+def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Request]:
+    """Copy each image to the device before the next one is taken.
+
+    Images reuse the device memory of earlier ones whose submissions have finished.
+    """
+    kept: deque[_core.Source] = deque()
+    for work in sequence:
+        if work.source.resident or work.source.exported:
+            yield work
+            continue
+        spare = kept.popleft() if len(kept) == IMAGES_AHEAD else None
+        kept.append(core.upload(work.source, spare, True))
+        settings = work.settings
+        # The iterable may overwrite the array when it makes the next image.
+        del work
+        yield Request(kept[-1], settings)
+
+
+def named(
+    plan: _core.Plan, arrays: tuple[NDArray[Any] | _core.Exported, ...], place: Destination = "host"
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a plan's outputs by name."""
+    frames: dict[str, NDArray[Any]] = {}
+    # Not a comprehension, for the reason above: `place` would be a cell.
+    for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True):
+        if place == "viewed" or isinstance(array, _core.Exported):
+            # Annotated as arrays of NumPy, which they are unless the caller asked for others.
+            frames[name] = cast("NDArray[Any]", DeviceArray(array, shape, dtype))
+        else:
+            frames[name] = array
+    return frames
+
+
+class Request(NamedTuple):
+    """The source and the settings of a request."""
+
+    source: _core.Source
+    settings: Settings
+
+
+class _Request(NamedTuple):
+    work: Request
+    plan: _core.Plan
+    arrays: tuple[NDArray[Any] | _core.Exported, ...]
+    place: Destination
+
+
+def _taken(
+    request: _Request, timings: dict[str, float], counts: tuple[int, int]
+) -> tuple[Settings, Result]:
+    return request.work.settings, Result(
+        named(request.plan, request.arrays, request.place), timings, counts
+    )
+
+
+class _Submitted(NamedTuple):
+    submission: _core.Submission
+    requests: list[_Request]
+    since: float
+
+
+class _Requests:
+    """Divides a sequence of work into submissions, in order.
+
+    - `most`: The most requests in one submission.
+    - `failure`: To be raised after the results of everything that was submitted.
+    """
+
+    def __init__(
+        self,
+        sequence: Iterable[Request],
+        core: _core.Renderer,
+        names: tuple[str, ...] | None,
+        most: int,
+        place: Callable[[_core.Source], Destination],
+    ) -> None:
+        self._sequence = iter(sequence)
+        self._core = core
+        self._names = names
+        self._ever = most
+        self._place = place
+        self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
+        self._alone = 0  # how many of these are submitted one by one
+        self._limit = 1
+        self._most = most  # that fit into SECONDS, as far as is known
+        self._ended = False
+        self.failure: Exception | None = None
+
+    def submit(self) -> _Submitted | None:
+        """Submit the next work. None: there is no more, or the next one failed."""
+        while requests := self._take():
+            plans = tuple(request.plan for request in requests)
+            try:
+                submission = self._core.run(
+                    requests[0].work.source, plans, tuple(one.arrays for one in requests)
+                )
+            except Exception as error:
+                if not self._blames_one(error, requests):
+                    self._fail(error)
+                    return None
+                # The requests before it are still submitted. The error is raised after their
+                # results.
+                self._waiting.extendleft(request.work for request in reversed(requests))
+                self._alone = len(requests)
+            else:
+                self._alone = max(0, self._alone - 1)
+                # Double the number, starting with one request. So the first frame waits for no
+                # other, and a caller that stops early wastes little work.
+                self._limit = min(2 * len(requests), REQUESTS)
+                return _Submitted(submission, requests, time.perf_counter())
+        return None
+
+    def took(self, seconds: float, count: int) -> None:
+        """Update the limit after a submission of `count` requests that took at most `seconds`."""
+        fit = int(SECONDS * count / max(seconds, SECONDS / REQUESTS))
+        self._most = min(max(1, fit), self._ever)
+
+    def _take(self) -> list[_Request]:
+        """Return the requests of the next submission."""
+        requests: list[_Request] = []
+        size = 0
+        limit = 1 if self._alone else min(self._limit, self._most)
+        while len(requests) < limit:
+            if requests and size + size // len(requests) > BYTES:
+                break
+            work = self._next()
+            if work is None:
+                break
+            try:
+                plan = self._core.plan(work.source, work.settings, self._names)
+                # Another source or other images need another submission.
+                if requests and not (
+                    work.source is requests[0].work.source and plan.shares_images(requests[0].plan)
+                ):
+                    self._waiting.appendleft(work)
+                    break
+                place = self._place(work.source)
+                arrays = new_arrays(self._core, plan, place)
+                requests.append(_Request(work, plan, arrays, place))
+            except Exception as error:
+                self._fail(error)
+                break
+            size += plan.size
+        return requests
+
+    def _next(self) -> Request | None:
+        if self._waiting:
+            return self._waiting.popleft()
+        if self._ended:
+            return None
+        try:
+            return next(self._sequence)
+        except StopIteration:
+            self._ended = True
+        except Exception as error:
+            self._fail(error)
+        return None
+
+    def _fail(self, error: Exception) -> None:
+        self.failure = error
+        self._ended = True
+        self._waiting.clear()
+
+    @staticmethod
+    def _blames_one(error: Exception, requests: list[_Request]) -> bool:
+        """Whether one of several requests may have caused the error; then each runs alone."""
+        general = _core.ValidationError, _core.DeviceLostError
+        return (
+            len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
+        )
+
+
+def run(
+    sequence: Iterable[Request],
+    core: _core.Renderer,
+    names: tuple[str, ...] | None,
+    *,
+    alone: bool = False,
+    place: Callable[[_core.Source], Destination] = lambda _: "host",
+) -> Iterator[tuple[Settings, Result]]:
+    """Yield the result of each request, in their order.
+
+    Work is taken before earlier results are yielded, so that the device is busy while the caller
+    uses results: none before the first result, then enough for `AHEAD` submissions.
+
+    `names`: The requested framebuffers; None: all.
+    """
+    waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS, place)
+    submitted: deque[_Submitted] = deque()
+    ahead = 1
+    before = 0.0  # when the last submission ended
+    try:
+        while True:
+            while len(submitted) < ahead and (added := waiting.submit()) is not None:
+                submitted.append(added)
+            if not submitted:
+                break
+            submission, requests, since = submitted.popleft()
+            timings, counts = submission.wait()
+            del submission
+            # The device started it after it was submitted and the one before had ended.
+            end = time.perf_counter()
+            waiting.took(end - max(since, before), len(requests))
+            before = end
+            # Yielded results are not kept, so that the caller is their only owner.
+            requests.reverse()
+            timings.reverse()
+            while requests:
+                yield _taken(requests.pop(), timings.pop(), (counts[0], counts[1]))
+            ahead = IMAGES_AHEAD if alone else AHEAD
+    finally:
+        # Waits here for submissions whose results nobody takes, not at the next garbage
+        # collection.
+        submitted.clear()
+    failure, waiting.failure = waiting.failure, None
+    if failure is not None:
+        try:
+            raise failure
+        finally:
+            # Its traceback would keep this frame and its arrays until the next garbage collection.
+            del failure

@@ -1,0 +1,225 @@
+"""The sources of frames: images and scenes, checked and converted for the core."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vkbloom import _core
+from vkbloom._checks import check_emission, check_image, check_mask, check_size, check_time
+from vkbloom._renderer.device_arrays import ImportedArray, likeness, on_cuda, take
+from vkbloom._renderer.image import Image
+from vkbloom._settings.settings import check_shading
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from vkbloom._scene import Mesh, Scene
+    from vkbloom._scene.textures import Texture
+    from vkbloom._settings.settings import Shading
+
+__all__ = [
+    "Inputs",
+    "batch_sources",
+    "checked_inputs",
+    "image_kind",
+    "image_source",
+    "is_image",
+    "scene_arguments",
+    "scene_source",
+    "take_batch",
+    "uploaded_inputs",
+]
+
+
+class Inputs(NamedTuple):
+    """An image with its mask and emission, checked: arrays of the host, or copies on the device."""
+
+    image: NDArray[Any] | ImportedArray
+    emission: NDArray[Any] | ImportedArray | None = None
+    mask: NDArray[np.float32] | None = None
+
+    def named(self) -> dict[str, NDArray[Any] | ImportedArray]:
+        """Return those that are there by name."""
+        return {name: part for name, part in self._asdict().items() if part is not None}
+
+    def kept(self) -> Inputs:
+        """Return inputs that the caller cannot change."""
+        copies: list[Any] = [
+            part if part is None or isinstance(part, ImportedArray) else part.copy()
+            for part in self
+        ]
+        return Inputs(*copies)
+
+    def on_host(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays by name, in the host's memory."""
+        return {
+            name: part.numpy() if isinstance(part, ImportedArray) else part
+            for name, part in self.named().items()
+        }
+
+    def source(self, levels: tuple[NDArray[Any] | ImportedArray, ...] = ()) -> _core.Source:
+        """Return the core's Source. The arrays must not change while it is used."""
+        return _core.image_source(
+            _as_read(self.image), _as_read(self.emission), self.mask, tuple(map(_as_read, levels))
+        )
+
+
+def _as_read(array: Any) -> Any:
+    return array.image() if isinstance(array, ImportedArray) else array
+
+
+def checked_inputs(
+    image: object,
+    mask: object | None = None,
+    emission: object | None = None,
+    core: _core.Renderer | None = None,
+    name: str = "image",
+    *,
+    waits: bool = True,
+) -> Inputs:
+    """Check the arrays of an image, and copy those that are on the renderer's device.
+
+    `waits`: As for `device_arrays.take`.
+    """
+    if core is None or not any(map(on_cuda, (image, mask, emission))):
+        core = None
+    pixels: Any
+    if core and on_cuda(image):
+        pixels = take(image, name, core, waits=waits)
+    else:
+        pixels = check_image(image, name)
+    glowing: Any = emission
+    if core and on_cuda(emission):
+        glowing = take(emission, "emission", core, waits=waits)
+    elif emission is not None:
+        glowing = check_emission(emission, pixels)
+    if core and on_cuda(mask):
+        # Its values are checked on the host; it has one channel of the image's three or four.
+        mask = take(mask, "mask", core, (2,)).numpy()
+    height, width, _ = pixels.shape
+    return Inputs(pixels, glowing, None if mask is None else check_mask(mask, (height, width)))
+
+
+def image_source(
+    image: object,
+    mask: object | None = None,
+    emission: object | None = None,
+    core: _core.Renderer | None = None,
+    name: str = "image",
+    *,
+    waits: bool = True,
+) -> _core.Source:
+    """Return the core's Source of an image. Its arrays must not change while it is used.
+
+    With a renderer, arrays may be on its device; these are copied. Errors of the image start with
+    `name`. `waits`: As for `device_arrays.take`.
+    """
+    if isinstance(image, Image):
+        for what, given in (("mask", mask), ("emission", emission)):
+            if given is not None:
+                raise ValueError(
+                    f"{what}: the image was uploaded already; upload it together with its {what}"
+                )
+        return image._source
+    return checked_inputs(image, mask, emission, core, name, waits=waits).source()
+
+
+def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:
+    """Return an uploaded image with its mask and emission; `pixels` reads it from the device."""
+    given = image._inputs
+    return Inputs(**given) if "image" in given else Inputs(pixels(), **given)
+
+
+def take_batch(images: Any, core: _core.Renderer) -> ImportedArray:
+    """Copy a batch on the device at once; `run` waits for the copy."""
+    return take(images, "images", core, (4,), waits=False)
+
+
+def batch_sources(batch: ImportedArray, first: int = 0) -> Iterator[_core.Source]:
+    """Yield the Source of each image of a batch on the device, from `first` on."""
+    for index in range(first, batch.shape[0]):
+        yield Inputs(batch.at(index)).source()
+
+
+def is_image(source: object) -> bool:
+    """Return whether a source is an image, or an object that NumPy can view."""
+    return isinstance(source, Image | memoryview) or any(
+        hasattr(source, name)
+        for name in ("__array__", "__array_interface__", "__dlpack__", "__cuda_array_interface__")
+    )
+
+
+def image_kind(image: object, name: str = "image") -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return shape and dtype of an image, which may be on the device."""
+    if on_cuda(image):
+        image = likeness(image)
+    checked = image if isinstance(image, Image) else check_image(image, name)
+    return checked.shape, checked.dtype
+
+
+def scene_source(
+    scene: Scene, size: tuple[int, int], shading: Shading, time: float, name: str = "scene"
+) -> _core.Source:
+    """Return the core's Source of a scene's frame. Errors of the scene start with `name`."""
+    check_shading(shading)
+    turns = check_time(time)
+    from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"{name}: a Scene is needed, not {type(scene).__name__}")
+    return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
+
+
+def scene_arguments(
+    scene: Scene, size: tuple[int, int], shading: Shading, turns: float
+) -> tuple[Any, ...]:
+    """Return the arguments of the core's scene_source, from checked values."""
+    camera = scene.camera
+    return (
+        _scene_arrays(scene),
+        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
+        size,
+        shading,
+        # `time` has period 1. It is reduced first, so that large times keep their float precision.
+        math.fmod(turns, 1.0),
+        scene.glow_intensity,
+    )
+
+
+def _scene_arrays(scene: Scene) -> Any:
+    """Return the scene's meshes, sky and textures."""
+    # Textures by identity, not by content: each is uploaded once.
+    numbers: dict[Texture, int] = {}
+    body = _mesh_arrays(scene.body, numbers)
+    glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)
+    sky = () if scene.skybox is None else scene.skybox.levels
+    textures = tuple(
+        (
+            texture.levels,
+            *texture.address_mode,
+            texture.mag_filter,
+            texture.min_filter,
+            texture.mipmap_filter,
+        )
+        for texture in numbers
+    )
+    return scene.contents_serial, body, glow, sky, textures
+
+
+def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
+    """Return a mesh's arrays; textures get the next numbers."""
+    surfaces = tuple(
+        (
+            surface.index_count,
+            *(
+                numbers.setdefault(texture, len(numbers))
+                for texture in (surface.base, surface.emission)
+            ),
+        )
+        for surface in mesh.surfaces
+    )
+    return mesh.vertices, mesh.indices, mesh.emission, mesh.texcoords, surfaces

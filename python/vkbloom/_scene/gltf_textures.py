@@ -1,0 +1,182 @@
+"""Textures of glTF materials: images, samplers, texture coordinates.
+
+Section numbers are those of the "glTF 2.0 Specification", version 2.0.1, Khronos Group.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._io.image_reading import check_plausible, opened
+from vkbloom._io.images import failure_of
+from vkbloom._io.srgb import decode_srgb
+from vkbloom._scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
+from vkbloom._scene.textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
+
+# The image formats of glTF (3.8.3), by their first bytes.
+_KINDS: Final = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}
+# A limit for all textures of a file, since small images can decode to any amount of memory. This
+# many texels take 1.4 GB with their mip levels.
+MAX_TEXELS: Final = 2**27
+# The numbers of samplers (5.26) as WebGPU's names. A minification filter has two parts: between
+# texels, and between mip levels.
+_ADDRESS_MODES: Final[dict[int, AddressMode]] = {
+    33071: "clamp-to-edge",
+    33648: "mirror-repeat",
+    10497: "repeat",
+}
+_MAG_FILTERS: Final[dict[int, Filter]] = {9728: "nearest", 9729: "linear"}
+_MIN_FILTERS: Final[dict[int, tuple[Filter, Filter | None]]] = {
+    9728: ("nearest", None),
+    9729: ("linear", None),
+    9984: ("nearest", "nearest"),
+    9985: ("linear", "nearest"),
+    9986: ("nearest", "linear"),
+    9987: ("linear", "linear"),
+}
+
+
+@dataclass(frozen=True)
+class TextureUse:
+    """A texture of a material, and its texture coordinates."""
+
+    texture: Texture
+    coordinates: str  # the attribute, TEXCOORD_0 and so on
+    transform: Floats  # (2, 3): applied to (u, v, 1)
+
+    def placed(self, coordinates: Floats) -> Floats:
+        """Return the transformed texture coordinates ``(n, 2)``."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed: Floats = coordinates @ self.transform[:, :2].T + self.transform[:, 2]
+        return placed
+
+
+class TextureReader:
+    """Reads a file's textures, each once."""
+
+    def __init__(self, file: GltfFile) -> None:
+        self._file = file
+        self._textures: dict[tuple[object, object], Texture] = {}
+        self._texels = 0
+
+    def use(self, info: Parsed, what: str) -> TextureUse | None:
+        """Read the texture of a material's textureInfo; None if it has no supported image."""
+        texture = self._file.item("textures", info.index, what)
+        user = f"textures[{info.index}]"
+        if texture.source is None:
+            self._file.leave_out("textures whose image only an extension gives")
+            return None
+        place = 0 if info.texCoord is None else info.texCoord
+        transform = np.eye(3)[:2]
+        extensions = info.extensions
+        if isinstance(extensions, dict) and TEXTURE_TRANSFORM in extensions:
+            given = extensions[TEXTURE_TRANSFORM]
+            if not isinstance(given, dict):
+                self._file.fail(f"{what}.{TEXTURE_TRANSFORM} is not an object")
+            transform = self._transform(given, what)
+            place = given.get("texCoord", place)
+        place = self._file.integer(place, f"{what}.texCoord", 0, 2**31 - 1)
+        key = (texture.source, texture.sampler)
+        if key not in self._textures:
+            self._textures[key] = self._texture(texture, user)
+        return TextureUse(self._textures[key], f"TEXCOORD_{place}", transform)
+
+    def _transform(self, given: dict[str, Any], what: str) -> Floats:
+        """Return the matrix ``(2, 3)`` of KHR_texture_transform: offset * rotation * scale.
+
+        With v pointing down, the rotation appears counter-clockwise, as in the example in the
+        extension's specification.
+        """
+        what = f"{what}.{TEXTURE_TRANSFORM}"
+        offset = self._file.floats(given.get("offset", [0.0, 0.0]), f"{what}.offset", 2)
+        scale = self._file.floats(given.get("scale", [1.0, 1.0]), f"{what}.scale", 2)
+        (angle,) = self._file.floats([given.get("rotation", 0.0)], f"{what}.rotation", 1)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        return np.column_stack((np.array([[cosine, sine], [-sine, cosine]]) * scale, offset))
+
+    def _texture(self, texture: Parsed, user: str) -> Texture:
+        address_mode: list[AddressMode] = ["repeat", "repeat"]
+        mag_filter: Filter = "linear"
+        # The default is the filter with the least aliasing.
+        min_filter: Filter = "linear"
+        mipmap_filter: Filter | None = "linear"
+        if texture.sampler is not None:
+            sampler = self._file.item("samplers", texture.sampler, user)
+            what = f"samplers[{texture.sampler}]"
+            for axis, name in enumerate(("wrapS", "wrapT")):
+                if getattr(sampler, name) is not None:
+                    address_mode[axis] = self._named(sampler, name, _ADDRESS_MODES, what)
+            if sampler.magFilter is not None:
+                mag_filter = self._named(sampler, "magFilter", _MAG_FILTERS, what)
+            if sampler.minFilter is not None:
+                min_filter, mipmap_filter = self._named(sampler, "minFilter", _MIN_FILTERS, what)
+        picture = self._picture(texture.source, user)
+        return Texture(
+            (picture,) if mipmap_filter is None else mip_levels(picture),
+            (address_mode[0], address_mode[1]),
+            mag_filter,
+            min_filter,
+            mipmap_filter or "nearest",
+        )
+
+    def _named(self, sampler: Parsed, name: str, names: dict[int, Any], what: str) -> Any:
+        value = self._file.integer(getattr(sampler, name), f"{what}.{name}", 0, 2**31 - 1)
+        if value not in names:
+            self._file.fail(f"{what}.{name} is {value}; {', '.join(map(str, names))} are possible")
+        return names[value]
+
+    def _picture(self, index: object, user: str) -> NDArray[np.float16]:
+        """Read an image as linear rgb, with an alpha of 1.
+
+        Base colours and emission are sRGB-encoded, whatever colour space the image declares (3.8.3,
+        3.9.2). The image's alpha is not used, as in alphaMode OPAQUE.
+        """
+        data = self._file.image_bytes(index, user)
+        what = f"images[{index}]"
+        suffix = next((end for start, end in _KINDS.items() if data.startswith(start)), None)
+        if suffix is None:
+            self._file.fail(f"{what} is neither PNG nor JPEG")
+        stored = self._decoded(data, suffix, what)
+        scale = np.iinfo(stored.dtype).max
+        # A table, since there are only a few values.
+        table = decode_srgb(np.arange(scale + 1) / scale).astype(np.float16)
+        picture = np.ones((*stored.shape[:2], 4), np.float16)
+        picture[:, :, :3] = table[stored[:, :, :3] if stored.shape[2] > 2 else stored[:, :, :1]]
+        return picture
+
+    def _decoded(self, data: bytes, suffix: str, what: str) -> NDArray[Any]:
+        """Return an image's values ``(h, w, C)``: uint8 or uint16, C 1 to 4."""
+        with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
+            # OpenImageIO's Python module can only read files.
+            path = Path(folder) / f"image{suffix}"
+            path.write_bytes(data)
+            try:
+                with opened(path, "Reading textures") as reader:
+                    spec = reader.spec()
+                    width, height, channels = spec.width, spec.height, spec.nchannels
+                    self._texels += width * height
+                    if max(width, height) > MAX_SIDE or self._texels > MAX_TEXELS:
+                        raise ValueError(
+                            f"{width} x {height} texels are too many: {MAX_SIDE} a side and "
+                            f"{MAX_TEXELS} in all of a file are possible"
+                        )
+                    check_plausible(spec, path)
+                    kind = "uint16" if str(spec.format) == "uint16" else "uint8"
+                    pixels = reader.read_image(0, 0, 0, channels, kind)
+                    # For a truncated file, OpenImageIO returns the part that is there and reports
+                    # an error.
+                    reason = failure_of(reader)
+            except ValueError as error:
+                reason = str(error)
+                pixels = None
+            reason = reason.replace(str(path), what)
+        if pixels is None or reason:
+            self._file.fail(f"{what}: {reason or 'damaged: the texels cannot be read'}")
+        return np.asarray(pixels).reshape(height, width, channels)

@@ -1,0 +1,354 @@
+"""Scenes: meshes, the sky and the camera, as immutable values.
+
+Loading needs no Vulkan. The data of a scene is read-only. So a renderer keeps its uploaded data as
+long as the serial of the scene's contents stays the same.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import os
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from numbers import Real
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from vkbloom._argument_types import checked
+from vkbloom._scene import skybox as sky
+from vkbloom._scene.mesh import Mesh
+from vkbloom._scene.skybox import Cubemap, SkyboxSource
+
+_serials = itertools.count(1)
+
+
+class _Contents:
+    """A serial that is shared by all living scenes with the same meshes and sky."""
+
+    def __init__(self) -> None:
+        self.serial = next(_serials)
+
+
+#: By the ids of body, glow and sky. A scene refers to its contents and to these three, so that no
+#: other object can have one of these ids while the entry exists.
+_contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
+    weakref.WeakValueDictionary()
+)
+
+# The arrays of the built-in scene, made by tools/make_scene.py from the files in examples/saucer.
+_UFO: Final = Path(__file__).parents[1] / "assets" / "ufo.npz"
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A look-at camera: view = translate(position) rotate(x) rotate(y) rotate(z).
+
+    Parameters
+    ----------
+    position : (float, float, float)
+        Translation xyz of the world in view space, in scene units. The camera looks along -z and
+        y points down.
+    rotation : (float, float, float)
+        Angles about x, y and z in degrees.
+    fov : float
+        Vertical field of view in degrees, over 0 and under 180.
+    near, far : float
+        Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
+
+    Raises
+    ------
+    TypeError
+        A field is no number, or no three numbers.
+    ValueError
+        A field is not finite or out of range.
+
+    See Also
+    --------
+    Scene : Has a camera.
+
+    Examples
+    --------
+    >>> camera = vkbloom.Camera(position=(0, 0, -5), rotation=(0, 90, 0), fov=60)
+    >>> camera.near, camera.far
+    (0.1, 256.0)
+    """
+
+    position: tuple[float, float, float] = (0.0, 0.0, -10.25)
+    rotation: tuple[float, float, float] = (7.5, -343.0, 0.0)
+    fov: float = 45.0
+    near: float = 0.1
+    far: float = 256.0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "rotation"):
+            value: Any = getattr(self, name)
+            if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
+                raise TypeError(f"{name} must be three numbers, not {value!r}")
+            if len(value) != 3:
+                raise ValueError(f"{name} has {len(value)} entries; three are needed")
+            triple = tuple(_number(f"{name}[{i}]", entry) for i, entry in enumerate(value))
+            object.__setattr__(self, name, triple)
+        for name in ("fov", "near", "far"):
+            object.__setattr__(self, name, _number(name, getattr(self, name)))
+        if not 0.0 < self.fov < 180.0:
+            raise ValueError(f"fov is {self.fov}; over 0 and under 180 degrees is needed")
+        if not self.near > 0.0:
+            raise ValueError(f"near is {self.near}; over 0 is needed")
+        if not self.far > self.near:
+            raise ValueError(f"far is {self.far}; over near ({self.near}) is needed")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene:
+    """A body, a glow mesh, a sky, and the camera.
+
+    Parameters
+    ----------
+    body : Mesh
+        The mesh that is lit.
+    glow : Mesh or None
+        The mesh that glows. None: what the body emits glows.
+    skybox : Cubemap or None
+        The sky, or None for black.
+    camera : Camera
+        The camera from which the scene is seen.
+    glow_intensity : float
+        Factor of the glow mesh's colour as emitted radiance in the deferred system, 0 or more.
+
+    Attributes
+    ----------
+    serial : int
+        A number that no other scene of this process has.
+
+    Raises
+    ------
+    TypeError
+        A field has another type.
+    ValueError
+        `glow_intensity` is negative or not finite.
+
+    See Also
+    --------
+    Scene.ufo : The built-in scene.
+    Scene.from_gltf : Loads files.
+    Renderer.render : Renders a scene.
+
+    Examples
+    --------
+    >>> scene = vkbloom.Scene.ufo()
+    >>> settings = vkbloom.Separable(bloom_size=(32, 32))
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.render(scene, settings, size=(64, 48))
+    >>> list(frames)
+    ['glow', 'glow_depth', 'blur_vertical', 'bloom', 'scene', 'depth', 'final']
+    """
+
+    body: Mesh
+    glow: Mesh | None = None
+    skybox: Cubemap | None = None
+    camera: Camera = field(default_factory=Camera)
+    glow_intensity: float = 1.0
+    serial: int = field(init=False, default_factory=lambda: next(_serials))
+    _contents: _Contents = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name, kind, optional in (
+            ("body", Mesh, False),
+            ("glow", Mesh, True),
+            ("skybox", Cubemap, True),
+            ("camera", Camera, False),
+        ):
+            value = getattr(self, name)
+            if not isinstance(value, kind) and not (optional and value is None):
+                needed = f"{kind.__name__} or None" if optional else kind.__name__
+                raise TypeError(f"{name} must be a {needed}, not {type(value).__name__}")
+        intensity = _number("glow_intensity", self.glow_intensity)
+        if intensity < 0.0:
+            raise ValueError(f"glow_intensity is {intensity}; 0 or more is needed")
+        object.__setattr__(self, "glow_intensity", intensity)
+        key = (id(self.body), id(self.glow), id(self.skybox))
+        object.__setattr__(self, "_contents", _contents.setdefault(key, _Contents()))
+
+    @property
+    def contents_serial(self) -> int:
+        """A number that only scenes with the same meshes and sky share, whatever their camera."""
+        return self._contents.serial
+
+    def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
+        # A copy gets its own serial, since another process may have used this one.
+        return Scene, (self.body, self.glow, self.skybox, self.camera, self.glow_intensity)
+
+    @classmethod
+    def ufo(cls) -> Scene:
+        """Return the built-in scene: a saucer, its glow mesh and a field of stars.
+
+        Returns
+        -------
+        Scene
+            A new scene on every call; its arrays are read again. No extra is needed.
+
+        See Also
+        --------
+        Scene.from_gltf : Loads files.
+
+        Examples
+        --------
+        >>> vkbloom.Scene.ufo().glow is not None
+        True
+        """
+        with np.load(_UFO) as arrays:
+            body, glow = (
+                Mesh(arrays[f"{name}_vertices"], arrays[f"{name}_indices"].astype(np.uint32))
+                for name in ("body", "glow")
+            )
+            glow = dataclasses.replace(glow, emission=arrays["glow_emission"])
+            return cls(body, glow, sky.from_array(arrays["sky"]))
+
+    @classmethod
+    @checked
+    def from_gltf(
+        cls,
+        base: str | os.PathLike[str],
+        *,
+        glow: str | os.PathLike[str] | None = None,
+        skybox: SkyboxSource | None = None,
+        glow_intensity: float = 1.0,
+        camera: Camera | None = None,
+    ) -> Scene:
+        """Load a scene from glTF or GLB files.
+
+        Parameters
+        ----------
+        base : str or path-like
+            File of the mesh that is lit. `vkbloom._scene.gltf.load_mesh` lists what is read.
+        glow : str or path-like, optional
+            File of the mesh that glows. None: what the materials of `base` emit glows.
+        skybox : str, path-like, sequence of these, ndarray or Cubemap, optional
+            A path to a KTX 1 cubemap or to an equirectangular image, six paths to face images
+            (+x, -x, +y, -y, +z, -z), an array ``(6, N, N, C)`` of uint8, float16 or float32 with C
+            3 or 4, a Cubemap, or None.
+        glow_intensity : float
+            Factor of the glow mesh's colour in the deferred system, 0 or more.
+        camera : Camera, optional
+            None: ``Camera()``.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        TypeError
+            An argument has another type.
+        OSError
+            A file is missing or cannot be read.
+        ValueError
+            A file is damaged or has no triangles, or an argument is out of range.
+        ModuleNotFoundError
+            pygltflib, or OpenImageIO for an image, is not installed.
+
+        See Also
+        --------
+        Scene.ufo : The built-in scene.
+
+        Examples
+        --------
+        >>> vkbloom.Scene.from_gltf("missing.glb")
+        Traceback (most recent call last):
+            ...
+        FileNotFoundError: [Errno 2] No such file or directory: 'missing.glb'
+        """
+        # Imported here, since other scenes do not need it.
+        from vkbloom._scene import gltf  # noqa: PLC0415
+
+        for name, path in (("base", base), ("glow", "" if glow is None else glow)):
+            if not isinstance(path, str | os.PathLike):
+                raise TypeError(f"{name}: a path is needed, not {path!r}")
+        return cls(
+            body=gltf.load_mesh(base),
+            glow=None if glow is None else gltf.load_mesh(glow),
+            skybox=None if skybox is None else sky.load(skybox),
+            camera=Camera() if camera is None else camera,
+            glow_intensity=glow_intensity,
+        )
+
+    def with_camera(self, camera: Camera) -> Scene:
+        """Return this scene with another camera. They share all other data.
+
+        `dataclasses.replace` does the same for any field.
+
+        Parameters
+        ----------
+        camera : Camera
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        TypeError
+            `camera` is not a Camera.
+
+        See Also
+        --------
+        Camera : The argument.
+
+        Examples
+        --------
+        >>> scene = vkbloom.Scene.ufo().with_camera(vkbloom.Camera(fov=30))
+        >>> scene.camera.fov
+        30.0
+        """
+        return dataclasses.replace(self, camera=camera)
+
+    def _rows(self) -> list[tuple[str, str]]:
+        camera = self.camera
+        sky_levels = (
+            "none"
+            if self.skybox is None
+            else f"{self.skybox.size} x {self.skybox.size} {self.skybox.dtype}, "
+            f"levels: {len(self.skybox.levels)}"
+        )
+        return [
+            ("body", self.body.summary),
+            ("glow", "none" if self.glow is None else self.glow.summary),
+            ("glow intensity", f"{self.glow_intensity:g}"),
+            ("skybox", sky_levels),
+            (
+                "camera",
+                (
+                    f"position {camera.position}, rotation {camera.rotation}, "
+                    f"fov {camera.fov:g}, near {camera.near:g}, far {camera.far:g}"
+                ),
+            ),
+        ]
+
+    def __repr__(self) -> str:
+        return f"Scene({'; '.join(f'{name}: {value}' for name, value in self._rows())})"
+
+    def _repr_html_(self) -> str:
+        """Return the page of `display.scene_html`."""
+        # Imported here, since only notebooks need it.
+        from vkbloom._views import display  # noqa: PLC0415
+
+        return display.scene_html(
+            self._rows(), None if self.skybox is None else self.skybox.levels[0]
+        )
+
+
+def _number(name: str, value: object) -> float:
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"{name} must be a number, not {value!r}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {number}; a finite number is needed")
+    return number

@@ -1,0 +1,362 @@
+"""Cubemaps for the sky: from KTX 1, six face images, one equirectangular image, or an array.
+
+Face images and KTX faces are used without colour decoding and without a flip. The sky is sampled in
+the direction of the object-space position on a cube. The renderer negates its y, as that of every
+mesh, and the projection has no y flip. So the -y face appears at the top of the frame.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._scene import ktx
+
+FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
+DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
+# Far above the 4096 that every Vulkan device supports. It rejects the sizes of damaged images. The
+# device's own limit is checked at upload.
+MAX_SIDE: Final = 16384
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return `array` as a C-contiguous array that cannot be changed.
+
+    An array that is read-only, C-contiguous and owns its memory is returned itself. Any other is
+    copied, because the base of a read-only view can still be changed.
+    """
+    flags = array.flags
+    if flags.writeable or not flags.c_contiguous or not flags.owndata:
+        array = array.copy(order="C")
+        array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cubemap:
+    """A cube texture with its mip levels.
+
+    Parameters
+    ----------
+    levels
+        Arrays ``(6, n, n, 4)`` of one dtype (uint8, float16 or float32): faces in the order +x, -x,
+        +y, -y, +z, -z, top row first, RGBA. n is halved and rounded down from level to level, but
+        at least 1. The chain may end before 1. Arrays are copied unless they are read-only and own
+        their memory.
+
+    Raises
+    ------
+    TypeError
+        A level is not an array of one of these dtypes.
+    ValueError
+        The shapes are not a mip chain.
+    """
+
+    levels: tuple[NDArray[Any], ...]
+
+    def __post_init__(self) -> None:
+        levels = tuple(self.levels)
+        if not levels:
+            raise ValueError("levels is empty; at least one level is needed")
+        for index, level in enumerate(levels):
+            if not isinstance(level, np.ndarray) or level.dtype not in DTYPES:
+                kind = level.dtype if isinstance(level, np.ndarray) else type(level).__name__
+                raise TypeError(
+                    f"levels[{index}] is {kind}; an array of uint8, float16 or float32 is needed"
+                )
+            if index == 0:
+                _check_faces("levels[0]", level, channels=(4,))
+            side = max(1, levels[0].shape[1] >> index)
+            if level.shape != (6, side, side, 4) or level.dtype != levels[0].dtype:
+                raise ValueError(
+                    f"levels[{index}] is {level.shape} {level.dtype}; "
+                    f"{(6, side, side, 4)} {levels[0].dtype} is needed"
+                )
+        if len(levels) > level_limit(levels[0].shape[1]):
+            raise ValueError(
+                f"levels has {len(levels)} entries; a face of {levels[0].shape[1]} has at most "
+                f"{level_limit(levels[0].shape[1])}"
+            )
+        object.__setattr__(self, "levels", tuple(read_only(level) for level in levels))
+
+    def __reduce__(self) -> tuple[type[Cubemap], tuple[tuple[NDArray[Any], ...]]]:
+        # Through the constructor, because NumPy pickles do not keep arrays read-only.
+        return Cubemap, (self.levels,)
+
+    def __repr__(self) -> str:
+        return f"Cubemap({self.size} x {self.size} {self.dtype}, levels: {len(self.levels)})"
+
+    @property
+    def size(self) -> int:
+        """Side of a face of the largest level, in pixels."""
+        return int(self.levels[0].shape[1])
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Dtype of all levels."""
+        return self.levels[0].dtype
+
+
+SkyboxSource: TypeAlias = (
+    str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | NDArray[Any] | Cubemap
+)
+
+
+def level_limit(side: int) -> int:
+    """Return the number of levels from `side` to 1, each half of the one before, rounded down."""
+    return side.bit_length()
+
+
+def load(source: SkyboxSource) -> Cubemap:
+    """Make a cubemap from any type of skybox argument.
+
+    `source`: A path to a KTX 1 cubemap; a path to an equirectangular image; six paths to face
+    images in the order +x, -x, +y, -y, +z, -z; an array ``(6, N, N, C)``; or a Cubemap, which is
+    returned itself.
+    """
+    if isinstance(source, Cubemap):
+        return source
+    if isinstance(source, np.ndarray):
+        return from_array(source)
+    if isinstance(source, (str, os.PathLike)):
+        path = Path(source)
+        with path.open("rb") as file:
+            start = file.read(4)
+        if start == ktx.IDENTIFIER[:4] or path.suffix.lower() == ".ktx":
+            return from_ktx(path)
+        return from_equirectangular(path)
+    if isinstance(source, Sequence):
+        return from_faces(source)
+    raise TypeError(
+        "skybox must be a path, six paths, an array (6, N, N, C) or a Cubemap, "
+        f"not {type(source).__name__}"
+    )
+
+
+def from_array(faces: NDArray[Any]) -> Cubemap:
+    """Make a cubemap with all mip levels from an array.
+
+    `faces`: ``(6, N, N, C)``, faces in the order +x, -x, +y, -y, +z, -z, top row first; C is 3
+    (alpha becomes 1, or 255) or 4; dtype uint8, float16 or float32. N does not have to be a power
+    of two.
+    """
+    if faces.dtype.newbyteorder("=") not in DTYPES:
+        raise TypeError(f"skybox is {faces.dtype}; uint8, float16 or float32 is needed")
+    _check_faces("skybox", faces, channels=(3, 4))
+    return _with_levels(_with_alpha(faces.astype(faces.dtype.newbyteorder("="))))
+
+
+def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
+    """Make a cubemap from a KTX 1 file."""
+    levels = ktx.read(path)
+    if len(levels) == 1:
+        return _with_levels(_with_alpha(levels[0]))
+    return Cubemap(tuple(_with_alpha(level) for level in levels))
+
+
+def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
+    """Make a cubemap with all mip levels from six face images.
+
+    `paths`: Image files in the order +x, -x, +y, -y, +z, -z. They are square, RGB or RGBA, and have
+    the same size and dtype. 8-bit images stay uint8, half-float images float16; 16-bit integers
+    become float32 in 0..1.
+    """
+    if isinstance(paths, (str, bytes)) or not all(isinstance(p, (str, os.PathLike)) for p in paths):
+        raise TypeError("skybox must be six paths of face images")
+    if len(paths) != 6:
+        raise ValueError(f"skybox has {len(paths)} face images; six are needed: {', '.join(FACES)}")
+    faces: list[NDArray[Any]] = []
+    for name, path in zip(FACES, paths, strict=True):
+        face = _with_alpha(_read_image(path))
+        height, width = face.shape[:2]
+        if width != height or width > MAX_SIDE:
+            raise ValueError(
+                f"{os.fspath(path)}: the {name} face is {width} x {height}; "
+                f"a square of 1..{MAX_SIDE} is needed"
+            )
+        if faces and (face.shape != faces[0].shape or face.dtype != faces[0].dtype):
+            raise ValueError(
+                f"{os.fspath(path)}: the {name} face is {width} x {height} {face.dtype}; the +x "
+                f"face is {faces[0].shape[1]} x {faces[0].shape[0]} {faces[0].dtype}"
+            )
+        faces.append(face)
+    return _with_levels(np.stack(faces))
+
+
+def from_equirectangular(path: str | os.PathLike[str]) -> Cubemap:
+    """Make a cubemap with all mip levels from an equirectangular panorama.
+
+    Returns: its faces have a side of round(width / 4) pixels. `project_equirectangular` states the
+    directions.
+    """
+    panorama = _with_alpha(_read_image(path))
+    height, width = panorama.shape[:2]
+    if width != 2 * height or width > 4 * MAX_SIDE:
+        raise ValueError(
+            f"{os.fspath(path)}: {width} x {height}; an equirectangular image is twice as wide as "
+            f"high, at most {4 * MAX_SIDE} wide"
+        )
+    return _with_levels(project_equirectangular(panorama, max(1, round(width / 4))))
+
+
+def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
+    """Resample an equirectangular panorama to the faces of a cube.
+
+    In the renderer's world -y is up: the y of meshes is negated, and the projection has no y flip.
+    So the panorama's top row is the direction -y. Its centre column is -z, straight ahead of a
+    camera without rotation. Columns to the right of the centre are towards +x, which this camera
+    sees on its right. The picture appears upright and not mirrored.
+
+    - `panorama`: ``(H, W, C)``, uint8, float16 or float32, top row first.
+    - `side`: Side of a face in pixels, at least 1.
+    - Returns: ``(6, side, side, C)`` in the panorama's dtype: bilinear samples, wrapped in
+      longitude and clamped at the poles. NaN and infinity count as 0.
+
+    Longitude u = 1/2 + atan2(x, -z) / 2 pi and latitude v = 1/2 + asin(y) / pi of the unit
+    direction. The direction of a face's pixel inverts the table "Cube map face and coordinate
+    selection" of the Vulkan specification.
+    """
+    height, width = panorama.shape[:2]
+    centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
+    t, s = np.meshgrid(centres, centres, indexing="ij")
+    one = np.ones_like(s)
+    directions = (
+        (one, -t, -s),
+        (-one, -t, s),
+        (s, one, t),
+        (s, -one, -t),
+        (s, -t, one),
+        (-s, -t, -one),
+    )
+    source = _finite(panorama)
+    faces = np.empty((6, side, side, panorama.shape[2]), panorama.dtype)
+    for face, (x, y, z) in zip(faces, directions, strict=True):
+        u = 0.5 + np.arctan2(x, -z) / (2.0 * np.pi)
+        v = 0.5 + np.arcsin(y / np.sqrt(x * x + y * y + z * z)) / np.pi
+        column, across = _split(u * width - 0.5)
+        row, down = _split(v * height - 0.5)
+        left, right = column % width, (column + 1) % width
+        top, bottom = np.clip(row, 0, height - 1), np.clip(row + 1, 0, height - 1)
+        above = source[top, left] * (1.0 - across) + source[top, right] * across
+        below = source[bottom, left] * (1.0 - across) + source[bottom, right] * across
+        face[...] = _as_dtype(above * (1.0 - down) + below * down, panorama.dtype)
+    return faces
+
+
+def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Make all mip levels of a cubemap.
+
+    Returns: `faces` and all smaller levels down to 1 x 1. A pixel is the mean of 2 x 2 pixels of
+    the next larger level. The last row and column of an odd side are left out, as sides are rounded
+    down. Means are computed in float32 and rounded to the dtype once for each level, so that errors
+    do not add up. NaN and infinity count as 0.
+    """
+    # Face by face, since what a face needs stays in the CPU's cache.
+    smaller = zip(*map(_smaller_levels, faces), strict=True)
+    return (faces, *map(np.stack, smaller))
+
+
+def _smaller_levels(face: NDArray[Any]) -> list[NDArray[Any]]:
+    quarter = np.float32(0.25)
+    levels = []
+    mean = face if face.dtype == np.uint8 else _finite(face)
+    while len(mean) > 1:
+        end = len(mean) // 2 * 2
+        complete = mean[:end, :end]
+        # Two sums, since a sum over two axes is ten times as slow.
+        if mean.dtype == np.uint8:
+            # Sums of integers are exact, too, and take half the time.
+            rows = np.add(complete[::2], complete[1::2], dtype=np.uint16)
+            mean = (rows[:, ::2] + rows[:, 1::2]) * quarter
+        else:
+            # Multiplied before the sum, so that four of the largest float32 do not overflow.
+            quarters = complete * quarter
+            rows = quarters[::2] + quarters[1::2]
+            mean = rows[:, ::2] + rows[:, 1::2]
+        levels.append(_as_dtype(mean, face.dtype))
+    return levels
+
+
+def _with_levels(faces: NDArray[Any]) -> Cubemap:
+    """Return a cubemap with all mip levels of `faces`, which nobody else may change."""
+    levels = mip_levels(faces)
+    for level in levels:
+        # So that the cubemap takes the level itself.
+        level.flags.writeable = False
+    return Cubemap(levels)
+
+
+def _check_faces(field: str, faces: NDArray[Any], *, channels: tuple[int, ...]) -> None:
+    shape = faces.shape
+    if (
+        len(shape) != 4
+        or shape[0] != 6
+        or shape[1] != shape[2]
+        or not 1 <= shape[1] <= MAX_SIDE
+        or shape[3] not in channels
+    ):
+        needed = " or ".join(map(str, channels))
+        raise ValueError(
+            f"{field} has shape {shape}; (6, N, N, C) with N in 1..{MAX_SIDE} and C {needed} "
+            "is needed"
+        )
+
+
+def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
+    """Return `image` with a fourth channel of 1 (255) if it has three."""
+    if image.shape[-1] == 4:
+        return image
+    full = np.empty((*image.shape[:-1], 4), image.dtype)
+    full[..., :3] = image
+    full[..., 3] = 255 if image.dtype == np.uint8 else 1
+    return full
+
+
+def _finite(image: NDArray[Any]) -> NDArray[np.float32]:
+    """Return `image` in float32. NaN and infinity become 0, since a mean would spread them."""
+    values = image.astype(np.float32)
+    if image.dtype.kind == "f":
+        values[~np.isfinite(values)] = 0.0
+    return values
+
+
+def _as_dtype(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    return (np.rint(values) if dtype == np.uint8 else values).astype(dtype)
+
+
+def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Split texel coordinates into integer texels and fractions (with a new last axis)."""
+    whole = np.floor(coordinate)
+    return whole.astype(np.intp), (coordinate - whole).astype(np.float32)[..., np.newaxis]
+
+
+def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """Read an RGB or RGBA image file as ``(H, W, C)``, with its stored values."""
+    # Imported here, since most skies come without them.
+    from vkbloom._io.image_reading import (  # noqa: PLC0415
+        check_plausible,
+        opened,
+    )
+    from vkbloom._io.images import failure_of  # noqa: PLC0415
+
+    name = os.fspath(path)
+    with opened(path, "Reading sky images") as image:
+        spec = image.spec()
+        if spec.nchannels not in (3, 4) or spec.depth > 1 or spec.deep:
+            raise ValueError(f"{name}: has {spec.nchannels} channels; flat RGB or RGBA is needed")
+        if max(spec.width, spec.height) > 4 * MAX_SIDE:
+            raise ValueError(f"{name}: {spec.width} x {spec.height} is too large for a sky")
+        check_plausible(spec, name)
+        kind = str(spec.format) if str(spec.format) in ("uint8", "half") else "float"
+        pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
+        # For a truncated file, OpenImageIO returns the part that is there and reports an error.
+        if pixels is None or image.has_error:
+            raise ValueError(f"{name}: damaged: {failure_of(image)}")
+    result: NDArray[Any] = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
+    return result

@@ -1,0 +1,147 @@
+"""Textures of meshes: pictures by which a surface's colours are multiplied."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._scene.skybox import read_only
+
+#: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
+AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
+Filter = Literal["nearest", "linear"]
+
+#: The longest side, far above the 4096 that every Vulkan device supports. The device's own limit is
+#: checked at upload.
+MAX_SIDE: Final = 16384
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Texture:
+    """A picture with its mip levels, and how it is sampled.
+
+    - `levels`: Arrays ``(h, w, 4)`` of float16, all finite: linear RGBA, top row first; sides
+      1..16384. h and w are halved and rounded down from level to level, but at least 1. The chain
+      may end early; a single level is a texture without mip levels. Arrays are copied unless they
+      are read-only and own their memory.
+    - `address_mode`: Horizontal and vertical: "repeat", "mirror-repeat" or "clamp-to-edge".
+    - `mag_filter`, `min_filter`: "nearest" or "linear": used where a texel is larger (`mag_filter`)
+      or smaller (`min_filter`) than a pixel.
+    - `mipmap_filter`: "nearest" or "linear": the nearest level, or a mean of two.
+    """
+
+    levels: tuple[NDArray[np.float16], ...]
+    address_mode: tuple[AddressMode, AddressMode] = ("repeat", "repeat")
+    mag_filter: Filter = "linear"
+    min_filter: Filter = "linear"
+    mipmap_filter: Filter = "linear"
+
+    def __post_init__(self) -> None:
+        levels = tuple(self.levels)
+        if not levels:
+            raise ValueError("levels is empty; at least one level is needed")
+        for index, level in enumerate(levels):
+            if not isinstance(level, np.ndarray) or level.dtype != np.float16:
+                kind = level.dtype if isinstance(level, np.ndarray) else type(level).__name__
+                raise TypeError(f"levels[{index}] is {kind}; an array of float16 is needed")
+            if level.ndim != 3 or level.shape[2] != 4 or 0 in level.shape:
+                raise ValueError(f"levels[{index}] has shape {level.shape}; (h, w, 4) is needed")
+            needed = tuple(max(1, side >> index) for side in levels[0].shape[:2])
+            if level.shape[:2] != needed or max(needed) > MAX_SIDE:
+                raise ValueError(
+                    f"levels[{index}] is {level.shape[1]} x {level.shape[0]}; "
+                    f"{needed[1]} x {needed[0]}, {MAX_SIDE} a side at the most, is needed"
+                )
+            if not np.isfinite(level).all():
+                raise ValueError(f"levels[{index}] holds NaN or infinity")
+        if len(levels) > max(levels[0].shape[:2]).bit_length():
+            raise ValueError(f"levels has {len(levels)} entries, beyond the level of 1 x 1")
+        modes = tuple(self.address_mode)
+        if len(modes) != 2:
+            raise ValueError(f"address_mode is {self.address_mode!r}; two modes are needed")
+        for name, value, possible in (
+            ("address_mode", modes[0], AddressMode),
+            ("address_mode", modes[1], AddressMode),
+            ("mag_filter", self.mag_filter, Filter),
+            ("min_filter", self.min_filter, Filter),
+            ("mipmap_filter", self.mipmap_filter, Filter),
+        ):
+            if value not in get_args(possible):
+                raise ValueError(f"{name}: {value!r} is not one of {', '.join(get_args(possible))}")
+        object.__setattr__(self, "levels", tuple(read_only(level) for level in levels))
+        object.__setattr__(self, "address_mode", modes)
+
+    def __reduce__(self) -> tuple[type[Texture], tuple[Any, ...]]:
+        # Through the constructor, because NumPy pickles do not keep arrays read-only.
+        fields = (self.address_mode, self.mag_filter, self.min_filter, self.mipmap_filter)
+        return Texture, (self.levels, *fields)
+
+    def __repr__(self) -> str:
+        height, width, _ = self.levels[0].shape
+        return f"Texture({width} x {height}, levels: {len(self.levels)})"
+
+
+#: The texture that changes nothing.
+WHITE: Final = Texture((np.ones((1, 1, 4), np.float16),), mag_filter="nearest")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The textures of some of a mesh's triangles.
+
+    - `index_count`: Entries of the mesh's indices, a positive multiple of 3.
+    - `base`: Multiplies the vertex colours; sampled at the first two texture coordinates.
+    - `emission`: Multiplies the emission; sampled at the last two texture coordinates.
+    """
+
+    index_count: int
+    base: Texture = WHITE
+    emission: Texture = WHITE
+
+    def __post_init__(self) -> None:
+        if self.index_count <= 0 or self.index_count % 3:
+            raise ValueError(
+                f"index_count is {self.index_count}; a positive multiple of 3 is needed"
+            )
+        for name in ("base", "emission"):
+            if not isinstance(getattr(self, name), Texture):
+                raise TypeError(f"{name} must be a Texture, not {getattr(self, name)!r}")
+
+
+def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
+    """Make all mip levels of a picture.
+
+    - `picture`: ``(h, w, C)`` float16, finite.
+    - Returns: the picture and all smaller levels down to 1 x 1; sizes are halved and rounded down.
+      A texel is the mean of the part of the larger level that it covers: of two texels along an
+      even side, and of three weighted texels along an odd side (Guthe and Heckbert,
+      "Non-Power-of-Two Mipmapping", NVIDIA, 2005). Means are computed in float32 and rounded once
+      for each level.
+    """
+    levels = [picture]
+    mean: NDArray[Any] = picture
+    while max(mean.shape[:2]) > 1:
+        mean = _halved(_halved(mean, 0), 1)
+        levels.append(mean.astype(np.float16))
+    return tuple(levels)
+
+
+def _halved(picture: NDArray[Any], axis: int) -> NDArray[Any]:
+    """Return the picture with one of its first two sides halved, in float32."""
+    side = picture.shape[axis]
+    if side == 1:
+        return picture
+    half = side // 2
+    lines = np.moveaxis(picture, axis, 0)
+    first = lines[0 : 2 * half : 2].astype(np.float32)
+    second = lines[1 : 2 * half : 2].astype(np.float32)
+    if side % 2 == 0:
+        mean = (first + second) / 2
+    else:
+        place = np.arange(half, dtype=np.float32)[:, np.newaxis, np.newaxis]
+        third = lines[2::2].astype(np.float32)
+        mean = ((half - place) * first + half * second + (place + 1) * third) / np.float32(side)
+    return np.moveaxis(mean, 0, axis)

@@ -1,0 +1,456 @@
+"""Fields of settings, stages and point-spread functions, and objects that are stored as fields.
+
+A `FieldInfo` is the one description of a field. Checks, JSON, the command line, the explorer, the
+axes of grids and fits read it. It comes from the field's declaration in its class: the annotation,
+the declared values, and the text about the parameter in the class's docstring. The core declares
+defaults and ranges of numbers (``shaders/params.h``), which a class can replace.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Final, Literal, Self
+
+from vkbloom import _core
+from vkbloom._checks import check_above, check_integer, check_number, check_size
+from vkbloom._suggestions import did_you_mean, lacking
+
+__all__ = [
+    "FieldInfo",
+    "Kind",
+    "Record",
+    "check_fields",
+    "choice_field",
+    "fields_of",
+    "flag_field",
+    "number_field",
+    "plain_value",
+    "value_field",
+]
+
+Kind = Literal[
+    "flag",
+    "integer",
+    "number",
+    "choice",
+    "size",
+    "numbers",
+    "vector",
+    "pairs",
+    "glare",
+    "psf",
+    "object",
+]
+#: A range of numbers; one that ends at infinity does not contain its beginning.
+Range = tuple[float, float]
+
+_KINDS: Final[Mapping[object, Kind]] = {
+    bool: "flag",
+    int: "integer",
+    float: "number",
+    tuple[int, int]: "size",
+    tuple[float, ...]: "numbers",
+    tuple[float, float, float]: "vector",
+    tuple[tuple[float, float], ...]: "pairs",
+}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FieldInfo:
+    """The description of a field.
+
+    - `range`: Least and largest value of a number; an infinite one stands for finite numbers
+      above the least.
+    - `slider`: The ends of a slider; an empty tuple for no slider; None: those of the range.
+    - `unit`: "1" for numbers without a unit, "" for others.
+    - `fixed`: Why the method takes only the default; "" for other fields.
+    - `narrowed`: Whether the class has fewer choices than the annotation.
+    - `read`: Checks a value of another kind and returns the value to store.
+    - `text`: The help of a class without a docstring.
+    """
+
+    name: str
+    kind: Kind
+    default: Any
+    owner: type
+    optional: bool = False
+    choices: tuple[Any, ...] = ()
+    range: Range | None = None
+    slider: Range | tuple[()] | None = None
+    unit: str = ""
+    option: str = ""
+    fixed: str = ""
+    narrowed: bool = False
+    read: Callable[[Any], Any] | None = None
+    text: str = ""
+
+    @property
+    def help(self) -> str:
+        """The first sentence about the parameter in the docstring of the class, or of a base."""
+        from vkbloom._views.descriptions import described_parameters  # noqa: PLC0415  rarely needed
+
+        texts = (
+            described_parameters(kind.__doc__ or "").get(self.name) for kind in self.owner.__mro__
+        )
+        return self.text or next(filter(None, texts), "")
+
+    @property
+    def ends(self) -> Range | None:
+        """The ends of the field's slider; None for fields without a slider."""
+        if self.kind not in ("number", "integer") or self.fixed or self.slider == ():
+            return None
+        return self.slider or (self.range if self.is_bounded else None)
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether the field is a number with a least and a largest value."""
+        return self.range is not None and math.isfinite(self.range[1])
+
+    def check(self, value: Any) -> Any:
+        """Return the value to store, or raise TypeError or ValueError."""
+        if value is None and self.optional:
+            return None
+        checked = value
+        if self.read is not None:
+            try:
+                checked = self.read(value)
+            except (TypeError, ValueError) as error:
+                if self.name in str(error):
+                    raise
+                raise type(error)(f"{self.name}: {error}") from error
+        elif self.kind == "choice":
+            checked = self._choice(value)
+        elif self.kind == "size":
+            checked = check_size(self.name, value)
+        elif self.range is not None:
+            checked = self._number(value, self.range)
+        if self.fixed and checked != self.default:
+            only = f"{self.default:g}" if isinstance(self.default, float) else self.default
+            raise ValueError(f"{self.name}: {value!r} is not {only}; {self.fixed}")
+        return checked
+
+    def _number(self, value: Any, ends: Range) -> float:
+        """Return a Python number, since NumPy scalars print differently."""
+        if self.kind != "number":
+            integer = check_integer(self.name, value, *ends)
+            return bool(integer) if self.kind == "flag" else integer
+        if not self.is_bounded:
+            return check_above(self.name, value, ends[0])
+        return check_number(self.name, value, *ends)
+
+    def _choice(self, value: Any) -> Any:
+        """Return a plain str, also for a subclass of str, such as an enum."""
+        # An array compares with a name element by element.
+        if not isinstance(value, str) or value not in self.choices:
+            of = ""
+            if self.narrowed and issubclass(self.owner, Record):
+                of = f", which the {self.owner._class_key} {self.owner._class_name()} has"
+            near = did_you_mean(value, self.choices) if isinstance(value, str) else ""
+            raise ValueError(
+                f"{self.name}: {value!r} is not one of {', '.join(self.choices)}{of}{near}"
+            )
+        # Not with str(), which returns an enum's own name.
+        return self.choices[self.choices.index(value)]
+
+
+def number_field(
+    name: str = "",
+    *,
+    default: Any = dataclasses.MISSING,
+    table: Mapping[str, tuple[float, float, float]] = _core.VALUES,
+    **declared: Any,
+) -> Any:
+    """Declare a field that is a number."""
+    if name:
+        initial, low, high = table[name]
+        default = initial if default is dataclasses.MISSING else default
+        # A class that declares no range keeps the range of its base.
+        declared["table_range"] = low, high
+    return dataclasses.field(default=default, metadata=declared)
+
+
+def flag_field(name: str, **declared: Any) -> Any:
+    """Declare a bool field, which is 0 or 1 in the core's table."""
+    return dataclasses.field(default=bool(_core.VALUES[name][0]), metadata=declared)
+
+
+def choice_field(name: str, choices: tuple[Any, ...] = (), **declared: Any) -> Any:
+    """Declare a field whose value is one of the core's names, or of some; the first is default."""
+    declared |= {"choices": choices} if choices else {}
+    return dataclasses.field(default=(choices or _core.CHOICES[name])[0], metadata=declared)
+
+
+def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
+    """Declare a field of any type; `kind` and `read` are values of a `FieldInfo`."""
+    return dataclasses.field(default=default, metadata=declared)
+
+
+def fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
+    """Return the descriptions of a dataclass's fields, by name."""
+    found: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")
+    if found is None:
+        inherited: dict[str, FieldInfo] = {}
+        for base in reversed(kind.__bases__):
+            if dataclasses.is_dataclass(base):
+                inherited.update(fields_of(base))
+        # Without the annotations of bases, which are in `inherited`.
+        own = inspect.get_annotations(kind, eval_str=True)
+        found = types.MappingProxyType(
+            {
+                field.name: _described(kind, field, own[field.name], inherited.get(field.name))
+                if field.name in own
+                else dataclasses.replace(inherited[field.name], owner=kind)
+                for field in dataclasses.fields(kind)
+            }
+        )
+        kind.__field_infos__ = found
+    return found
+
+
+def _described(
+    owner: type, field: dataclasses.Field[Any], annotation: Any, base: FieldInfo | None
+) -> FieldInfo:
+    """Return the description of a field that a class declares; `base` is that of its base class."""
+    declared = dict(field.metadata)
+    table = declared.pop("table_range", None)
+    if base is None and table is not None:
+        declared.setdefault("range", table)
+    parts = typing.get_args(annotation)
+    optional = types.NoneType in parts
+    if optional and len(parts) == 2:
+        (annotation,) = (part for part in parts if part is not types.NoneType)
+    kind = _KINDS.get(annotation, "object")
+    if typing.get_origin(annotation) is Literal:
+        kind = "choice"
+        declared["narrowed"] = "choices" in declared or (base is not None and base.narrowed)
+        declared.setdefault("choices", base.choices if base else typing.get_args(annotation))
+    found = {"kind": kind, "default": field.default, "owner": owner, "optional": optional}
+    if base is not None:
+        if "range" in declared:
+            declared.setdefault("slider", None)
+        return dataclasses.replace(base, **{**found, "kind": base.kind, **declared})
+    if kind == "flag":
+        declared["range"] = 0, 1
+    if kind in ("number", "integer"):
+        declared.setdefault("unit", "1")
+    return FieldInfo(**{"name": field.name, "option": field.name, **found, **declared})
+
+
+def check_fields(record: Any) -> None:
+    """Check the fields of a frozen dataclass, and store the values that `FieldInfo.check` returns.
+
+    A default is not checked: `Settings.replace` makes settings often, with few other values.
+    """
+    for name, info in fields_of(type(record)).items():
+        value = getattr(record, name)
+        if value is not info.default:
+            object.__setattr__(record, name, info.check(value))
+
+
+class _ConstructorSignature:
+    """The signature of a class's ``__init__``."""
+
+    def __get__(self, _: object, owner: type[Any]) -> inspect.Signature:
+        signature = inspect.signature(owner.__init__)
+        return signature.replace(parameters=[*signature.parameters.values()][1:])
+
+
+def _unknown(kind: type[Record], name: str, unknown: list[str]) -> str:
+    """Return the text of an error for fields that a class lacks."""
+    others = {other: fields_of(one) for other, one in kind._classes().items()}
+    return lacking(name, unknown, fields_of(kind), others)
+
+
+class Record:
+    """Base class of settings, stages of glare and point-spread functions.
+
+    A record can be stored as the name of its class and its fields, as a mapping or as JSON text.
+    """
+
+    #: The key of the class's name among the fields: "method", "stage" or "psf".
+    _class_key: ClassVar[str]
+    #: The beginning of error messages about the fields.
+    _subject: ClassVar[str]
+
+    #: The constructor's, since `inspect` would show the arguments of `__new__`.
+    __signature__ = _ConstructorSignature()
+
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        """Raise TypeError for a field that the class lacks, with the field that was meant."""
+        if values and dataclasses.is_dataclass(cls):
+            known = fields_of(cls)
+            if not known.keys() >= values.keys():
+                unknown = [name for name in values if name not in known]
+                raise TypeError(_unknown(cls, cls.__name__, unknown))
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def _class_name(cls) -> str | None:
+        """Return the name of the class in stored records; None for an abstract class."""
+        name: str | None = getattr(cls, cls._class_key, None)
+        return name
+
+    @classmethod
+    def _classes(cls) -> Mapping[str, type[Any]]:
+        """Return the classes of stored records by name."""
+        raise NotImplementedError
+
+    @classmethod
+    def _check_stored(cls, values: dict[str, Any]) -> None:
+        """Take from the stored values what is no field, and check it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the name of the class, and the fields by name.
+
+        Returns
+        -------
+        dict
+            Values that JSON can represent. The name of the class has the key "method" for settings,
+            "stage" for stages of glare and "psf" for point-spread functions.
+
+        See Also
+        --------
+        from_dict : Makes the object from the result.
+        to_json : Returns the result as text.
+
+        Examples
+        --------
+        >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
+        3
+        >>> vkbloom.Streaks(directions=4).to_dict()["stage"]
+        'streaks'
+        >>> vkbloom.psf.gaussian(sigma=2).to_dict()
+        {'psf': 'gaussian', 'sigma': 2.0}
+        """
+        values = {name: plain_value(getattr(self, name)) for name in fields_of(type(self))}
+        return {self._class_key: self._class_name(), **values}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """Make an object from the result of `to_dict`.
+
+        Parameters
+        ----------
+        fields : mapping of str to object
+            Values by field. Missing fields have their defaults. The name of the class may be
+            missing in calls on that class, such as ``Separable.from_dict``.
+
+        Returns
+        -------
+        Settings, Glare or PSF
+            Of the named class.
+
+        Raises
+        ------
+        ValueError
+            There is no such class or field, the named class is not that of the call, a field
+            without a default has no value, or a value is out of range.
+        TypeError
+            `fields` is not a mapping, or a value has the wrong type.
+
+        See Also
+        --------
+        to_dict : Returns the fields by name.
+
+        Examples
+        --------
+        >>> vkbloom.Streaks.from_dict({"stage": "streaks", "directions": 4}).directions
+        4
+        >>> vkbloom.psf.PSF.from_dict({"psf": "gaussian", "sigma": 2})
+        gaussian(sigma=2.0)
+        """
+        if not isinstance(fields, Mapping):
+            raise TypeError(f"{cls._subject}: a mapping is needed, not {type(fields).__name__}")
+        key, classes, own = cls._class_key, cls._classes(), cls._class_name()
+        name = fields.get(key, own)
+        if not isinstance(name, str) or name not in classes:
+            load = "; load its file with vkbloom.load_method" if "sha256" in fields else ""
+            near = did_you_mean(name, classes)
+            raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}{load or near}")
+        if own not in (None, name):
+            raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
+        values = {field: value for field, value in fields.items() if field != key}
+        classes[name]._check_stored(values)
+        declared = fields_of(classes[name])
+        unknown = [field for field in values if field not in declared]
+        if unknown:
+            raise ValueError(f"{cls._subject}: {_unknown(classes[name], name, unknown)}")
+        lacking = [
+            field
+            for field, info in declared.items()
+            if field not in values and info.default is dataclasses.MISSING
+        ]
+        if lacking:
+            raise ValueError(f"{cls._subject}: {name} needs a value for {', '.join(lacking)}")
+        made: Self = classes[name](**values)
+        return made
+
+    def to_json(self) -> str:
+        """Return `to_dict` as JSON text.
+
+        See Also
+        --------
+        from_json : Makes the object from the result.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=2).to_json()
+        '{"psf": "gaussian", "sigma": 2.0}'
+        """
+        import json  # noqa: PLC0415  costs start-up time
+
+        return json.dumps(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Make an object from the result of `to_json`.
+
+        Parameters
+        ----------
+        text : str
+            An object with the keys of `from_dict`.
+
+        Returns
+        -------
+        Settings, Glare or PSF
+
+        Raises
+        ------
+        ValueError, TypeError
+            The text is not a JSON object, or as for `from_dict`.
+
+        See Also
+        --------
+        to_json : Returns the text.
+
+        Examples
+        --------
+        >>> from vkbloom import Settings
+        >>> Settings.from_json('{"method": "pyramid", "levels": 3}').levels
+        3
+        """
+        import json  # noqa: PLC0415  costs start-up time
+
+        try:
+            fields = json.loads(text)
+        except RecursionError:
+            raise ValueError("text: lists and objects are nested too deeply") from None
+        return cls.from_dict(fields)
+
+
+def plain_value(value: Any) -> Any:
+    """Return the value of a field as values that JSON can represent."""
+    if isinstance(value, tuple | list):
+        return [plain_value(item) for item in value]
+    for convert in ("to_dict", "to_plain"):
+        if hasattr(value, convert):
+            return getattr(value, convert)()
+    return value

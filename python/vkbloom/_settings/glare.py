@@ -1,0 +1,150 @@
+"""The base classes of the stages of glare, and functions for the field `Settings.glare`."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar
+
+from vkbloom import _core
+from vkbloom._settings.fields import Record, fields_of, number_field
+from vkbloom._settings.registry import STAGES
+
+#: Declares a field that is a number in the core's table of glare.
+stage_field = functools.partial(number_field, table=_core.GLARE_VALUES)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Glare(Record):
+    """Base class of the stages of glare; use a stage's class, such as `Streaks`.
+
+    Stages are frozen and hashable. Their light is added to the bloom: the composite adds
+    i b + sum of i_k g_k instead of i b. Here b is the bloom and i its intensity; g_k and i_k are
+    the framebuffer and the intensity of stage k. `Dirt` multiplies this sum.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Ghosts, Halo, Streaks, Dirt : The stages.
+    Settings : Takes stages as `glare`.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Pyramid(glare=(vkbloom.Streaks(), vkbloom.Streaks(directions=1)))
+    >>> image = np.zeros((32, 32, 3), np.float16)
+    >>> image[16, 16] = 100
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, settings)
+    >>> list(frames)[:3]
+    ['glow', 'streaks_0', 'streaks_1']
+    """
+
+    _class_key: ClassVar[str] = "stage"
+    _subject: ClassVar[str] = "glare"
+    stage: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if not hasattr(self, "stage"):
+            raise TypeError(f"{type(self).__name__} is abstract; use a stage, such as Streaks")
+        super().__post_init__()
+
+    @classmethod
+    def _classes(cls) -> Mapping[str, type[Glare]]:
+        return STAGES
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GlareLight(Glare):
+    """Base class of the stages that add light; use a stage's class, such as `Streaks`.
+
+    Parameters
+    ----------
+    intensity : float
+        Factor of the stage's light, 0 to 65504.
+    threshold : float
+        Subtracted from each channel that the stage reads, 0 to 65504. Negative differences become
+        0. It is subtracted after the halvings, in which small highlights become dark and vanish:
+        one, two or three halvings leave at most 1/16, 1/68 or 1/276 of a single pixel's value. If
+        alpha is blurred, it is multiplied by the factor of the brightest channel.
+    halvings : int
+        Number of times that the stage's input is halved, 0 to 4, by the 13 taps of `Pyramid`. Each
+        halving makes the stage four times as fast, and its light coarser.
+
+    See Also
+    --------
+    Ghosts, Halo, Streaks : The stages.
+
+    Notes
+    -----
+    A stage reads what glows: ``glow``, with threshold, mask and emission. Published methods apply
+    threshold and mask in a later pass. With them, the stages have a threshold pass of their own,
+    which uses the formulas of `Settings`. Texels outside of the picture are black. The framebuffers
+    of stages are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
+
+    Examples
+    --------
+    >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
+    2
+    """
+
+    intensity: float = stage_field("intensity", slider=(0, 4))
+    threshold: float = stage_field("threshold", slider=(0, 16))
+    halvings: int = stage_field("halvings")
+
+
+def check_glare(glare: object) -> tuple[Glare, ...]:
+    """Return the stages of settings.
+
+    `glare`: A mapping is the result of `Glare.to_dict`. None: no stages.
+    """
+    if glare is None:
+        return ()
+    if isinstance(glare, Glare | Mapping):
+        glare = (glare,)
+    if isinstance(glare, str) or not isinstance(glare, Iterable):
+        raise TypeError(f"glare: {glare!r} is not a sequence of stages")
+    found = []
+    for one in glare:
+        stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
+        if not isinstance(stage, Glare):
+            raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
+        found.append(stage)
+    if sum(stage.stage == "dirt" for stage in found) > 1:
+        raise ValueError("glare: there is more than one Dirt; give one")
+    if len(found) > _core.MAX_STAGES:
+        raise ValueError(f"glare: {len(found)} stages are out of range, 0 to {_core.MAX_STAGES}")
+    return tuple(found)
+
+
+def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
+    """Return the stage and the field of a name such as "glare.0.intensity"."""
+    parts = name.split(".")
+    if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
+        place = int(parts[1])
+        if place < len(glare) and parts[2] in fields_of(type(glare[place])):
+            return place, parts[2]
+    known = [
+        f"glare.{place}.{field}"
+        for place, stage in enumerate(glare)
+        for field in fields_of(type(stage))
+    ]
+    raise ValueError(
+        f"glare: {name!r} is not a field of a stage: {', '.join(known) or 'no stages'}"
+    )
+
+
+def replaced_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tuple[Glare, ...]:
+    """Return stages with some fields changed, by names such as "glare.0.intensity"."""
+    stages_now = list(glare)
+    for name, value in changes.items():
+        place, field = stage_field_of(glare, name)
+        changed: Any = dataclasses.replace(stages_now[place], **{field: value})
+        stages_now[place] = changed
+    return tuple(stages_now)

@@ -1,0 +1,112 @@
+"""The registries of methods and of stages of glare: their classes by name.
+
+All parts of the package read a registry at the time of use, so that a class that is registered
+later has options, controls, axes, fits and JSON like the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from vkbloom._suggestions import Named
+
+if TYPE_CHECKING:
+    from vkbloom._settings.glare import Glare
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["METHODS", "STAGES", "Methods", "Reference", "Registry", "glares", "presets"]
+
+
+class Reference(Protocol):
+    """A method in NumPy, such as the modules of `vkbloom.reference`.
+
+    ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the data
+    flow; the last one is "bloom". `source` is a `vkbloom.reference._image.BlurInput`.
+    ``gain(settings, size)`` returns the bloom of a flat image of 1; `size` is the width and height
+    of the frame.
+    """
+
+    passes: Any
+    gain: Any
+
+
+def _imported(source: str | type[Any]) -> type[Any]:
+    if isinstance(source, type):
+        return source
+    module, _, kind = source.partition(":")
+    return getattr(import_module(module), kind)  # type: ignore[no-any-return]
+
+
+class Registry(Named[type[Any]]):
+    """Classes by name. Those of the package are imported on first use, since some import much."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(kind, _imported)
+
+    def supply(self, package: str, places: Mapping[str, str]) -> None:
+        """Set the classes of a package: "module:Class" by name."""
+        self.fill(lambda: {name: f"{package}.{place}" for name, place in places.items()})
+
+    def is_added(self, name: str) -> bool:
+        """Return whether the class was added at run time."""
+        return isinstance(self._entries.get(name), type)
+
+    def class_named(self, name: str) -> type[Any] | None:
+        """Return the class with this name in Python; None if there is none."""
+        for key, source in self._entries.items():
+            own = source.partition(":")[2] if isinstance(source, str) else source.__name__
+            if own == name:
+                return self[key]
+        return None
+
+
+class Methods(Registry):
+    """The settings classes of the methods, and the methods in NumPy."""
+
+    _references: Final[dict[str, Reference]]
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(kind)
+        self._references = {}
+
+    def register(self, kind: type[Any], reference: Reference | None = None) -> None:
+        """Add a class under its `method`, or replace one that was added."""
+        name = kind.method
+        if isinstance(self._entries.get(name), str):
+            raise ValueError(f"method: {name!r} is a method of vkbloom; give another name")
+        self.unregister(name)
+        self._entries[name] = kind
+        if reference is not None:
+            self._references[name] = reference
+
+    def unregister(self, name: str) -> None:
+        """Remove a class that was added, if it is there."""
+        if isinstance(self._entries.get(name), type):
+            del self._entries[name]
+            self._made.pop(name, None)
+            self._references.pop(name, None)
+
+    def has_reference(self, name: str) -> bool:
+        """Return whether the method is there in NumPy."""
+        return isinstance(self._entries.get(name), str) or name in self._references
+
+    def reference(self, name: str) -> Reference:
+        """Return a method in NumPy; raise KeyError if there is none."""
+        if isinstance(self._entries.get(name), str):
+            module: Any = import_module(f"vkbloom.reference._{name}")
+            return module  # type: ignore[no-any-return]
+        return self._references[name]
+
+
+#: The methods, which `vkbloom._methods` supplies, in the order of ``VKB_METHODS`` in the core.
+METHODS: Final = Methods("method")
+#: The stages of glare, which `vkbloom._glare` supplies.
+STAGES: Final = Registry("glare")
+#: Name to settings, which `vkbloom._presets` supplies. ``vkbloom presets`` and ``docs/presets.md``
+#: list what they are, with their sources.
+presets: Final[Named[Settings]] = Named("preset", lambda preset: preset.make())
+#: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
+#: ``docs/glare.md`` list what they are, with their sources.
+glares: Final[Named[tuple[Glare, ...]]] = Named("glare", lambda glare: glare.stages)

@@ -1,0 +1,312 @@
+"""The settings of a bloom: the fields that all methods share.
+
+Defaults and ranges are read from the core's tables, which come from ``shaders/params.h``: each is
+declared once for the shaders, the core and Python.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self, get_args
+
+from vkbloom._argument_types import HINTS
+from vkbloom._settings.fields import (
+    FieldInfo,
+    Record,
+    choice_field,
+    fields_of,
+    flag_field,
+    number_field,
+    value_field,
+)
+from vkbloom._settings.glare import Glare, check_glare, replaced_stages, stage_field_of
+from vkbloom._settings.registry import METHODS, glares, presets
+from vkbloom._suggestions import did_you_mean, unknown
+
+Shading = Literal["forward", "deferred"]
+Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
+ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
+Encoding = Literal["none", "gamma22", "srgb", "pq", "hlg"]
+Alpha = Literal["keep", "max", "blur"]
+BloomFormat = Literal[
+    "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat", "rgba8unorm-srgb"
+]
+
+SHADINGS: tuple[Shading, ...] = get_args(Shading)
+
+
+def _read_glare(glare: object) -> tuple[Glare, ...]:
+    """Return the stages of a name in `glares`, or of `check_glare`."""
+    if not isinstance(glare, str):
+        return check_glare(glare)
+    if glare not in glares:
+        near = did_you_mean(glare, glares)
+        raise ValueError(f"glare: {glare!r} is not one of {', '.join(glares)}{near}")
+    return glares[glare]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Settings(Record):
+    """Base class of the settings of all methods; use a method's class, such as `Separable`.
+
+    Settings are frozen and hashable; `replace` returns a changed copy.
+
+    Parameters
+    ----------
+    bloom : bool
+        Whether to run the bloom passes. False: ``final`` is the tone-mapped scene without bloom
+        and without the scene's glow mesh.
+    threshold : float or None
+        Brightness above which a colour contributes to the bloom, 0 to 65504; None: every colour
+        does. In a scene the threshold applies to the glow, with deferred shading to the
+        brightness.
+    knee : float
+        Softness of the threshold, 0 to 1. 0: colours whose luminance is above the threshold pass
+        unchanged. Otherwise, with b = max(r, g, b), k = threshold * knee and
+        q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5), the colour is scaled by
+        max(q, b - threshold) / max(b, 1e-5).
+    composite : {"add", "mix", "screen"}
+        s + i b; s + (b - s) i; 1 - (1 - s)(1 - i b) with both clamped to 0..1. `GodotBloom` has two
+        more.
+    intensity : float
+        The i of the composite, 0 to 65504.
+    alpha : {"keep", "max", "blur"}
+        Treatment of the alpha a of an RGBA image. "max" and "blur" need premultiplied colours.
+        "keep": a does not change. "max": max(a, clamp(max over r, g, b of i b, 0, 1)), for every
+        `composite`. "blur": alpha is blurred like a colour, with the weights of the colours, and is
+        ``bloom[..., 3]``; the result is 1 - (1 - a)(1 - clamp(i b_a, 0, 1)). If a threshold
+        subtracts instead of scaling (`FilamentBloom`), alpha is multiplied by the factor of the
+        brightest channel. Scenes ignore it.
+    tonemap : {"none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"}
+        The tone curve that is applied to the composite.
+    exposure : float
+        In stops, -32 to 32: the composite is multiplied by 2**exposure before the curve.
+    encoding : {"none", "gamma22", "srgb", "pq", "hlg"}
+        Applied to rgb after the curve. "pq" and "hlg" are those of Rec. ITU-R BT.2100: the inverse
+        EOTF of c * reference_white cd/m2, clamped to 0..10000; and the OETF of
+        clamp(0.26496 c, 0, 1), without an OOTF, so that 1 gives the signal 0.75.
+    reference_white : float
+        Luminance of a value of 1 with "pq", 1 to 10000 cd/m2. 203 is that of Report ITU-R BT.2408.
+    dither : bool
+        Whether to add noise before ``final`` is rounded to 8 bits, so that dark gradients show
+        grain instead of bands. The noise of each channel is uniform over one level, +-1/2. The
+        mean over pixels is then the unrounded value (Roberts, "Picture Coding Using Pseudo-Random
+        Noise", IRE Transactions on Information Theory, 1962). Values that 8 bits represent
+        exactly, such as 0 and 1, do not change. A float ``final`` is not dithered.
+    dither_seed : int
+        Seed of the noise, 0 to 65535. The noise is a hash of the pixel's position and the seed,
+        so that it is the same on every adapter.
+    bloom_size : (int, int) or None
+        Width and height of the bloom buffers in pixels.
+    bloom_scale : float
+        The same as a fraction of the frame, 0.001 to 4, if `bloom_size` is None. Sides are rounded
+        down, but at least 1. A forward scene with neither (a scale of 1) has 256 x 256.
+    format : str or None
+        Format of the bloom buffers, "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat" or
+        "rgba8unorm-srgb". None: "rgba8unorm" for forward scenes and uint8 images,
+        "rgba16float" for deferred scenes, the image's own for float images. "rg11b10ufloat" has 6
+        bits of mantissa, 5 for blue, and no negative values. Stored values are rounded to the
+        nearest one; negative values and NaN become 0; values above 65024 (64512 for blue) become
+        this limit. Its arrays are float32. Published methods store only their levels in it:
+        ``glow`` and ``bloom``, which are the frame before and after in an engine, are not rounded.
+        "rgba8unorm-srgb" has 8-bit levels of sRGB: values are clamped to 0..1, encoded and rounded
+        when they are stored, and decoded when they are read. Its arrays are float32 light.
+        Published methods do not round their ``bloom`` to it.
+    glare : sequence of Glare, or a name of `vkbloom.glares`
+        Up to 5 stages, such as `Streaks`, that read what glows and add light to the bloom. Each has
+        a framebuffer of its name, with a number if there are several of a kind. In ``final``,
+        i b + sum of i_k g_k stands in place of i b, with framebuffer g_k and intensity i_k of each.
+
+    Raises
+    ------
+    ValueError
+        A field is out of its range; the message names the field, the value and the range.
+    TypeError
+        A field has the wrong type.
+
+    See Also
+    --------
+    Separable, Pyramid, DualKawase : The methods.
+    presets : Published settings by name.
+    Renderer.apply, Renderer.render : Use settings.
+
+    Examples
+    --------
+    >>> settings = vkbloom.Pyramid(levels=5, threshold=1.0, composite="mix")
+    >>> settings.replace(intensity=0.04).intensity
+    0.04
+    >>> settings.replace(knee=2)
+    Traceback (most recent call last):
+        ...
+    ValueError: knee: 2 is out of range, 0 to 1
+    """
+
+    _class_key: ClassVar[str] = "method"
+    _subject: ClassVar[str] = "fields"
+    method: ClassVar[str]
+    #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
+    published: ClassVar[bool] = False
+
+    bloom: bool = flag_field("bloom")
+    threshold: float | None = number_field("threshold", default=None, slider=(0, 4))
+    knee: float = number_field("knee")
+    composite: Composite = choice_field("composite", ("add", "mix", "screen"))
+    intensity: float = number_field("intensity", slider=(0, 4))
+    alpha: Alpha = choice_field("alpha")
+    tonemap: ToneMap = choice_field("tonemap")
+    exposure: float = number_field("exposure", unit="stop", slider=(-8, 8))
+    encoding: Encoding = choice_field("encoding")
+    reference_white: float = number_field("reference_white", unit="cd/m2")
+    dither: bool = flag_field("dither")
+    dither_seed: int = number_field("dither_seed", slider=(0, 100))
+    bloom_size: tuple[int, int] | None = value_field(None, unit="pixel")
+    bloom_scale: float = number_field("bloom_scale", slider=(0.05, 1))
+    format: BloomFormat | None = None
+    glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
+
+    def __post_init__(self) -> None:
+        if type(self) is Settings:
+            raise TypeError("Settings is abstract; use a method, such as Separable")
+        super().__post_init__()
+
+    @property
+    def glow_note(self) -> str:
+        """What `glow` shows if it is not the light above the threshold; empty if it is."""
+        is_frame = self.published and self.threshold is not None
+        return "the frame before its threshold" if is_frame else ""
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some fields changed, as `dataclasses.replace` does.
+
+        Parameters
+        ----------
+        **changes
+            New values by field. Those of a stage of `glare` have names such as
+            "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``.
+
+        Returns
+        -------
+        Settings
+            Settings of the same method.
+
+        Raises
+        ------
+        ValueError
+            A value is out of its field's range.
+        TypeError
+            The method has no such field, or a value has the wrong type.
+
+        See Also
+        --------
+        to_dict : The fields by name.
+
+        Examples
+        --------
+        >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
+        4.0
+        """
+        nested = {name: changes.pop(name) for name in [*changes] if "." in name}
+        if nested:
+            glare = _read_glare(changes.get("glare", self.glare))
+            changes["glare"] = replaced_stages(glare, nested)
+        return dataclasses.replace(self, **changes)
+
+    def value_of(self, name: str) -> Any:
+        """Return the value of a field, or of a stage's field, such as "glare.0.intensity".
+
+        See Also
+        --------
+        replace : Takes the same names.
+
+        Examples
+        --------
+        >>> vkbloom.Pyramid(glare=vkbloom.Streaks(fade=0.9)).value_of("glare.0.fade")
+        0.9
+        """
+        if "." not in name:
+            return getattr(self, name)
+        place, field = stage_field_of(self.glare, name)
+        return getattr(self.glare[place], field)
+
+    @property
+    def _has_state(self) -> bool:
+        """Whether frames depend on those before; only custom methods can."""
+        return False
+
+    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+        """Return the settings for a frame of a sequence, whose frames share the state."""
+        return self
+
+    @classmethod
+    def _classes(cls) -> Mapping[str, type[Settings]]:
+        return METHODS
+
+    def _repr_html_(self) -> str:
+        """Return the table of `display.fields_html`."""
+        # Imported here because only notebooks need it.
+        from vkbloom._views import display  # noqa: PLC0415
+
+        return display.fields_html(self)
+
+
+def field_info(settings: Settings, name: str) -> FieldInfo:
+    """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""
+    if "." not in name:
+        return fields_of(type(settings))[name]
+    place, field = stage_field_of(settings.glare, name)
+    return fields_of(type(settings.glare[place]))[field]
+
+
+def no_knee(method: str) -> Any:
+    """Declare the knee of a method whose threshold has none."""
+    return number_field("knee", fixed=f"the threshold of the method {method} has no knee")
+
+
+def check_shading(shading: str) -> Shading:
+    """Return the shading; raise ValueError if there is no shading of that name."""
+    if not isinstance(shading, str) or shading not in SHADINGS:
+        raise ValueError(f"shading: {shading!r} is not one of {', '.join(SHADINGS)}")
+    return shading
+
+
+@functools.cache
+def _defaults(method: str) -> Settings:
+    # Always the same object, since a renderer keeps the plan of the last one.
+    settings: Settings = METHODS[method]()
+    return settings
+
+
+def check_settings(
+    settings: Settings | str | None, name: str = "settings", *, of_image: bool = False
+) -> Settings:
+    """Return the settings, or those of a preset; raise TypeError for what is neither.
+
+    None: the preset "tutorial", or with `of_image` "bevy_natural".
+    """
+    if isinstance(settings, Settings):
+        return settings
+    if settings is None:
+        return _defaults("bevy" if of_image else "separable")
+    if not isinstance(settings, str):
+        raise TypeError(f"{name}: {settings!r} is not a Settings{_hint(settings)}")
+    if settings in presets:
+        return presets[settings]
+    if settings in METHODS:
+        given = METHODS[settings].__name__
+        package = "" if METHODS.is_added(settings) else "vkbloom."
+        raise ValueError(f"{name}: {settings!r} is a method; give {package}{given}()")
+    raise ValueError(unknown(f"{name}: unknown preset", settings, presets))
+
+
+def _hint(settings: object) -> str:
+    """Return what to give instead of an object that is not a Settings; "" if that is unknown."""
+    if isinstance(settings, type) and issubclass(settings, Settings):
+        return f"; give {settings.__name__}(), an object of the class"
+    if isinstance(settings, Mapping):
+        return "; give vkbloom.Settings.from_dict(...) of it"
+    return ""
+
+
+HINTS["a Settings"] = _hint

@@ -1,0 +1,147 @@
+"""What a misspelled name may have meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
+
+__all__ = ["Named", "did_you_mean", "lacking", "nearest", "unknown"]
+
+T = TypeVar("T")
+
+
+# More changes than these, or than one for three letters, make another word.
+_MAX_CHANGES = 3
+_LETTERS = 3
+
+
+def nearest(name: object, known: Iterable[str]) -> str | None:
+    """Return the known name that is most like another one; None if none is like it.
+
+    A name is like another one if few letters differ, or if one is a complete word of the other.
+    Upper case, "-" and "_" make no difference.
+    """
+    plain = {one.lower().replace("-", "_").strip("_"): one for one in known}
+    asked = str(name).lower().replace("-", "_").strip("_")
+    most = min(_MAX_CHANGES, (len(asked) + 1) // _LETTERS)
+    near = {one: _changes(asked, one) for one in plain if abs(len(one) - len(asked)) <= most}
+    found = [one for one in sorted(near, key=near.__getitem__) if near[one] <= most]
+    if not found and len(asked) >= _LETTERS:
+        found = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
+    return plain[found[0]] if found else None
+
+
+def _changes(first: str, second: str) -> int:
+    """Return how many letters are to be changed, added, left out, or exchanged with the next."""
+    before: list[int] = []
+    row = list(range(len(second) + 1))
+    for y, letter in enumerate(first):
+        earlier, before, row = before, row, [y + 1]
+        for x, other in enumerate(second):
+            least = min(before[x] + (letter != other), before[x + 1] + 1, row[x] + 1)
+            if x and y and (letter, other) == (second[x - 1], first[y - 1]):
+                least = min(least, earlier[x - 1] + 1)
+            row.append(least)
+    return row[-1]
+
+
+def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
+    """Return "; did you mean 'x'?" with the nearest known name; "" if none is near."""
+    near = nearest(name, known)
+    return f"; did you mean {form.format(near)}?" if near is not None else ""
+
+
+def lacking(
+    owner: str, names: Sequence[str], own: Iterable[str], others: Mapping[str, Iterable[str]]
+) -> str:
+    """Return a text that something lacks fields: what was meant, or what has them.
+
+    - `own`: The fields that it has.
+    - `others`: The fields of others by their names.
+    """
+    own = list(own)
+    text = f"{owner} has no {', '.join(map(repr, names))}"
+    if near := did_you_mean(names[0], own):
+        return text + near
+    having = [other for other, fields in others.items() if set(names) <= set(fields)]
+    if having:
+        return f"{text}, which {', '.join(having)} {'has' if len(having) == 1 else 'have'}"
+    return f"{text}; it has {', '.join(own)}"
+
+
+def unknown(what: str, name: object, known: Iterable[str]) -> str:
+    """Return a text that a name is unknown: which one may be meant, and which there are."""
+    known = list(known)
+    near = did_you_mean(name, known) or ";"
+    return f"{what} {name!r}{near} available: {', '.join(known) or 'none'}"
+
+
+class Named(Mapping[str, T]):
+    """Objects by their published names, as keys or attributes.
+
+    The error for an unknown name suggests one.
+
+    - `kind`: What the objects are.
+    - `make`: Makes an object of its entry, when it is first asked for. The entry's `what` and
+      `whose` say what it looks like, and its source.
+    """
+
+    def __init__(self, kind: str, make: Callable[[Any], T]) -> None:
+        self._kind = kind
+        self._late: Callable[[], Mapping[str, Any]] | None = None
+        self._filled: dict[str, Any] = {}
+        self._make = make
+        self._made: dict[str, T] = {}
+
+    def fill(self, entries: Callable[[], Mapping[str, Any]]) -> None:
+        """Set the function that returns the entries; it is called at the first use."""
+        self._late = entries
+
+    @property
+    def _entries(self) -> dict[str, Any]:
+        if self._late is not None:
+            late, self._late = self._late, None
+            self._filled = {**late(), **self._filled}
+        return self._filled
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._entries:
+            raise KeyError(unknown(f"unknown {self._kind}", name, self))
+        if name not in self._made:
+            self._made.setdefault(name, self._make(self._entries[name]))
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __getattr__(self, name: str) -> T:
+        # copy and pickle ask for methods before there are entries.
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0], name=name, obj=self) from None
+
+    def __dir__(self) -> Iterable[str]:
+        return [*super().__dir__(), *self]
+
+    def __repr__(self) -> str:
+        width = max(map(len, self), default=0)
+        return "\n".join(f"{name:<{width}}  {one.what}" for name, one in self._entries.items())
+
+    def _repr_html_(self) -> str:
+        from html import escape  # noqa: PLC0415  rarely needed
+
+        rows = (
+            "".join(f"<td>{escape(text)}</td>" for text in (name, one.what, one.whose))
+            for name, one in self._entries.items()
+        )
+        head = f"<tr><th>{escape(self._kind)}</th><th>what</th><th>whose</th></tr>"
+        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"

@@ -1,0 +1,356 @@
+"""Viewable pictures of framebuffers: PNG, and contact sheets as HTML and PNG."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+import struct
+import warnings
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_index, import_extra
+from vkbloom._framebuffers import Framebuffers, leading
+from vkbloom._io.srgb import encode_srgb
+
+__all__ = [
+    "contact_sheet_html",
+    "contact_sheet_png",
+    "labelled",
+    "leading_png",
+    "picture",
+    "png",
+    "reduced",
+    "resized",
+    "scaled",
+    "sheet_png",
+]
+
+_THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
+
+
+def leading_png(frames: Framebuffers) -> bytes:
+    """Return the picture of `final`, or else of the last image, or else of the last framebuffer.
+
+    8-bit images are shown as stored. Float images are clipped to 0..1 and shown with
+    the sRGB curve, unless the settings' encoding was already applied to them; `normal`
+    is shown as (n + 1) / 2, `position` with each axis stretched to 0..1, depth from
+    white (nearest) to black (farthest). NaN counts as 0.
+    """
+    return png(_picture(frames, leading(frames)))
+
+
+def contact_sheet_html(frames: Framebuffers) -> str:
+    """Return a contact sheet of all framebuffers, with the pass times, as HTML.
+
+    Pictures are made as in `leading_png`, without alpha, and reduced to at most 320 pixels by
+    averaging. Linear floats with more than one pixel in a hundred above 1 are shown with less
+    exposure; the caption gives the exposure, and the range of all floats. Text inherits the
+    page's colours.
+    """
+    page = ['<div style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em">']
+    page.append(
+        '<div style="display:grid;gap:12px;'
+        'grid-template-columns:repeat(auto-fill,minmax(200px,1fr))">'
+    )
+    for name, array in frames.items():
+        height, width = array.shape[:2]
+        shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
+        stops = _viewing_stops(frames, name)
+        picture = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
+        data = base64.b64encode(png(picture)).decode("ascii")
+        # Show the pixels of an enlarged pyramid level without smoothing.
+        rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
+        label = html.escape(name)
+        size = html.escape(_described(array, _note(frames, name)) + _ranged(array))
+        if stops != 0:
+            size += f", shown at {stops:g} stops"
+        page.append(
+            '<figure style="margin:0">'
+            f'<img src="data:image/png;base64,{data}" alt="{label}, {size}" '
+            'style="display:block;width:100%;height:auto;max-width:none;'
+            f"aspect-ratio:{_aspect(frames):.4g};object-fit:contain;"
+            f'background:rgba(128,128,128,.15);image-rendering:{rendering}">'
+            f'<figcaption><b>{label}</b> <span style="opacity:.7">{size}</span></figcaption>'
+            "</figure>"
+        )
+    page.append("</div>")
+    if frames.timings:
+        page.append(_timings_html(frames))
+    facts = [f"{key} {value}" for key, value in frames.info.items()]
+    page.append(
+        '<div style="margin-top:10px;opacity:.8">' + html.escape(", ".join(facts)) + "<br>"
+        '<code style="color:inherit;background:none;padding:0;white-space:pre-wrap;'
+        f'overflow-wrap:anywhere">{html.escape(repr(frames.settings))}</code></div></div>'
+    )
+    return "".join(page)
+
+
+def _timings_html(frames: Framebuffers) -> str:
+    longest = max((t for t in frames.timings.values() if math.isfinite(t)), default=0.0)
+    adapter = html.escape(str(frames.info.get("adapter", "the device")))
+    rows = [
+        f'<div style="margin-top:10px">Time of each pass on {adapter}</div>'
+        '<div style="display:grid;grid-template-columns:max-content 1fr max-content;'
+        'gap:2px 8px;align-items:center">'
+    ]
+    for name, seconds in frames.timings.items():
+        part = seconds / longest if longest > 0 and math.isfinite(seconds) else 0.0
+        rows.append(
+            f"<div>{html.escape(name)}</div>"
+            f'<div style="width:{100 * part:.1f}%;height:.7em;background:#5b8def;'
+            'border-radius:2px"></div>'
+            f'<div style="text-align:right">{1e3 * seconds:.3f} ms</div>'
+        )
+    rows.append("</div>")
+    return "".join(rows)
+
+
+def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
+    """Return a labelled contact sheet of all framebuffers as PNG.
+
+    Pictures are shown as in a notebook, without alpha, fitted into cells with the aspect of
+    `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
+    its fonts are missing, they are left out with a warning.
+
+    `width`: Width of a picture in pixels, 128 to 4096.
+    """
+    columns = check_index("columns", columns, 1, 32)
+    width = check_index("width", width, 128, 4096)
+    if not frames:
+        raise ValueError("frames: a contact sheet needs at least one framebuffer")
+    height = round(width / _aspect(frames))
+    tiles = []
+    for name, array in frames.items():
+        fit = min(width / array.shape[1], height / array.shape[0])
+        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
+        note = _note(frames, name)
+        tiles.append((picture, f"{name}: {note}" if note else name, _described(array)))
+    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
+    title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
+    return sheet_png(tiles, columns, (width, height), title)
+
+
+def sheet_png(
+    tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
+    columns: int,
+    cell: tuple[int, int],
+    title: str = "",
+) -> bytes:
+    """Return pictures with two lines of text below each as PNG.
+
+    - `tiles`: Pictures that are not larger than a cell, with their lines.
+    - `cell`: Width and height in pixels.
+    """
+    width, height = cell
+    columns = min(columns, len(tiles))
+    text = max(11, width // 20)
+    gap, caption = text, 3 * text
+    heading = 2 * text * bool(title)
+    rows = -(-len(tiles) // columns)
+    sheet = np.full(
+        (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
+        24,
+        np.uint8,
+    )
+    labels = [(gap, gap + text, title)] if title else []
+    for index, (picture, *lines) in enumerate(tiles):
+        row, column = divmod(index, columns)
+        left = gap + column * (width + gap)
+        top = gap + heading + row * (height + caption + gap)
+        y = top + (height - picture.shape[0]) // 2
+        x = left + (width - picture.shape[1]) // 2
+        sheet[top : top + height, left : left + width] = 40
+        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[:, :, :3]
+        baseline = top + height + text + text // 4
+        labels += [(left, baseline + i * (text + 2), line) for i, line in enumerate(lines)]
+    return png(labelled(sheet, labels, text))
+
+
+def labelled(
+    sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
+) -> NDArray[np.uint8]:
+    """Draw light grey texts at (x, baseline y); leave them out if there is no font.
+
+    - `size`: Font size in pixels.
+    """
+    try:
+        oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
+    except ModuleNotFoundError as error:
+        warnings.warn(f"the contact sheet has no labels: {error}", stacklevel=3)
+        return sheet
+    canvas = oiio.ImageBuf(sheet)
+    for x, y, label in labels:
+        if not oiio.ImageBufAlgo.render_text(canvas, x, y, label, size, "", (0.87, 0.87, 0.87)):
+            warnings.warn(f"the contact sheet has no labels: {canvas.geterror()}", stacklevel=3)
+            return sheet
+    drawn: NDArray[np.uint8] = canvas.get_pixels(oiio.UINT8)
+    return drawn
+
+
+def _picture(
+    frames: Framebuffers, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
+) -> NDArray[np.uint8]:
+    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
+    encoded = name == "final" and frames.settings.encoding != "none"
+    return picture(frames[name], name, encoded=encoded, size=size, stops=stops)
+
+
+def picture(
+    array: NDArray[Any],
+    name: str = "",
+    *,
+    encoded: bool = False,
+    size: tuple[int, int] | None = None,
+    range_of: NDArray[Any] | None = None,
+    stops: float = 0.0,
+) -> NDArray[np.uint8]:
+    """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
+
+    - `size`: Width and height of the picture: pixels are averaged or repeated.
+    - `stops`: Exposure of float colours in stops; other values do not change.
+    """
+    values = np.atleast_3d(array).astype(np.float32)
+    ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
+    linear = False
+    if array.dtype.kind == "u":
+        shown = values / np.float32(np.iinfo(array.dtype).max)
+    elif array.ndim == 2:
+        shown = np.float32(1) - _stretched(values, ranged)
+    elif name == "position":
+        shown = _stretched(values, ranged)
+    elif name == "normal":
+        shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
+    else:
+        if stops != 0:
+            values[:, :, :3] *= np.float32(2.0**stops)
+        shown = _clipped(values)
+        linear = not encoded
+    if size is not None:
+        shown = resized(shown, *size)
+    if linear:
+        shown[:, :, :3] = encode_srgb(shown[:, :, :3])
+    pixels: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
+    return pixels
+
+
+def _viewing_stops(frames: Framebuffers, name: str) -> float:
+    """Return the exposure, 0 or negative in half stops, that leaves 99 % of the pixels below 1."""
+    array = frames[name]
+    is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
+    if not is_light or (name == "final" and frames.settings.encoding != "none"):
+        return 0.0
+    # A subset of rows and columns: a percentile of all pixels would take longer than the picture.
+    step = max(1, max(array.shape[:2]) // _THUMBNAIL_SIDE)
+    brightest = array[::step, ::step, :3].max(axis=2).astype(np.float32)
+    brightest = brightest[np.isfinite(brightest)]
+    peak = float(np.percentile(brightest, 99, method="lower")) if brightest.size else 0.0
+    return -math.ceil(2 * math.log2(peak)) / 2 if peak > 1 else 0.0
+
+
+def _ranged(array: NDArray[Any]) -> str:
+    """Return the range of finite floats without alpha as text; "" for integers."""
+    if array.dtype == np.uint8:
+        return ""
+    values = np.atleast_3d(array)[:, :, :3]
+    finite = np.isfinite(values)
+    if not finite.any():
+        return ", nothing finite"
+    low = values.min(where=finite, initial=np.inf)
+    high = values.max(where=finite, initial=-np.inf)
+    return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
+
+
+def _aspect(arrays: Framebuffers) -> float:
+    """Return the aspect of a contact sheet's cells, that of the leading framebuffer.
+
+    It is bounded, so that a strip of one pixel leaves room for the others.
+    """
+    height, width = arrays[leading(arrays)].shape[:2]
+    return float(min(max(width / height, 0.5), 3.0))
+
+
+def _described(array: NDArray[Any], note: str = "") -> str:
+    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}" + (f", {note}" if note else "")
+
+
+def _note(frames: Framebuffers, name: str) -> str:
+    """Return what a framebuffer shows where its name does not tell it."""
+    return frames.settings.glow_note if name == "glow" else ""
+
+
+def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Clip to 0..1; NaN gives 0."""
+    finite = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0)
+    return np.clip(finite, 0.0, 1.0)
+
+
+def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Map the finite range that each channel has in `ranged` to 0..1; one value gives 0."""
+    finite = np.isfinite(ranged)
+    low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)
+    high: NDArray[np.float32] = ranged.max(axis=(0, 1), where=finite, initial=-np.inf)
+    # Stays positive if no value is finite and the range is inf to -inf.
+    span = np.maximum(high - low, np.finfo(np.float32).tiny)
+    return _clipped((np.clip(values, low, high) - low) / span)
+
+
+def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+    """Return a size times a factor; each side is at least one pixel."""
+    return max(1, round(width * factor)), max(1, round(height * factor))
+
+
+def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+    """Resize an (H, W, C) image: average groups of pixels to reduce, repeat pixels to enlarge."""
+    for axis, wanted in ((0, height), (1, width)):
+        count = image.shape[axis]
+        starts = np.arange(wanted) * count // wanted
+        if wanted < count:
+            lengths = np.diff(starts, append=count).astype(np.float32)
+            sums = np.add.reduceat(image, starts, axis=axis)
+            image = sums / lengths.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+        else:
+            image = image.take(starts, axis=axis)
+    return image
+
+
+def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return an (H, W, C) image whose pixels are averaged until it fits into (width, height)."""
+    height, width = image.shape[:2]
+    shrink = min(size[0] / width, size[1] / height)
+    if shrink >= 1:
+        return image
+    with np.errstate(invalid="ignore"):
+        small = resized(image.astype(np.float32), *scaled(width, height, shrink))
+    return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
+
+
+def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
+    """Encode a picture as PNG (W3C PNG specification).
+
+    It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
+    users save.
+
+    `pixels`: ndarray of uint8, shape (H, W, C); 1, 3 or 4 channels.
+    """
+    height, width, channels = pixels.shape
+    rows = pixels.reshape(height, width * channels)
+    # Filter type 2, the difference to the row above, compresses smooth pictures far better.
+    filtered = np.full((height, 1 + rows.shape[1]), 2, np.uint8)
+    filtered[:, 1:] = rows
+    filtered[1:, 1:] -= rows[:-1]
+    colour_type = {1: 0, 3: 2, 4: 6}[channels]
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
+        (b"IDAT", zlib.compress(filtered.tobytes(), level)),
+        (b"IEND", b""),
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    )

@@ -1,8 +1,0 @@
-"""Derivatives of what a renderer returns."""
-
-from __future__ import annotations
-
-from vkbloom.gradients.passes import on_device
-from vkbloom.gradients.pulling import Pullback, pull_each, pullback_of, vjp
-
-__all__ = ["Pullback", "on_device", "pull_each", "pullback_of", "vjp"]

@@ -1,1 +1,0 @@
-"""Own methods: passes that are loaded at run time, in the syntax of mpv's user shaders."""

@@ -1,0 +1,286 @@
+"""The base class of the point-spread functions."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vkbloom._checks import check_size
+from vkbloom._settings.fields import Record
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["FRAME_DEGREES", "PSF", "Array", "centred", "check_radii", "functions"]
+
+Array = NDArray[np.float64]
+
+#: Degrees that the longer side of a frame spans where `pixels_per_degree` is None.
+FRAME_DEGREES = 50.0
+
+
+class PSF(Record, abc.ABC):
+    """Base class of the point-spread functions of `vkbloom.psf`.
+
+    A point-spread function describes how the light of one point is distributed over a picture. If
+    its `unit` is "degree", it is a density per steradian, and `pixels_per_degree` converts it to
+    pixels. Otherwise it is defined in pixels. Two functions are equal, and have the same hash, if
+    their classes and parameters are equal.
+
+    Attributes
+    ----------
+    unit : {"degree", "pixel"}
+
+    See Also
+    --------
+    vkbloom.Convolution : Bloom by a point-spread function.
+
+    Examples
+    --------
+    >>> spread = vkbloom.psf.gaussian(sigma=2)
+    >>> spread.array((9, 9)).shape
+    (9, 9, 3)
+    >>> vkbloom.psf.PSF.from_json(spread.to_json()) == spread
+    True
+    """
+
+    _class_key: ClassVar[str] = "psf"
+    _subject: ClassVar[str] = "psf"
+    unit: ClassVar[Literal["degree", "pixel"]]
+
+    @abc.abstractmethod
+    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
+        """Return the energy of each pixel.
+
+        Parameters
+        ----------
+        size : (int, int)
+            Width and height in pixels.
+        pixels_per_degree : float, optional
+            Default: the longer side spans 50 degrees. Ignored if `unit` is "pixel".
+
+        Returns
+        -------
+        ndarray of float64, shape (height, width, 3)
+            Linear RGB. The point is at [height // 2, width // 2]. The values are integrals over
+            the pixels, not samples at their centres.
+
+        See Also
+        --------
+        kernel : Returns the kernel for the convolution of a frame.
+        save : Writes the array to a file.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
+        array([[0.058, 0.093, 0.058],
+               [0.093, 0.147, 0.093],
+               [0.058, 0.093, 0.058]])
+        """
+
+    @abc.abstractmethod
+    def energy(self) -> Array:
+        """Return the total energy of the function.
+
+        Returns
+        -------
+        ndarray of float64, shape (3,)
+            Linear RGB. The integral over the hemisphere if `unit` is "degree", the sum over the
+            plane if it is "pixel".
+
+        See Also
+        --------
+        encircled_energy : The part inside circles.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=1).energy()
+        array([1., 1., 1.])
+        """
+
+    @abc.abstractmethod
+    def encircled_energy(self, radii: ArrayLike) -> Array:
+        """Return the energy inside circles around the point.
+
+        Parameters
+        ----------
+        radii : array-like of float, shape (N,)
+            In degrees or pixels, at least 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (N, 3)
+            Linear RGB. It rises to `energy` with the radius.
+
+        See Also
+        --------
+        energy : The energy of the complete function.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
+        array([0.393, 0.989])
+        """
+
+    @abc.abstractmethod
+    def mtf(self, frequencies: ArrayLike) -> Array:
+        """Return the modulation transfer function along the horizontal.
+
+        Parameters
+        ----------
+        frequencies : array-like of float, shape (N,)
+            In cycles per degree, or per pixel, at least 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (N, 3)
+            Absolute value of the Fourier transform, divided by `energy`: 1 at 0.
+
+        See Also
+        --------
+        array : The function itself.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
+        array([1.   , 0.821])
+        """
+
+    def kernel(
+        self,
+        frame: tuple[int, int],
+        size: tuple[int, int] | None = None,
+        pixels_per_degree: float | None = None,
+    ) -> Array:
+        """Return the kernel for the convolution of a frame.
+
+        Parameters
+        ----------
+        frame : (int, int)
+            Width and height of the frame in pixels.
+        size : (int, int), optional
+            Width and height of the kernel. Default: (2 width - 1, 2 height - 1) of the frame, so
+            that the light of every pixel reaches every other pixel.
+        pixels_per_degree : float, optional
+            Default: the frame's longer side spans 50 degrees.
+
+        Returns
+        -------
+        ndarray of float64, shape (height, width, 3)
+
+        See Also
+        --------
+        array : Returns an array of any size.
+
+        Examples
+        --------
+        >>> vkbloom.psf.gaussian(sigma=1).kernel((8, 6)).shape
+        (11, 15, 3)
+        """
+        width, height = frame
+        scale = pixels_per_degree or max(frame) / FRAME_DEGREES
+        return self.array(size or (2 * width - 1, 2 * height - 1), scale)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        size: tuple[int, int] = (512, 512),
+        pixels_per_degree: float | None = None,
+    ) -> Path:
+        """Write `array` to an image file.
+
+        Parameters
+        ----------
+        path : str or path-like
+            An OpenEXR file, which renderers can load as a kernel, or another file of floats.
+        size, pixels_per_degree
+            The arguments of `array`.
+
+        Returns
+        -------
+        Path
+            The file, which has float32 RGB.
+
+        Raises
+        ------
+        ValueError, OSError, ModuleNotFoundError
+            The errors of `vkbloom.write`.
+
+        See Also
+        --------
+        vkbloom.write : Writes any array.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = vkbloom.psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
+        ...     vkbloom.read(path).shape
+        (9, 9, 3)
+        """
+        from vkbloom._io import array_files  # noqa: PLC0415  costs start-up time
+
+        return array_files.write(path, self.array(size, pixels_per_degree).astype(np.float32))
+
+    @classmethod
+    def _class_name(cls) -> str | None:
+        return cls.__name__ if dataclasses.is_dataclass(cls) else None
+
+    @classmethod
+    def _classes(cls) -> Mapping[str, type[PSF]]:
+        return functions()
+
+    def _repr_png_(self) -> bytes:
+        """Return a picture of 256 x 256, logarithmic, with six decades below the peak."""
+        from vkbloom._views import pictures  # noqa: PLC0415  costs start-up time
+
+        values = self.array((256, 256))
+        scaled = 1 + np.log10(np.maximum(values / values.max(), 1e-6)) / 6
+        return pictures.png(np.round(255 * scaled).astype(np.uint8))
+
+
+def check_radii(name: str, values: ArrayLike) -> Array:
+    """Return the values as a float64 array (N,), or raise TypeError or ValueError."""
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError
+        numbers = np.asarray(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
+    if numbers.ndim != 1 or not (numbers >= 0).all():
+        raise ValueError(f"{name}: {values!r} is not a sequence of numbers of at least 0")
+    return numbers
+
+
+def centred(array: Array, size: tuple[int, int]) -> Array:
+    """Return the array cropped, or extended by zeros, around its centre [h // 2, w // 2]."""
+    width, height = check_size("size", size)
+    result = np.zeros((height, width, *array.shape[2:]))
+    places: list[tuple[slice, slice]] = []
+    for length, wanted in zip(array.shape[:2], (height, width), strict=True):
+        first = max(0, length // 2 - wanted // 2)
+        start = max(0, wanted // 2 - length // 2)
+        count = min(length - first, wanted - start)
+        places.append((slice(first, first + count), slice(start, start + count)))
+    (rows, to_rows), (columns, to_columns) = places
+    result[to_rows, to_columns] = array[rows, columns]
+    return result
+
+
+def functions() -> dict[str, type[PSF]]:
+    """Return the point-spread functions that there are now, by name."""
+    return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
+
+
+def _leaves(kind: type[Any]) -> list[type[Any]]:
+    """Return the classes below `kind` that have parameters."""
+    found: list[type[Any]] = []
+    for below in kind.__subclasses__():
+        found += [below] if dataclasses.is_dataclass(below) else _leaves(below)
+    return found

@@ -1,0 +1,95 @@
+"""The point-spread function of settings."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vkbloom._array_cache import kept
+from vkbloom._settings.fields import value_field
+from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import Settings
+from vkbloom.psf._base import Array
+from vkbloom.psf._sampled import SampledPSF
+
+__all__ = ["measured"]
+
+
+def _read_settings(settings: Any) -> Settings:
+    if isinstance(settings, Mapping):
+        settings = Settings.from_dict(settings)
+    if not isinstance(settings, Settings):
+        raise TypeError(f"settings: {settings!r} is not a Settings")
+    if settings.threshold is not None:
+        raise ValueError(
+            f"threshold: {settings.threshold!r} is not None; a bloom with a threshold is not "
+            "linear and has no point spread"
+        )
+    return settings
+
+
+@dataclasses.dataclass(frozen=True)
+class measured(SampledPSF):
+    """The bloom of one pixel of 1, computed by `vkbloom.reference`, defined in pixels.
+
+    That of a method without a reference, such as a loaded one, is rendered.
+
+    Parameters
+    ----------
+    settings : Settings
+        Settings without a threshold, which would not be linear. If the spread depends on the
+        position, it is that of the pixel in the middle.
+    size : (int, int)
+        Width and height of the image. The pixel is at (width // 2, height // 2).
+
+    Raises
+    ------
+    TypeError
+        `settings` is not a Settings.
+    ValueError
+        The settings have a threshold, or `size` is not a pair of integers of at least 1.
+
+    See Also
+    --------
+    vkbloom.testing.point_spread : Measures any bloom.
+
+    Examples
+    --------
+    >>> spread = vkbloom.psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))
+    >>> spread.energy().round(3)
+    array([1., 1., 1.])
+    """
+
+    settings: Settings = value_field(read=_read_settings)
+    size: tuple[int, int] = (256, 256)
+
+    def own_array(self) -> Array:
+        return _spread(self)
+
+
+@kept
+def _spread(psf: measured) -> Array:
+    from vkbloom import reference  # noqa: PLC0415  costs start-up time
+
+    width, height = psf.size
+    # Values of doubles are not clamped.
+    point = np.zeros((height, width, 3))
+    point[height // 2, width // 2] = 1
+    if METHODS.has_reference(psf.settings.method):
+        spread = reference.blur(point, psf.settings, format="rgba32float")
+    else:
+        spread = _rendered(point, psf.settings)
+    spread.flags.writeable = False
+    return spread
+
+
+def _rendered(point: Array, settings: Settings) -> Array:
+    """Return the bloom of a method without a reference."""
+    from vkbloom._renderer.default import apply  # noqa: PLC0415  above this floor
+
+    exact = settings.replace(format="rgba32float")
+    frames = apply(point.astype(np.float32), exact, framebuffers="bloom")
+    return frames["bloom"][..., :3].astype(np.float64)

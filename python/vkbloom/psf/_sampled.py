@@ -1,0 +1,145 @@
+"""Point-spread functions that are arrays, defined in pixels."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import functools
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from vkbloom._settings.fields import value_field
+from vkbloom.psf._base import PSF, Array, centred, check_radii
+from vkbloom.psf._values import ArrayValue
+
+__all__ = ["SampledPSF", "check_values", "samples"]
+
+
+class SampledPSF(PSF):
+    """A point-spread function that is an array of energies per pixel, of a fixed size.
+
+    See Also
+    --------
+    samples : A function that is given as an array.
+    """
+
+    unit = "pixel"
+
+    @abc.abstractmethod
+    def own_array(self) -> Array:
+        """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0.
+
+        See Also
+        --------
+        array : Returns an array of any size.
+
+        Examples
+        --------
+        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).own_array().shape
+        (3, 3, 3)
+        """
+
+    def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
+        return centred(self.own_array(), size)
+
+    def energy(self) -> Array:
+        return np.asarray(self.own_array().sum(axis=(0, 1)))
+
+    def encircled_energy(self, radii: ArrayLike) -> Array:
+        """Return the energy of the pixels whose centres are inside circles around the point.
+
+        Parameters
+        ----------
+        radii : array-like of float, shape (N,)
+            In pixels, at least 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (N, 3)
+
+        See Also
+        --------
+        energy : The energy of the complete function.
+
+        Examples
+        --------
+        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).encircled_energy([0, 1])[:, 0]
+        array([4., 8.])
+        """
+        values = self.own_array()
+        y, x = (np.arange(side) - side // 2 for side in values.shape[:2])
+        distance = np.hypot(y[:, np.newaxis], x).ravel()
+        order = np.argsort(distance, kind="stable")
+        sums = np.concatenate([np.zeros((1, 3)), values.reshape(-1, 3)[order].cumsum(axis=0)])
+        inside = np.searchsorted(distance[order], check_radii("radii", radii), side="right")
+        return np.asarray(sums[inside])
+
+    def mtf(self, frequencies: ArrayLike) -> Array:
+        lines = self.own_array().sum(axis=0)
+        places = np.arange(len(lines)) - len(lines) // 2
+        cycles = check_radii("frequencies", frequencies)
+        waves = np.exp(-2j * np.pi * np.outer(cycles, places))
+        return np.asarray(np.abs(waves @ lines) / lines.sum(axis=0))
+
+
+def check_values(name: str, values: Any) -> ArrayValue:
+    """Return an array (h, w) or (h, w, 3) of finite numbers, or raise TypeError or ValueError."""
+    if isinstance(values, str | bytes | os.PathLike):
+        raise TypeError(
+            f"{name}: an array is needed, not {values!r}; read a file first: vkbloom.read(...)"
+        )
+    held = ArrayValue(values, name)
+    array = held.array
+    if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,)) or 0 in array.shape:
+        raise ValueError(
+            f"{name}: shape {array.shape} is not (h, w) or (h, w, 3) with sides of at least 1"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: some numbers are not finite as float32")
+    return held
+
+
+@dataclasses.dataclass(frozen=True)
+class samples(SampledPSF):
+    """An array as a point-spread function.
+
+    Parameters
+    ----------
+    values : array-like, shape (h, w) or (h, w, 3)
+        Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
+        copied to float32.
+
+    See Also
+    --------
+    unreal : A kernel image for Unreal Engine's convolution bloom.
+
+    Examples
+    --------
+    >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
+    array([8., 8., 8.])
+    """
+
+    values: Any = value_field(read=functools.partial(check_values, "values"))
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values.array, dtype=dtype, copy=copy)
+
+    def own_array(self) -> Array:
+        return rgb(self.values)
+
+    def kernel(
+        self,
+        frame: tuple[int, int],
+        size: tuple[int, int] | None = None,
+        pixels_per_degree: float | None = None,
+    ) -> Array:
+        return self.own_array() if size is None else centred(self.own_array(), size)
+
+
+def rgb(values: ArrayValue) -> Array:
+    """Return an array (h, w) or (h, w, 3) as float64 (h, w, 3)."""
+    array = values.array.astype(np.float64)
+    return np.repeat(array[..., np.newaxis], 3, axis=2) if array.ndim == 2 else array

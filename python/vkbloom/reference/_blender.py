@@ -1,0 +1,195 @@
+"""Blender's Glare node: highlights, bloom, and what all types end with.
+
+Formulas from the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
+node_composite_glare.cc (@ f92418fbe034: the same formulas).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._blender_lights import FACTORS, GAINS, LIGHTS
+from ._image import BlurInput, Storage, finite, storage
+from ._levels import halved
+from ._pyramid import downsample
+from ._sampling import Array, sample, weighted_mean
+from ._tape import value_of
+from ._threshold import brightest, masked
+from ._upsampling import combine, linear, tent_of_target
+
+if TYPE_CHECKING:
+    from vkbloom._methods.blender import BlenderGlare
+
+__all__ = ["gain", "passes", "saturated"]
+
+# (x, y) in texels, and the share, of the 13 taps' five groups.
+_GROUPS = (
+    (((-1, -1), (1, -1), (-1, 1), (1, 1)), 0.5),
+    (((-2, -2), (0, -2), (-2, 0), (0, 0)), 0.125),
+    (((0, -2), (2, -2), (0, 0), (2, 0)), 0.125),
+    (((-2, 0), (0, 0), (-2, 2), (0, 2)), 0.125),
+    (((0, 0), (2, 0), (0, 2), (2, 2)), 0.125),
+)
+
+
+def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
+    """Return the framebuffers: "glow" are the highlights, "bloom" the glare over the intensity.
+
+    The glare is made in the size of the highlights, whose sides are those of the frame, a half or a
+    quarter of them, rounded up. It is enlarged bilinearly. Its saturation is multiplied, with a
+    result of 0 to 1, then its channels by the tint.
+    """
+    height, width, _ = source.image.shape
+    factor = FACTORS[settings.quality]
+    reduced = _means(source.image, factor)
+    bright = source.store(masked(_highlights(reduced, settings), source.mask))
+    found = {"glow": bright}
+    if factor > 1:
+        found = {"highlights": bright, "glow": source.store(sample(bright, (width, height)))}
+    # 8 bits and few bits of mantissa hold too little of what spreads over hundreds of pixels.
+    exact = source.store.high > 65024
+    store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
+    images = _TYPES[settings.type](bright, settings, store, (width, height))
+    light = sample(images.pop("light"), source.size)
+    rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
+    rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
+    alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
+    return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
+
+
+def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
+    """Return the bloom of a flat image of 1, for each channel: in the middle of a large one.
+
+    The saturation of a grey is 0. Streaks and ghosts have colours.
+    """
+    one = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    found = (
+        one * GAINS[settings.type](settings, size) if settings.type in GAINS else np.full(3, one)
+    )
+    tinted = saturated(found, settings.saturation) * np.array(settings.tint)
+    return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
+
+
+def saturated(rgb: Array, saturation: float) -> Array:
+    """Return colours whose saturation s = (max - min) / max is clamp(saturation s, 0, 1).
+
+    The largest channel does not change. Where it is not above 0, the others become equal to it.
+    """
+    most = rgb.max(axis=-1, keepdims=True)
+    spread = most - rgb.min(axis=-1, keepdims=True)
+    # The distance of each channel from the largest one is scaled. Around a grey, distances grow
+    # from 0 by the same scale. Around black, opposite changes of two channels grow by at most 1/2.
+    around_grey = np.where(most > 0, np.inf, np.where(most < 0, 0.0, 0.5))
+    most_scale = np.maximum(most, 0.0) / np.where(spread > 0, spread, 1.0)
+    scale = np.minimum(saturation, np.where(spread > 0, most_scale, around_grey))
+    result: Array = most - scale * (most - rgb)
+    return result
+
+
+def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
+    """Return saturated colours, derived as if channels were equal, or 0, that are but for rounding.
+
+    The roundings of a convolution are those of the single floats of renderers, so that the kinks
+    are at the same colours.
+    """
+    values = value_of(rgb)
+    if values is rgb:
+        return saturated(rgb, saturation)
+    near = np.where(np.abs(values) <= rounding, 0.0, values)
+    for extreme in (near.max(axis=-1, keepdims=True), near.min(axis=-1, keepdims=True)):
+        least = rounding * (1 + 10 * np.abs(extreme))
+        near = np.where(np.abs(near - extreme) <= least, extreme, near)
+    result: Array = saturated(rgb + (near - values), saturation)
+    result = result + (saturated(values, value_of(saturation)) - value_of(result))
+    return result
+
+
+def _means(image: Array, factor: int) -> Array:
+    """Return the means of factor x factor pixels, rows from below, with the last ones repeated."""
+    for axis, length in enumerate(image.shape[:2]):
+        count = -(-length // factor)
+        places = np.minimum(np.arange(count * factor), length - 1)
+        if axis == 0:
+            places = (length - 1 - places)[::-1]
+        taps = image[places] if axis == 0 else image[:, places]
+        parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
+        image = sum(parts[1:], parts[0]) / factor
+    return image
+
+
+def _bloom(
+    bright: Array, settings: BlenderGlare, store: Storage, size: tuple[int, int]
+) -> dict[str, Array]:
+    """Return the levels, and their sum over their number.
+
+    There are n = max(1, floor(log2(size * shorter side))) levels, of which the highlights are the
+    first. Each next level has half the size, by 13 taps. In the first such step, the taps within
+    each of their groups of four are weighted by 1 / (1 + brightest channel).
+    up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level.
+    """
+    height, width, _ = bright.shape
+    count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
+    downs = [bright]
+    level = (width, height)
+    for k in range(1, count):
+        level = halved(level)
+        shrink = _weighted_taps if k == 1 else downsample
+        downs.append(store(shrink(downs[-1], level)))
+    levels = combine(
+        downs,
+        BlurInput(bright, (width, height), store),
+        upsample=tent_of_target,
+        last=linear,
+        gain=1 / count,
+        end=lambda image: image,
+    )
+    del levels["down_0"]
+    return {**levels, "light": levels.pop("bloom")}
+
+
+_TYPES: dict[str, Any] = {"bloom": _bloom, **LIGHTS}
+
+
+def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
+    """Scale colours to the part of their brightness that is above the threshold."""
+    if settings.threshold is None:
+        return rgb
+    low = settings.threshold
+    high = math.inf if settings.maximum is None else low + settings.maximum
+    value = brightest(rgb)
+    # The soft parts must not extend below 0 or beyond the other end.
+    at_low = min(settings.smoothness, low, high - low)
+    at_high = min(settings.smoothness, high, high - low)
+    kept = _smooth_extreme(1, value, low, at_low)
+    if high < math.inf:
+        kept = _smooth_extreme(-1, kept, high, at_high)
+    scale = (kept - low) / np.where(value > 0, value, 1)
+    return np.where(value > 0, rgb * scale, 0)
+
+
+def _smooth_extreme(sign: int, values: Array, end: float, width: float) -> Array:
+    """Return max(value, end) + h^2 width / 4 with h = max(1 - |value - end| / width, 0).
+
+    With a sign of -1, the minimum and a difference. The quadratic smooth minimum of Inigo Quilez,
+    "Smooth minimum". Where h is above 0, this is a parabola, which has no kink at the end.
+    """
+    extreme: Array = (np.maximum if sign > 0 else np.minimum)(values, end)
+    if width > 0:
+        beyond = values - end
+        parabola = (values + end) / 2 + sign * width / 4 + sign * beyond * beyond / (4 * width)
+        extreme = np.where(np.abs(beyond) < width, parabola, extreme)
+    return extreme
+
+
+def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
+    """Return the 13 taps of half the size; 0 where negative weights make it undefined."""
+    result: Any = 0.0
+    for places, group_share in _GROUPS:
+        taps = [sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)]) for x, y in places]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = weighted_mean((1 / (1 + brightest(tap)), tap) for tap in taps)
+        result = result + group_share * mean
+    return finite(result)

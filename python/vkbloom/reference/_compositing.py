@@ -1,0 +1,235 @@
+"""The last pass: scene and bloom to the final image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vkbloom._argument_types import checked
+
+from ._image import as_float, format_of, storage
+from ._sampling import Array
+from ._tape import joined
+from ._tone_map import ENCODINGS, TONE_MAPS
+
+__all__ = ["check_settings", "composite", "composite_checked"]
+
+
+class CompositeSettings(Protocol):
+    """The settings that the last pass reads. For Godot it also reads `white`."""
+
+    @property
+    def method(self) -> str: ...
+    @property
+    def bloom(self) -> bool: ...
+    @property
+    def alpha(self) -> str: ...
+    @property
+    def composite(self) -> str: ...
+    @property
+    def intensity(self) -> float: ...
+    @property
+    def exposure(self) -> float: ...
+    @property
+    def tonemap(self) -> str: ...
+    @property
+    def encoding(self) -> str: ...
+    @property
+    def reference_white(self) -> float: ...
+    @property
+    def dither(self) -> bool: ...
+    @property
+    def dither_seed(self) -> int: ...
+
+
+def check_settings(settings: object) -> None:
+    """Raise TypeError for an object without the fields that all settings have."""
+    if not hasattr(settings, "composite"):
+        raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
+
+
+@checked
+def composite(
+    scene: NDArray[Any],
+    bloom: NDArray[Any] | None,
+    settings: CompositeSettings,
+    dtype: DTypeLike | None = None,
+    *,
+    share: float | Array = 1.0,
+    is_light: bool = False,
+) -> Array:
+    """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
+
+    With s the scene, b the bloom and i the intensity, "add" is s + i b, "mix" is s + (b - s) i, and
+    "screen" is 1 - (1 - s)(1 - i b) with s and i b clamped to 0..1. The exposure e multiplies by
+    2^e. `vkbloom.GodotBloom` has its own composites, with the exposure before them, and
+    `vkbloom.BlenderGlare` has max(0, s) + i b. Dither rounds
+    uint8 to floor(255 c + n) / 255, with c clamped to 0..1 and a noise n in 0..1. It does not
+    change other types. All this applies to rgb. ``settings.alpha`` selects the result's alpha from
+    the scene's alpha a: "keep" is a; "max" is max(a, clamp(max over rgb of i b, 0, 1)); "blur",
+    with the bloom's alpha b_a, is 1 - (1 - a)(1 - clamp(i b_a, 0, 1)).
+
+    If the bloom was made from only a share of the scene, "mix" is s + i (b - share s).
+
+    A component of the scene that is NaN or infinite stays so. It counts as 0 in tone maps that mix
+    the channels.
+
+    Parameters
+    ----------
+    scene : ndarray, shape (H, W, 3) or (H, W, 4)
+        uint8 (read as value / 255), float16, float32 or float64.
+    bloom : ndarray, shape (H, W, 3) or (H, W, 4), or None
+        Finite, of the same types. Not read if ``settings.bloom`` is off.
+    settings : vkbloom.Settings
+    dtype : dtype, optional
+        Dtype of the final image; by default the scene's. The result is clamped to its range.
+    share : float or ndarray, shape (H, W, 1)
+        The share of the scene in the bloom's source: the mask, or 0 with an emission.
+    is_light : bool
+        Whether `bloom` is already i b, or the sum of that and glare.
+
+    Returns
+    -------
+    ndarray of float64, shape of the scene
+        In real units. Only the dither rounds to `dtype`.
+
+    Raises
+    ------
+    TypeError
+        An image has another dtype, `bloom` is missing while the bloom is on, or `settings` is not
+        Settings.
+    ValueError
+        An image has another shape, or the sizes differ.
+
+    See Also
+    --------
+    apply : All steps.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> scene = np.full((2, 2, 3), 0.25)
+    >>> bloom = np.full((2, 2, 3), 0.5)
+    >>> settings = vkbloom.Separable(intensity=0.5, composite="mix")
+    >>> reference.composite(scene, bloom, settings)[0, 0]
+    array([0.375, 0.375, 0.375])
+    """
+    check_settings(settings)
+    image = as_float(scene, "scene", (3, 4))
+    stored = np.asarray(scene).dtype if dtype is None else dtype
+    if not settings.bloom:
+        return composite_checked(image, None, settings, stored)
+    if bloom is None:
+        raise TypeError("bloom must be an array where settings.bloom is True, not None")
+    light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
+    if light.shape[:2] != image.shape[:2]:
+        raise ValueError(
+            f"bloom must have the scene's height and width {image.shape[:2]}, not {light.shape[:2]}"
+        )
+    return composite_checked(image, light, settings, stored, share)
+
+
+def composite_checked(
+    image: Array,
+    light: Array | None,
+    settings: CompositeSettings,
+    dtype: DTypeLike,
+    share: float | Array = 1.0,
+) -> Array:
+    """Return the final image of a scene and light, both in real units; None: without bloom."""
+    original, alpha = image[..., :3], image[..., 3:]
+    rgb = np.where(np.isfinite(original), original, 0.0)
+    scale, curve = 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
+    if light is None:
+        rgb = curve(rgb * scale)
+    else:
+        glow = light[..., :3]
+        if settings.method == "godot":
+            # The glow was already exposed before the threshold.
+            rgb = _godots(rgb * scale, glow, settings, curve, share)
+        elif settings.method == "blender":
+            # max(0, s), whose derivative at black is the mean of both sides.
+            rgb = curve(((rgb + np.abs(rgb)) / 2 + glow) * scale)
+        else:
+            rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
+        alpha = _blend_alpha(alpha, light, settings.alpha)
+    rgb = ENCODINGS[settings.encoding](rgb, settings.reference_white)
+    stored = np.dtype(dtype)
+    store = storage(format_of(np.empty(0, stored), None))
+    rgb = store(rgb)
+    if settings.dither and stored == np.uint8:
+        rgb = np.floor(255 * rgb + _noise(rgb.shape[:2], settings.dither_seed)) / 255
+    result = np.concatenate([rgb, store(alpha)], axis=-1)
+    kept: Array = np.where(np.isfinite(image), result, image)
+    return kept
+
+
+def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
+    """Return the alpha of the final image, (H, W, 1); (H, W, 0) if the scene has none."""
+    if mode == "max":
+        larger: Array = np.maximum(alpha, np.clip(light[..., :3].max(axis=-1, keepdims=True), 0, 1))
+        return larger
+    if mode == "blur":
+        if light.shape[2] == 3:
+            raise ValueError('bloom must have 4 channels where settings.alpha is "blur", not 3')
+        return 1 - (1 - alpha) * (1 - np.clip(light[..., 3:], 0, 1))
+    return alpha
+
+
+def _blend(scene: Array, light: Array, mode: str, intensity: float, share: float | Array) -> Array:
+    """Return the combination of scene and light, which is i b."""
+    if mode == "add":
+        return scene + light
+    if mode == "mix":
+        return scene + light - intensity * share * scene
+    if mode == "screen":
+        return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(light, 0, 1))
+    raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
+
+
+def _godots(
+    scene: Array,
+    glow: Array,
+    settings: CompositeSettings,
+    curve: Callable[[Array], Array],
+    share: float | Array,
+) -> Array:
+    """Return scene and light after the tone map, as Godot blends them.
+
+    From godotengine/godot, servers/rendering/renderer_rd/shaders/effects/tonemap.glsl
+    @ 001c8c9c24dc.
+    """
+    if settings.composite == "soft_light":
+        light, toned = np.clip(curve(glow), 0, 1), curve(scene)
+        dark = ((16 * toned - 12) * toned + 4) * toned
+        full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
+        lit: Array = joined(toned, 1.0, toned + light * (full - toned), toned)
+        return lit
+    if settings.composite == "screen":
+        white = getattr(settings, "white")  # noqa: B009
+        glow = np.clip(glow, 0, white)
+        return curve(scene + glow - scene * glow / white)
+    if settings.composite == "replace":
+        return curve(glow)
+    return curve(_blend(scene, glow, settings.composite, settings.intensity, share))
+
+
+def _noise(size: tuple[int, int], seed: int) -> Array:
+    """Return the noise of an image of (height, width): (n + 1/2) / 4096, n in 0..4095.
+
+    For each channel, n is the upper 12 bits of one of the three 32-bit numbers that pcg3d computes
+    from column, row and seed (Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3),
+    2020).
+    """
+    rows, columns = np.indices(size, np.uint32)
+    state = [columns, rows, np.full(size, seed, np.uint32)]
+    state = [np.uint32(1664525) * number + np.uint32(1013904223) for number in state]
+    for mixing in range(2):
+        for place in range(3):
+            state[place] = state[place] + state[place - 2] * state[place - 1]
+        if mixing == 0:
+            state = [number ^ (number >> np.uint32(16)) for number in state]
+    return (np.stack(state, axis=-1) // np.uint32(2**20) + 0.5) / 4096

@@ -1,0 +1,111 @@
+"""Convolution with a kernel, by numpy.fft."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from ._image import BlurInput
+from ._sampling import Array, sample
+from ._tape import joined, operation, value_of
+from ._threshold import luminance
+
+__all__ = ["convolve", "gain", "passes", "prefiltered"]
+
+
+class ConvolutionSettings(Protocol):
+    """What this method reads of its settings."""
+
+    @property
+    def boundary(self) -> str: ...
+    @property
+    def prefilter(self) -> tuple[float, float, float]: ...
+    def kernel(self, frame: tuple[int, int], buffers: tuple[int, int] | None = None) -> Array: ...
+
+
+def passes(source: BlurInput, settings: ConvolutionSettings) -> dict[str, Array]:
+    """Return "kernel" and "bloom".
+
+    Three channels are convolved with the channels of the kernel. A fourth channel is convolved with
+    the mean of these, and so is every channel of an image with another number of channels.
+    """
+    height, width, channels = source.image.shape
+    kernel = settings.kernel(source.size, (width, height))
+    mean = kernel.mean(axis=2, keepdims=True)
+    colours = kernel if channels in (3, 4) else mean
+    used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)
+    spread = convolve(prefiltered(source.image, settings.prefilter), used, settings.boundary)
+    return {"kernel": kernel, "bloom": source.store(sample(spread, source.size))}
+
+
+def gain(settings: ConvolutionSettings, size: tuple[int, int]) -> Array:
+    """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
+    one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
+    sums: Array = one * settings.kernel(size).sum(axis=(0, 1))
+    return sums
+
+
+def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
+    """Return the glow past Unreal Engine's filter of bright colours.
+
+    A colour whose luminance L is above min gets the luminance min(mult (L - min) + min, max).
+    """
+    low, high, factor = prefilter
+    if high < low or glow.shape[2] not in (3, 4):
+        return glow
+    found = luminance(glow[..., :3])
+    wanted = np.minimum(factor * (found - low) + low, high)
+    scale = np.where(found > 0, wanted / np.maximum(found, 1e-30), factor)
+    rgb = joined(found, low, glow[..., :3], glow[..., :3] * scale)
+    return np.concatenate([rgb, glow[..., 3:]], axis=2)
+
+
+def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
+    """Return sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)].
+
+    The glow is extended by as much as the kernel reaches, so that the Fourier transform's own
+    wrapping falls outside.
+    """
+    rows, columns = kernel.shape[:2]
+    modes: dict[str, tuple[Any, Any]] = {
+        "zero": ("constant", "constant"),
+        "edge": ("edge", "edge"),
+        "wrap": ("wrap", "wrap"),
+        "wrap_x": ("edge", "wrap"),
+    }
+    down, across = modes[boundary]
+    # A pixel takes from the right what the kernel has left of its point, and the other way round.
+    extended = np.pad(glow, ((rows - 1 - rows // 2, rows // 2), (0, 0), (0, 0)), down)
+    extended = np.pad(
+        extended, ((0, 0), (columns - 1 - columns // 2, columns // 2), (0, 0)), across
+    )
+    return _valid(extended, kernel)
+
+
+def _valid(image: Array, kernel: Array) -> Array:
+    """Return the convolution where the kernel lies inside of the image."""
+    shape = image.shape[:2]
+    values = [np.fft.rfft2(value_of(one), shape, axes=(0, 1)) for one in (image, kernel)]
+    rows, columns = (image.shape[i] - kernel.shape[i] + 1 for i in (0, 1))
+
+    def spread(product: Any) -> Array:
+        whole: Array = np.fft.irfft2(product, shape, axes=(0, 1))
+        return whole
+
+    def spectrum(derivative: Array) -> Any:
+        placed = np.zeros(image.shape)
+        placed[kernel.shape[0] - 1 :, kernel.shape[1] - 1 :] = derivative
+        return np.fft.rfft2(placed, axes=(0, 1))
+
+    # From the first pixel on whose sum is complete.
+    result = spread(values[0] * values[1])[-rows:, -columns:]
+    valid: Array = operation(
+        np.ascontiguousarray(result),
+        (image, lambda d: spread(spectrum(d) * values[1].conj())),
+        (
+            kernel,
+            lambda d: spread(spectrum(d) * values[0].conj())[: kernel.shape[0], : kernel.shape[1]],
+        ),
+    )
+    return valid

@@ -1,0 +1,214 @@
+"""Derivatives of the framebuffers, in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._settings.fields import fields_of
+
+from ._framebuffers import checked_image, framebuffers
+from ._sampling import Array
+from ._tape import Traced, gradients, value_of
+
+__all__ = ["DISCRETE", "Gradients", "check_cotangents", "check_shape", "differentiable", "vjp"]
+
+#: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
+DISCRETE: Final = frozenset(
+    {"anamorphism", "bloom_scale", "jitter", "pixels_per_degree", "size", "sun_position"}
+)
+
+
+class Gradients(dict[str, Array]):
+    """Derivatives by name. A name without a derivative raises ValueError."""
+
+    def __missing__(self, name: str) -> Array:
+        raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(self)}")
+
+
+@checked
+def vjp(
+    image: NDArray[Any],
+    settings: Any,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+) -> tuple[dict[str, Array], Callable[[Mapping[str, NDArray[Any]]], Gradients]]:
+    """Return the framebuffers, and a function for the derivatives of a sum over them.
+
+    The bloom buffers are "rgba32float", so that stores do not clamp. Rounding to 8 bits and dither
+    count as the identity.
+
+    Where the function has a kink, such as an end of a clamp, a threshold that is subtracted, or the
+    offset of a tap that lies on a texel centre, the subgradient is the mean of both sides. Equal
+    channels have equal shares of a maximum. A hard threshold has the derivative of what it keeps:
+    its own derivative is 0.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4)
+        As for `apply`.
+    settings : vkbloom.Settings
+    mask : ndarray, shape (H, W), optional
+    emission : ndarray, optional
+        Of the image's shape and dtype.
+
+    Returns
+    -------
+    framebuffers : dict of str to ndarray of float64
+        As of `apply`, with buffers of "rgba32float".
+    pullback : callable
+        ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum over
+        all framebuffers of (framebuffer . cotangent), it returns the derivatives of S: by "image",
+        "mask" (H, W) and "emission" if they were given, by "kernel" (of `vkbloom.Convolution`), and
+        by each real field under its name. Fields of glare have names such as "glare.0.intensity".
+        Values are derivatives by real units: for uint8, by value / 255. At NaN and infinity of the
+        image they are 0. Any other name, such as that of an integer field, raises ValueError.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `apply`. The method was loaded from a file of passes, which has no derivative. From
+        `pullback`: there is no such framebuffer, or a cotangent has another shape, is not of real
+        numbers, or is not finite.
+
+    See Also
+    --------
+    apply : The framebuffers alone.
+
+    Notes
+    -----
+    The formulas of the reference run on arrays that record each operation with its derivative; the
+    records are applied in reverse order (Griewank and Walther, "Evaluating Derivatives", 2008).
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> image = np.full((4, 4, 3), 0.5)
+    >>> frames, pullback = reference.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
+    >>> derivatives = pullback({"final": np.ones_like(image)})
+    >>> float(derivatives["intensity"])  # the sum of the bloom
+    24.0
+    >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
+    np.float64(1.5)
+    """
+    if hasattr(settings, "twin"):
+        raise ValueError(
+            f"method: {settings.method!r} has no derivative, since its passes come from a file"
+        )
+    scene, source, weights, _ = checked_image(image, settings, mask, emission)
+    inputs: dict[str, Traced] = {"image": Traced(scene)}
+    if emission is not None:
+        inputs["emission"] = Traced(source)
+    if weights is not None:
+        inputs["mask"] = Traced(weights)
+    traced: Any = _TracedSettings(settings, inputs)
+    arrays: dict[str, Any] = {**inputs}
+    found: dict[str, Any] = framebuffers(
+        arrays["image"],
+        arrays.get("emission", arrays["image"]),
+        traced,
+        mask=arrays.get("mask"),
+        share=0.0 if emission is not None else arrays.get("mask", 1.0),
+        format="rgba32float",
+        dtype=np.asarray(image).dtype,
+    )
+    values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
+
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        given = check_cotangents(cotangents, values)
+        given = {name: part for name, part in given.items() if isinstance(found[name], Traced)}
+        derivatives = gradients(
+            [(found[name], part) for name, part in given.items()], [*inputs.values()]
+        )
+        results = Gradients(zip(inputs, derivatives, strict=True))
+        for name, pixels in (("image", scene), ("emission", source)):
+            if name in results:
+                results[name] = np.where(np.isfinite(pixels), results[name], 0.0)
+        if "mask" in results:
+            results["mask"] = results["mask"][..., 0]
+        return results
+
+    return values, pullback
+
+
+def differentiable(settings: Any) -> dict[str, Any]:
+    """Return the values of the real fields with a derivative, by name."""
+    found = {
+        name: getattr(settings, name)
+        for name, info in fields_of(type(settings)).items()
+        if name not in DISCRETE and _is_real(getattr(settings, name)) and not info.fixed
+    }
+    for place, stage in enumerate(getattr(settings, "glare", ())):
+        found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
+    return found
+
+
+def _is_real(value: Any) -> bool:
+    """Whether a value is a float, or a tuple of such or of tuples of them, all of one length."""
+    if isinstance(value, tuple) and value:
+        return all(map(_is_real, value)) and len({np.shape(one) for one in value}) == 1
+    return isinstance(value, float)
+
+
+class _TracedSettings:
+    """Settings whose real fields are traced; every other attribute is that of the settings."""
+
+    def __init__(self, settings: Any, inputs: dict[str, Traced], prefix: str = "") -> None:
+        self._settings = settings
+        self.dither = False
+        fields = differentiable(settings)
+        for name in (name for name in fields if "." not in name):
+            inputs[prefix + name] = Traced(fields[name])
+            setattr(self, name, inputs[prefix + name])
+        if stages := getattr(settings, "glare", ()):
+            self.glare = tuple(
+                _TracedSettings(stage, inputs, f"glare.{place}.")
+                for place, stage in enumerate(stages)
+            )
+        if callable(getattr(settings, "kernel", None)):
+            self._inputs = inputs
+            self.kernel = self._kernel
+
+    def _kernel(self, *sizes: tuple[int, int]) -> Traced:
+        self._inputs["kernel"] = Traced(self._settings.kernel(*sizes))
+        return self._inputs["kernel"]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._settings, name)
+
+
+def check_cotangents(
+    cotangents: Mapping[str, NDArray[Any]], values: Mapping[str, Any]
+) -> dict[str, Array]:
+    """Check and return cotangents in float64; `values` are the framebuffers."""
+    if not isinstance(cotangents, Mapping):
+        raise TypeError(
+            f"cotangents: {type(cotangents).__name__} is not a mapping of framebuffer to array; "
+            'give {"final": array}'
+        )
+    return {name: _checked_cotangent(name, part, values) for name, part in cotangents.items()}
+
+
+def check_shape(name: str, shape: tuple[int, ...], values: Mapping[str, Any]) -> None:
+    """Raise ValueError unless a framebuffer has the cotangent's shape."""
+    if name not in values:
+        known = ", ".join(values)
+        raise ValueError(f"cotangents: unknown framebuffer {name!r}; available: {known}")
+    if shape != values[name].shape:
+        raise ValueError(f"cotangents: the shape of {name!r} is {shape}, not {values[name].shape}")
+
+
+def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
+    given = np.asarray(cotangent)
+    check_shape(name, given.shape, values)
+    if given.dtype.kind not in "fiub":
+        raise TypeError(f"cotangents: {name!r} is of dtype {given.dtype}, not of real numbers")
+    array = given.astype(np.float64)
+    if not np.isfinite(array).all():
+        raise ValueError(f"cotangents: {name!r} has NaN or infinity")
+    return array

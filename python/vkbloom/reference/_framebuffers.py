@@ -1,0 +1,380 @@
+"""The framebuffers of every bloom method, by name."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._settings.registry import METHODS, Reference
+
+from . import _custom as own
+from . import _glare as glare
+from ._compositing import CompositeSettings, check_settings, composite_checked
+from ._image import BlurInput, as_array, as_float, as_mask, finite, format_of, storage
+from ._sampling import Array, sample
+from ._threshold import apply_threshold, masked
+
+__all__ = ["apply", "blur", "gain", "passes"]
+
+
+class Settings(CompositeSettings, Protocol):
+    """The settings that the reference reads for all methods; each method also has its own."""
+
+    method: ClassVar[str]
+    published: ClassVar[bool]
+
+    @property
+    def threshold(self) -> float | None: ...
+    @property
+    def knee(self) -> float: ...
+    @property
+    def bloom_size(self) -> tuple[int, int] | None: ...
+    @property
+    def bloom_scale(self) -> float: ...
+    @property
+    def format(self) -> str | None: ...
+    @property
+    def glare(self) -> tuple[Any, ...]: ...
+
+
+@checked
+def apply(
+    image: NDArray[Any],
+    settings: Settings,
+    *,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
+) -> dict[str, Array]:
+    """Return what `vkbloom.Renderer.apply` returns, computed in float64.
+
+    The image is reduced to the size of the bloom buffers by bilinear sampling at their pixel
+    centres, thresholded, blurred and composited. Components that are NaN or infinite count as
+    0 in the bloom and stay as they are in "final".
+
+    An emission replaces the image up to the composite. A mask is reduced like the image and
+    multiplies the thresholded image. Published methods apply their threshold while they downsample;
+    they read the mask at the pixel centres of the image that this pass writes. With
+    ``settings.alpha`` "blur", alpha is a fourth channel: the weights follow from rgb, and limits of
+    colours (such as a clamp against overflow) do not apply to alpha.
+
+    Every store to a bloom buffer clamps: to 0..1 in "rgba8unorm", to +-65504 in "rgba16float". Only
+    "rg11b10ufloat" and "rgba8unorm-srgb" also round to the steps of the format. Published methods
+    do not round their "bloom" to these, nor their "glow" to the former.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, 3) or (H, W, 4)
+        uint8 (read as value / 255), float16, float32 or float64. The format of the bloom
+        buffers follows from it unless ``settings.format`` names one; that of float64 is
+        "rgba32float".
+    settings : vkbloom.Settings
+    mask : ndarray, shape (H, W), optional
+        uint8 (read as value / 255), bool, or floats in 0..1.
+    emission : ndarray, optional
+        Of the image's shape and dtype.
+
+    Returns
+    -------
+    dict of str to ndarray of float64
+        In the order of the data flow: "glow", those of the stages of glare, those of `passes`, then
+        "final". The values are in real units: 0..1 for unorm formats. Bloom buffers have 4
+        channels. Their alpha is 1, except with ``settings.alpha`` "blur". "final" has the image's
+        channels. With ``settings.bloom`` off there is only "final".
+
+    Raises
+    ------
+    TypeError
+        The image has another dtype, or `settings` is not Settings.
+    ValueError
+        The image has another shape; the mask another size or other values; the emission another
+        shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
+
+    See Also
+    --------
+    passes : Only the blur.
+    composite : Only the last step.
+    vkbloom.Renderer.apply : The same on a device.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> image = np.zeros((16, 16, 4), np.float32)
+    >>> image[8, 8] = 4
+    >>> settings = vkbloom.Pyramid(levels=2, threshold=1.0)
+    >>> expected = reference.apply(image, settings)
+    >>> with vkbloom.Renderer("software") as renderer:
+    ...     frames = renderer.apply(image, settings)
+    >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
+    True
+    """
+    if (twin := getattr(settings, "twin", None)) is not None:
+        scene = as_float(image, "image", (3, 4))
+        return own.framebuffers(twin, scene, settings, np.asarray(image).dtype)
+    scene, source, weights, format = checked_image(image, settings, mask, emission)
+    share = 0.0 if emission is not None else 1.0 if weights is None else weights
+    return framebuffers(
+        scene,
+        source,
+        settings,
+        mask=weights,
+        share=share,
+        format=format,
+        dtype=np.asarray(image).dtype,
+    )
+
+
+def checked_image(
+    image: NDArray[Any],
+    settings: Settings,
+    mask: NDArray[Any] | None,
+    emission: NDArray[Any] | None,
+) -> tuple[Array, Array, Array | None, str]:
+    """Return scene, source of the bloom and mask in real units, and the bloom buffers' format."""
+    _method(settings)
+    scene = as_float(image, "image", (3, 4))
+    height, width, channels = scene.shape
+    format = format_of(image, settings.format)
+    if settings.alpha != "keep" and (channels == 3 or format == "rg11b10ufloat"):
+        raise ValueError(f'alpha must be "keep" without a fourth channel, not {settings.alpha!r}')
+    source = scene if emission is None else _emission(image, emission)
+    return scene, source, None if mask is None else as_mask(mask, (width, height)), format
+
+
+def framebuffers(
+    scene: Array,
+    source: Array,
+    settings: Settings,
+    *,
+    mask: Array | None,
+    share: float | Array,
+    format: str,
+    dtype: DTypeLike,
+) -> dict[str, Array]:
+    """Return the framebuffers of `apply`.
+
+    `share` is the share of the scene that is the source of the bloom, (H, W, 1) or a number.
+    """
+    method = _method(settings)
+    height, width, _ = scene.shape
+    if not settings.bloom:
+        return {"final": composite_checked(scene, None, settings, dtype)}
+    store = storage(format)
+    channels = 4 if settings.alpha == "blur" else 3
+    reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
+    if settings.published:
+        glow = store.first(reduced)
+    else:
+        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
+    blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
+    stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
+    found = _with_alphas({"glow": glow, **stages, **blurred})
+    if settings.glare:
+        images = [found[name] for name in stages]
+        light = glare.light(found["bloom"], settings.intensity, images, settings.glare)
+    else:
+        light = found["bloom"] * settings.intensity
+    found["final"] = composite_checked(scene, light, settings, dtype, share)
+    return found
+
+
+def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
+    """Return the input of the stages of glare; published methods do not threshold the glow."""
+    if not settings.published:
+        return glow
+    return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
+
+
+@checked
+def passes(
+    glow: NDArray[Any],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    format: str | None = None,
+    *,
+    mask: NDArray[Any] | None = None,
+) -> dict[str, Array]:
+    """Return the framebuffers of the blur of a glow, without threshold and composite.
+
+    Parameters
+    ----------
+    glow : ndarray, shape (H, W, C)
+        The content of the first bloom buffer, at its size: uint8 (read as value / 255), float16,
+        float32 or float64. A fourth channel is alpha; it becomes 1, except with ``settings.alpha``
+        "blur". All other channels are blurred separately. NaN and infinity count as 0.
+    settings : vkbloom.Settings
+        Only the fields of the blur and `format` are used.
+    size : (int, int), optional
+        Width and height of the final image, at whose pixels the last pass is evaluated; by default
+        those of the glow.
+    format : str, optional
+        Format of the bloom buffers; by default that of the settings, and if this is None, the one
+        of the glow's dtype.
+    mask : ndarray, shape (height, width), optional
+        Multiplies the thresholded image of a published method, as in `apply`. For other methods the
+        glow is already thresholded and masked.
+
+    Returns
+    -------
+    dict of str to ndarray of float64
+        In the order of the data flow: "blur_vertical" (`Separable` without ``direct``), or
+        "down_0" to "down_N-1" and "up_N-2" to "up_0", then "bloom".
+
+    Raises
+    ------
+    TypeError
+        The glow has another dtype, or `settings` is not Settings.
+    ValueError
+        The glow has another shape, the size is below 1, or the format is unknown.
+
+    See Also
+    --------
+    apply : With threshold and composite.
+    blur : The last of these framebuffers.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> glow = np.full((16, 16, 3), 0.5)
+    >>> list(reference.passes(glow, vkbloom.DualKawase(levels=2)))
+    ['down_0', 'down_1', 'up_0', 'bloom']
+    """
+    method = _method(settings)
+    values = finite(as_float(glow, "glow"))
+    height, width, channels = values.shape
+    if size is not None and min(size) < 1:
+        raise ValueError(f"size must be (width, height) of at least 1, not {size}")
+    store = storage(format_of(glow, settings.format if format is None else format))
+    has_alpha = channels == 4 and settings.alpha != "blur"
+    colours = values[..., :3] if has_alpha else values
+    colours = store.first(colours) if settings.published else store(colours)
+    size = size or (width, height)
+    weights = as_mask(mask, size) if mask is not None and settings.published else None
+    framebuffers: dict[str, Array] = method.passes(
+        BlurInput(colours, size, store, weights), settings
+    )
+    if not has_alpha:
+        return framebuffers
+    return _with_alphas(framebuffers)
+
+
+@checked
+def blur(
+    glow: NDArray[Any],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    format: str | None = None,
+) -> Array:
+    """Return the bloom of a glow, without threshold and composite.
+
+    Parameters
+    ----------
+    glow, settings, size, format
+        As for `passes`.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width, C)
+        "bloom" of `passes`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `passes`.
+
+    See Also
+    --------
+    passes : All framebuffers of the blur.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> glow = np.full((16, 16, 3), 0.5)
+    >>> float(reference.blur(glow, vkbloom.Pyramid(levels=2))[8, 8, 0])
+    0.5
+    """
+    return passes(glow, settings, size, format)["bloom"]
+
+
+@checked
+def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
+    """Return the bloom of a flat image of 1, without clamps and before the intensity.
+
+    Parameters
+    ----------
+    settings : vkbloom.Settings
+        Their threshold is applied to the flat image of 1.
+    size : (int, int), optional
+        Width and height of the image. It matters for `vkbloom.KinoBloom`, which has more levels for
+        higher images, and in the eighth digit for `vkbloom.UrpBloom`.
+
+    Returns
+    -------
+    float, or ndarray of float64, shape (3,)
+        For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
+
+    See Also
+    --------
+    vkbloom.testing.assert_gain : Asserts the gain of any bloom.
+
+    Examples
+    --------
+    >>> from vkbloom import reference
+    >>> reference.gain(vkbloom.Pyramid(levels=3))
+    1.0
+    >>> round(reference.gain(vkbloom.Separable()), 3)
+    1.922
+    """
+    method = _method(settings)
+    threshold = None if settings.published else settings.threshold
+    glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])
+    return glow * method.gain(settings, size)
+
+
+def _method(settings: Settings) -> Reference:
+    check_settings(settings)
+    try:
+        return METHODS.reference(settings.method)
+    except KeyError:
+        raise ValueError(
+            f"method: {settings.method!r} has no reference in NumPy; give one when it is loaded, "
+            "load_method(file, reference=function), or registered"
+        ) from None
+
+
+def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height of the bloom buffers of a frame."""
+    if settings.bloom_size is not None:
+        return settings.bloom_size
+    width, height = (max(1, math.floor(side * settings.bloom_scale)) for side in frame)
+    return width, height
+
+
+def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
+    """Return an emission in real units."""
+    values = as_float(emission, "emission", (3, 4))
+    kinds = [
+        (part.shape, part.dtype) for part in (np.asarray(image), as_array(emission, "emission"))
+    ]
+    if kinds[0] != kinds[1]:
+        raise ValueError(
+            f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"
+        )
+    return values
+
+
+def _with_alphas(framebuffers: dict[str, Array]) -> dict[str, Array]:
+    """Return the images with a fourth channel; a kernel has three."""
+    return {
+        name: part if name == "kernel" else _with_alpha(part) for name, part in framebuffers.items()
+    }
+
+
+def _with_alpha(image: Array) -> Array:
+    """Return rgb with a fourth channel of 1. Four channels are returned unchanged."""
+    if image.shape[2] == 4:
+        return image
+    return np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=-1)

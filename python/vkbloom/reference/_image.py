@@ -1,0 +1,190 @@
+"""Images in real units, formats, and the effect of storing values in a format."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._sampling import Array
+
+__all__ = ["BlurInput", "Storage", "as_float", "as_mask", "finite", "format_of", "storage"]
+
+_FORMATS = {
+    "uint8": "rgba8unorm",
+    "float16": "rgba16float",
+    "float32": "rgba32float",
+    # There are no bloom buffers of doubles. Only the reference uses them, without clamps.
+    "float64": "rgba32float",
+}
+
+
+def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
+    """Return an image in real units.
+
+    - `image`: ndarray, shape (H, W, C); uint8 (read as value / 255), float16, float32 or float64.
+    """
+    array = as_array(image, name)
+    if array.dtype.name not in _FORMATS:
+        raise TypeError(
+            f"{name} must be uint8, float16, float32 or float64, not {array.dtype}"
+            + f"; convert it: ({name} / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
+        )
+    if array.ndim != 3 or 0 in array.shape:
+        raise ValueError(f"{name} must have the shape (H, W, C), not {array.shape}")
+    if channels is not None and array.shape[2] not in channels:
+        wanted = " or ".join(map(str, channels))
+        raise ValueError(f"{name} must have {wanted} channels, not {array.shape[2]}")
+    real = array.astype(np.float64)
+    return real / 255 if array.dtype == np.uint8 else real
+
+
+def as_array(values: object, name: str) -> NDArray[Any]:
+    """Return an array view, or raise an error that names the argument."""
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name} must be an array; NumPy: {error}") from None
+
+
+def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
+    """Return a mask as values of 0 to 1.
+
+    - `mask`: ndarray, shape (H, W); uint8 (read as value / 255), bool, or floats.
+    """
+    array = as_array(mask, "mask")
+    if array.dtype.kind not in "buf":
+        raise TypeError(f"mask must be of numbers, not {array.dtype}")
+    if array.shape != size[::-1]:
+        raise ValueError(f"mask must have the image's shape {size[::-1]}, not {array.shape}")
+    values = array.astype(np.float64) / (255 if array.dtype == np.uint8 else 1)
+    if not ((values >= 0) & (values <= 1)).all():
+        raise ValueError("mask must have values of 0 to 1")
+    return values[..., np.newaxis]
+
+
+def finite(image: Array) -> Array:
+    """Return the image with 0 instead of NaN and infinity."""
+    return np.where(np.isfinite(image), image, 0.0)
+
+
+def format_of(image: NDArray[Any], format: str | None) -> str:
+    """Return the format of the bloom buffers: `format`, or by default that of the image's dtype."""
+    if format is not None:
+        return format
+    dtype = np.asarray(image).dtype
+    if dtype.name not in _FORMATS:
+        raise TypeError(f"dtype: {dtype} is not one of {', '.join(_FORMATS)}")
+    return _FORMATS[dtype.name]
+
+
+@dataclasses.dataclass(frozen=True)
+class Storage:
+    """The effect of storing in a format: values are clamped to its range.
+
+    Values are not rounded to the steps of a format, unless these are coarse. The tolerance of a
+    comparison allows for the rounding.
+    """
+
+    low: float
+    high: float
+    coarse: Literal["", "rg11b10", "srgb8"] = ""
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether values are rounded."""
+        return self.coarse != ""
+
+    @property
+    def holds_means(self) -> bool:
+        """Whether sums of levels are stored as means, since they would be clamped."""
+        return self.high == 1 and not self.is_coarse
+
+    def __call__(self, image: Array) -> Array:
+        """Return the image as stored."""
+        if self.is_coarse:
+            return _as_rg11b10(image) if self.coarse == "rg11b10" else _as_srgb8(image)
+        return np.clip(image, self.low, self.high)
+
+    def first(self, image: Array) -> Array:
+        """Return the first image of a published method as stored."""
+        return self(image) if self.coarse == "srgb8" else self.end(image)
+
+    def end(self, image: Array) -> Array:
+        """Return the last image of a published method as stored.
+
+        Engines use "rg11b10ufloat" for the levels only: the frame and the bloom have other
+        formats, so that this format does not change them. The one with "rgba8unorm-srgb" reads the
+        frame from it, too.
+        """
+        return image if self.is_coarse else self(image)
+
+
+@dataclasses.dataclass(frozen=True)
+class BlurInput:
+    """What the passes of a method read.
+
+    - `image`: ndarray of float64, shape (H, W, C); The content of the first bloom buffer. Methods
+      that read a luminance accept 1, 3 or, with alpha, 4 channels.
+    - `size`: Width and height of the bloom.
+    - `store`: The effect of storing values in a bloom buffer.
+    - `mask`: ndarray of float64, shape (height, width, 1), optional; Multiplies the result of a
+      published method's threshold. Other methods do not read it.
+    """
+
+    image: Array
+    size: tuple[int, int]
+    store: Storage
+    mask: Array | None = None
+
+
+def _as_rg11b10(image: Array) -> Array:
+    """Round to the nearest values with 5 bits of exponent and 6 of mantissa, of blue 5.
+
+    Ties go to the even value, as in IEEE 754. The smallest step is 2^-20, for blue 2^-19.
+
+    `image`: ndarray of float64, shape (..., C); Three channels are red, green and blue. With
+    another number, all have 6 bits.
+    """
+    bits = np.array([6, 6, 5]) if image.shape[-1] == 3 else np.array(6)
+    kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
+    _, exponent = np.frexp(kept)
+    step = np.exp2(np.maximum(exponent - 1, -14) - bits)
+    rounded: Array = np.round(kept / step) * step
+    return rounded
+
+
+def _as_srgb8(image: Array) -> Array:
+    """Round to the light of the nearest 8-bit level of sRGB; of alpha to the nearest level.
+
+    `image`: ndarray of float64, shape (..., C); A fourth channel is alpha.
+    """
+    light = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 1)
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    share = np.round(255 * encoded) / 255
+    result = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    if image.shape[-1] == 4:
+        result[..., 3] = np.round(255 * light[..., 3]) / 255
+    return result
+
+
+_STORAGES = {
+    "rgba8unorm": Storage(0, 1),
+    # Clamped, since a blur would spread an infinity over the picture.
+    "rgba16float": Storage(-65504, 65504),
+    "rgba32float": Storage(-math.inf, math.inf),
+    "rg11b10ufloat": Storage(0, 65024, "rg11b10"),
+    "rgba8unorm-srgb": Storage(0, 1, "srgb8"),
+}
+
+
+def storage(format: str) -> Storage:
+    """Return the effect of storing values in a bloom buffer of a format."""
+    if format not in _STORAGES:
+        names = ", ".join(map(repr, _STORAGES))
+        raise ValueError(f"format must be one of {names}, not {format!r}")
+    return _STORAGES[format]

@@ -1,0 +1,71 @@
+"""pygfx' PhysicalBasedBloomPass.
+
+From pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._image import BlurInput, finite
+from ._levels import halved
+from ._pyramid import downsample, groups
+from ._sampling import Array, weighted_mean
+from ._threshold import luminance, masked
+from ._upsampling import combine, linear, tent
+
+if TYPE_CHECKING:
+    from vkbloom._methods.pygfx import PygfxBloom
+
+__all__ = ["gain", "passes"]
+
+
+def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    down_0 has half the size of the frame and each next level half of the one before, by 13 taps.
+    With `karis_average`, down_0 is the mean of their five groups, weighted by 1 / (1 + luminance)
+    only. up_k = down_k + tent(up_k+1), whose taps are `filter_radius` of the width apart along
+    both axes; the bloom is up_0, bilinear. The levels are clamped to at least 0.
+    """
+    height, width, _ = source.image.shape
+    image, level, downs = source.image, (width, height), []
+    for k in range(_level_count(settings, level)):
+        level = halved(level)
+        shrink = _averaged if settings.karis_average and k == 0 else downsample
+        image = np.maximum(shrink(image, level), 0)
+        image = source.store(masked(image, source.mask) if k == 0 else image)
+        downs.append(image)
+    return combine(
+        downs,
+        source,
+        upsample=lambda image, larger: _tent(image, larger, settings.filter_radius),
+        last=linear,
+    )
+
+
+def gain(settings: PygfxBloom, size: tuple[int, int]) -> float:
+    """Return the bloom of a flat image of 1: the number of levels."""
+    return float(_level_count(settings, size))
+
+
+def _level_count(settings: PygfxBloom, size: tuple[int, int]) -> int:
+    longer = max(1, max(size) // 2)
+    return min(settings.levels, math.floor(math.log2(longer)) + 1)
+
+
+def _averaged(image: Array, size: tuple[int, int]) -> Array:
+    """Weight the groups by 1 / (1 + luminance), also of negative ones; 0 where it is undefined."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return finite(
+            weighted_mean((1 / (1 + luminance(mean)), mean) for _, mean in groups(image, size))
+        )
+
+
+def _tent(image: Array, size: tuple[int, int], radius: float) -> Array:
+    """Sample the tent. Its step in texels is the same along both axes."""
+    step = radius * image.shape[1]
+    return tent(image, size, step, step)

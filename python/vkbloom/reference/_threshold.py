@@ -1,0 +1,85 @@
+"""The threshold: by luminance, or by brightness with a soft knee."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._sampling import Array, sample
+from ._tape import joined
+
+__all__ = ["apply_threshold", "brightest", "firefly_weight", "luminance", "masked", "soften"]
+
+# Rec. 709 luma coefficients of linear rgb.
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:
+    """Return the luminance, by default that of Rec. 709: 0.2126 r + 0.7152 g + 0.0722 b.
+
+    - `rgb`: ndarray of float64, shape (..., 3), (..., 4) or (..., 1); A fourth channel is alpha,
+      which is ignored. A single channel is its own luminance.
+    - `coefficients`: ndarray of float64, shape (3,); Sources differ in the last digits.
+    """
+    if rgb.shape[-1] == 1:
+        return rgb
+    weighted: Array = (rgb[..., :3] * coefficients).sum(axis=-1, keepdims=True)
+    return weighted
+
+
+def brightest(image: Array) -> Array:
+    """Return the largest colour channel, (..., 1); a fourth channel is alpha."""
+    largest: Array = image[..., :3].max(axis=-1, keepdims=True)
+    return largest
+
+
+def masked(image: Array, mask: Array | None) -> Array:
+    """Return the image times the mask, which is read bilinearly at the image's pixel centres.
+
+    - `mask`: ndarray of float64, shape (H, W, 1), or None.
+    """
+    if mask is None:
+        return image
+    height, width, _ = image.shape
+    return image * sample(mask, (width, height))
+
+
+def firefly_weight(brightness: Array) -> Array:
+    """Return 1 / (1 + brightness), with negative brightness as 0 (Karis, 2013)."""
+    weight: Array = 1 / (1 + np.maximum(brightness, 0.0))
+    return weight
+
+
+def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
+    """Keep colours brighter than the threshold.
+
+    Without a knee, a colour does not change if its luminance is greater than the threshold, and
+    becomes 0 otherwise. With a knee, the colour is scaled by max(q, b - threshold) / max(b, 1e-5)
+    with b = max(r, g, b), k = threshold * knee and
+    q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5). This is a quadratic from 0 at
+    threshold - k to the line b - threshold at threshold + k. Both formulas are documented with
+    `vkbloom.Settings`.
+
+    - `rgb`: ndarray of float64, shape (..., 3) or (..., 4); Alpha is scaled like the colour.
+    - `threshold`: In the units of the image; None keeps everything.
+    """
+    if threshold is None:
+        return rgb
+    if knee == 0:
+        return np.where(luminance(rgb) > threshold, rgb, 0.0)
+    half_width = threshold * knee
+    return soften(rgb, threshold, half_width, 4 * half_width + 1e-5, 1e-5)
+
+
+def soften(rgb: Array, threshold: float, half_width: float, divisor: float, least: float) -> Array:
+    """Scale colours by max(q, b - threshold) / max(b, least).
+
+    b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
+    divisor.
+
+    - `threshold`, `half_width`: Middle and half-width of the soft part, in the units of the image.
+    """
+    brightness = brightest(rgb)
+    above = brightness - threshold
+    soft = np.clip(above + half_width, 0, 2 * half_width) ** 2 / divisor
+    scale: Array = joined(above - soft, 0.0, soft, above) / np.maximum(brightness, least)
+    return rgb * scale

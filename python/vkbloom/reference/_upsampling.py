@@ -1,0 +1,128 @@
+"""Upsampling of a chain of levels: filters that enlarge, and the combination of the levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ._image import BlurInput
+from ._sampling import Array, sample
+from ._tape import contiguous
+
+__all__ = [
+    "combine",
+    "cubic",
+    "flat_gain",
+    "linear",
+    "spline_taps",
+    "tent",
+    "tent_of_target",
+]
+
+# (image, size of the result) -> the image enlarged
+Filter = Callable[[Array, tuple[int, int]], Array]
+
+
+def linear(image: Array, size: tuple[int, int]) -> Array:
+    """Read one bilinear tap."""
+    return sample(image, size)
+
+
+def tent(image: Array, size: tuple[int, int], x_step: float = 1.0, y_step: float = 1.0) -> Array:
+    """Read 3 x 3 bilinear taps with the weights (1 2 1)^2 / 16; steps in texels of the image."""
+    x_taps, y_taps = (((-step, 0.25), (0.0, 0.5), (step, 0.25)) for step in (x_step, y_step))
+    return sample(image, size, x_taps, y_taps)
+
+
+def tent_of_target(image: Array, size: tuple[int, int]) -> Array:
+    """Read the tent with taps one pixel of the result apart."""
+    return tent(image, size, image.shape[1] / size[0], image.shape[0] / size[1])
+
+
+def cubic(image: Array, size: tuple[int, int]) -> Array:
+    """Read the cubic B-spline with the texels as its control points.
+
+    At the fraction f of the way between two texels, the four nearest weigh (1 - f)^3,
+    4 - 6 f^2 + 3 f^3, 1 + 3 f + 3 f^2 - 3 f^3 and f^3, each divided by 6.
+    """
+    rows = _cubic_rows(image, size[1])
+    columns = _cubic_rows(rows.swapaxes(0, 1), size[0])
+    return contiguous(columns.swapaxes(0, 1))
+
+
+def _cubic_rows(image: Array, count: int) -> Array:
+    """Enlarge along the first axis."""
+    length = image.shape[0]
+    positions = (np.arange(count) + 0.5) * length / count - 0.5
+    lower = np.floor(positions)
+    f = (positions - lower)[:, np.newaxis, np.newaxis]
+    weights = ((1 - f) ** 3, 4 - 6 * f**2 + 3 * f**3, 1 + 3 * f + 3 * f**2 - 3 * f**3, f**3)
+    result = np.zeros((count, *image.shape[1:]))
+    for offset, weight in enumerate(weights, start=-1):
+        texels = np.clip(lower + offset, 0, length - 1).astype(np.intp)
+        result += weight / 6 * image[texels]
+    return result
+
+
+def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
+    """Return the cubic B-spline as two bilinear taps: their positions and their weights.
+
+    The four texels around a position weigh w_0 to w_3. A bilinear tap between the first two, at
+    w_1 / (w_0 + w_1) of the way, has both their shares (Sigg and Hadwiger, "Fast Third-Order
+    Texture Filtering", GPU Gems 2, chapter 20); likewise the other two.
+
+    `positions`: In texels, with texel n at n.
+    """
+    lower = np.floor(positions)
+    f = positions - lower
+    w = ((1 - f) ** 3 / 6, (4 - 6 * f**2 + 3 * f**3) / 6, (1 + 3 * f + 3 * f**2 - 3 * f**3) / 6)
+    right = w[2] + f**3 / 6
+    return [
+        (lower - 1 + w[1] / (w[0] + w[1]), w[0] + w[1]),
+        (lower + 1 + f**3 / 6 / right, right),
+    ]
+
+
+def combine(
+    downs: Sequence[Array],
+    source: BlurInput,
+    *,
+    upsample: Filter,
+    last: Filter,
+    own: Sequence[float] | None = None,
+    coarse: Sequence[float] | None = None,
+    smallest: float = 1.0,
+    gain: float = 1.0,
+    end: Callable[[Array], Array] | None = None,
+) -> dict[str, Array]:
+    """Return the framebuffers of a chain of levels.
+
+    up_N-1 = smallest * down_N-1, up_k = own[k] down_k + coarse[k] upsample(up_k+1), and the bloom
+    is gain * last(up_0). Buffers of rgba8unorm hold values up to 1: there up_k is divided by the
+    value that it has if all levels are 1 (with the sizes of the shares instead of the shares), and
+    the bloom is multiplied by that of up_0.
+    """
+    size, store = source.size, source.store
+    framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
+    own = own or [1.0] * len(downs)
+    coarse = coarse or [1.0] * len(downs)
+    # up_k is the stored image times the factor. The smallest level is stored without its factor.
+    up, factor = downs[-1], smallest
+    for k in range(len(downs) - 2, -1, -1):
+        height, width, _ = downs[k].shape
+        below = coarse[k] * factor
+        total = own[k] * downs[k] + below * upsample(up, (width, height))
+        factor = (abs(own[k]) + abs(below) or 1.0) if store.holds_means else 1.0
+        up = store(total / factor)
+        framebuffers[f"up_{k}"] = up
+    framebuffers["bloom"] = (end or store.end)(gain * factor * last(up, size))
+    return framebuffers
+
+
+def flat_gain(own: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
+    """Return the bloom that `combine` computes from flat levels, for a gain of 1."""
+    value = levels[-1]
+    for k in range(len(levels) - 2, -1, -1):
+        value = own[k] * levels[k] + coarse[k] * value
+    return value

@@ -1,0 +1,84 @@
+"""How far a bloom is from a law: the figures, and the assertion that they are within the limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+
+from vkbloom.testing._probe import Image
+
+__all__ = ["Deviation", "compare_with_law", "fail", "figure", "is_within", "measuring"]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A deviation from a law, and the largest that is allowed; infinity for a mere figure."""
+
+    law: str
+    off: float
+    allowed: float
+    name: str
+
+
+_measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
+
+
+@contextmanager
+def measuring() -> Iterator[list[Deviation]]:
+    """Collect the deviations of all assertions inside, up to the first one that fails."""
+    found: list[Deviation] = []
+    token = _measured.set(found)
+    try:
+        yield found
+    finally:
+        _measured.reset(token)
+
+
+def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
+    """Return whether a deviation is within its limit; NaN is not."""
+    found = _measured.get()
+    if found is not None:
+        found.append(Deviation(law, off, allowed, name))
+    return off <= allowed
+
+
+def figure(name: str, value: float) -> None:
+    """Collect a figure that has no limit."""
+    is_within("", value, math.inf, name)
+
+
+def compare_with_law(
+    assertion: str,
+    law: str,
+    found: Image,
+    expected: Image,
+    allowed: float,
+    *,
+    border: int = 0,
+    note: str = "",
+) -> None:
+    """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
+    __tracebackhide__ = True
+    difference = np.abs(found - expected)
+    place = np.unravel_index(int(difference.argmax()), difference.shape)
+    if not is_within(law, float(difference[place]), allowed):
+        y, x, channel = (int(index) for index in place)
+        fail(
+            assertion,
+            law,
+            f"{found[place]:.6g} instead of {expected[place]:.6g} at x {x + border}, "
+            f"y {y + border}, channel {channel}: off by {difference[place]:.3g}, {allowed:.3g} "
+            f"allowed{note}",
+        )
+
+
+def fail(assertion: str, law: str, figure: str) -> NoReturn:
+    """Raise AssertionError with the figure and the law."""
+    __tracebackhide__ = True
+    raise AssertionError(f"{assertion}: {figure}\n  law: {law}")

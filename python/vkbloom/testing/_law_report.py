@@ -1,0 +1,306 @@
+"""Every law at once: which ones a bloom holds, by how much, and why it may break the others."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import measuring
+from vkbloom.testing._law_table import LAWS, Law, law_name
+from vkbloom.testing._probe import Bloom, Probe
+from vkbloom.testing._subject import Subject, fitting_probe
+
+__all__ = ["COLOURS", "LawReport", "LawRow", "law_report", "report"]
+
+#: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
+COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawRow:
+    """One law of a report.
+
+    Attributes
+    ----------
+    name : str
+        Name of the assertion without ``assert_``; "transposed" is `assert_symmetric` for "xy".
+    held : bool or None
+        None: the premise of the law does not hold, such as light that reaches the border.
+    off : float
+        The deviation that is the largest share of its limit; NaN where nothing was measured.
+    limit : float
+        The allowed deviation there.
+    figures : mapping of str to float
+        What was measured, by name: the deviations, and figures such as the gain.
+    law : str
+        The law in words.
+    message : str
+        The assertion's message, or the reason why it could not be tested; empty if the law holds.
+    why : str
+        Why a bloom that is no fault may break the law.
+
+    See Also
+    --------
+    LawReport : Has one row for each law.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> testing.report(lambda image: image, size=(32, 32)).rows[0].held
+    True
+    """
+
+    name: str
+    held: bool | None
+    off: float
+    limit: float
+    figures: Mapping[str, float]
+    law: str
+    message: str
+    why: str
+
+    @property
+    def words(self) -> str:
+        """The verdict: yes, no or not tested."""
+        return {True: "yes", False: "no", None: "not tested"}[self.held]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LawReport:
+    """Which laws a bloom holds.
+
+    Attributes
+    ----------
+    rows : tuple of LawRow
+    probe : Probe
+        The test images: size, dtype and brightest value.
+    gain : float
+        Of a flat image of that value, in its middle. Where none is promised, the law of the gain is
+        tested with it.
+    required : tuple of str
+        Names of the laws that the bloom promises.
+
+    See Also
+    --------
+    report : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.Separable())
+    >>> found = testing.report(bloom, size=(64, 64))
+    >>> [row.name for row in found.rows if not row.held]
+    ['bounded_fireflies', 'additive', 'energy', 'resolution']
+    >>> found.assert_held("superposition", "gain", "symmetric")
+    """
+
+    rows: tuple[LawRow, ...]
+    probe: Probe
+    gain: float
+    required: tuple[str, ...] = ()
+
+    def assert_held(self, *names: str) -> None:
+        """Assert that the laws of these names hold; without a name, all of them.
+
+        Parameters
+        ----------
+        *names : str
+
+        Raises
+        ------
+        AssertionError
+            One does not hold, or could not be tested. The message has those of all of them.
+        ValueError
+            There is no law of this name.
+
+        See Also
+        --------
+        assert_superposition : One of the assertions.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> testing.report(lambda image: image, size=(32, 32)).assert_held("symmetric")
+        """
+        __tracebackhide__ = True
+        known = {row.name: row for row in self.rows}
+        try:
+            chosen = [law_name(name, known) for name in names] or list(known)
+        except ValueError as error:
+            raise ValueError(f"names: {error}") from None
+        broken = [known[name] for name in chosen if not known[name].held]
+        if broken:
+            raise AssertionError(
+                "\n".join(f"{row.name}: {row.message}\n  why: {row.why}" for row in broken)
+            )
+
+    def __str__(self) -> str:
+        """Return a table, and below it the reasons for broken laws."""
+        width, height = self.probe.size
+        lines = [
+            f"Laws of a bloom, on {self.probe.dtype} images of {width} x {height} with values up "
+            f"to {self.probe.value:g}; gain {self.gain:.4g}",
+            f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
+        ]
+        for row in self.rows:
+            figures = "".join(f"{cell:>10}" for cell in _cells(row))
+            mark = " required" if row.name in self.required else ""
+            lines.append(f"{row.name:<18} {row.words:<11}{figures}{mark}".rstrip())
+        for row in self.rows:
+            if not row.held:
+                lines += [f"{row.name}: {row.message}", f"  why: {row.why}"]
+        return "\n".join(lines)
+
+    def kind(self, row: LawRow) -> str:
+        """Return whether a row is held, untested, broken, or broken and required."""
+        if row.held:
+            return "held"
+        if row.name in self.required:
+            return "required"
+        return "untested" if row.held is None else "broken"
+
+    def _repr_html_(self) -> str:
+        """Return the same as a table."""
+        heads = "".join(
+            f'<th scope="col" style="text-align:left">{head}</th>'
+            for head in ("law", "held", "off by", "allowed", "why it may be broken")
+        )
+        body = []
+        for row in self.rows:
+            kind = self.kind(row)
+            words = f"<b>{row.words}</b>" if not row.held else row.words
+            words += " (required)" if row.name in self.required else ""
+            why = "" if row.held else f"{html.escape(row.message)}<br><i>{html.escape(row.why)}</i>"
+            body.append(
+                f'<tr class="{kind}"><th scope="row" style="text-align:left;color:{COLOURS[kind]}" '
+                f'title="{html.escape(row.law)}">{row.name}</th>'
+                f'<td style="color:{COLOURS[kind]}">{words}</td>'
+                + "".join(f"<td>{cell}</td>" for cell in _cells(row))
+                + f'<td style="text-align:left">{why}</td></tr>'
+            )
+        return (
+            f'<table style="color:inherit"><caption>{html.escape(str(self).splitlines()[0])}'
+            f"</caption><thead><tr>{heads}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+        )
+
+
+def _cells(row: LawRow) -> tuple[str, str]:
+    return ("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")
+
+
+@checked
+def report(
+    bloom: Bloom,
+    *,
+    size: tuple[int, int] = (256, 256),
+    laws: str | Sequence[str] = "all",
+    gain: float | None = None,
+    probe: Probe | None = None,
+) -> LawReport:
+    """Test a bloom against every law.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone, or the
+        picture with its bloom.
+    size : (int, int)
+        Width and height of the test images. A wide bloom needs a large one.
+    laws : "all" or sequence of str
+        Names of the laws to test; they are promised: `LawReport.required`.
+    gain : float, optional
+        The gain of flat images that the bloom promises. Default: `gain` tests that there is one,
+        and `energy` that no light is lost or added.
+    probe : Probe, optional
+        Replaces `size`. Default: float32 with values up to 1, or up to 16 where a bloom of 1 is
+        black, as after a threshold.
+
+    Returns
+    -------
+    LawReport
+
+    Raises
+    ------
+    TypeError, ValueError
+        `bloom` is not such a callable, or a law is unknown.
+
+    See Also
+    --------
+    stability, resolution_response : Measure a moving light, and several resolutions.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.DualKawase(levels=2))
+    >>> found = testing.report(bloom, size=(64, 64))
+    >>> [row.name for row in found.rows if row.held][:3]
+    ['superposition', 'gain', 'symmetric']
+    """
+    if gain is not None:
+        check_number("gain", gain, 0.0, math.inf)
+    names = [] if laws == "all" else [laws] if isinstance(laws, str) else laws
+    try:
+        required = tuple(dict.fromkeys(law_name(name) for name in names))
+    except ValueError as error:
+        raise ValueError(f"laws: {error}") from None
+    used = probe or fitting_probe(bloom, Probe(size=size))
+    return law_report(Subject(bloom=bloom, probe=used, gain=gain), required or LAWS, required)
+
+
+def law_report(
+    subject: Subject,
+    names: Iterable[str],
+    required: tuple[str, ...] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> LawReport:
+    """Test a bloom against laws; those that do not apply to it only if they are required."""
+    gain = subject.measured_gain
+    rows = []
+    for law in (LAWS[name] for name in LAWS if name in names):
+        if law.name in required or law.applies(subject):
+            progress(law.name)
+            rows.append(_row(law, subject))
+    return LawReport(rows=tuple(rows), probe=subject.probe, gain=gain, required=required)
+
+
+def _row(law: Law, subject: Subject) -> LawRow:
+    """Test a law."""
+    message, why = "", law.why
+    held: bool | None = True
+    # NaN and infinity among the test images are no fault of the caller's arithmetic.
+    with measuring() as found, np.errstate(all="ignore"):
+        try:
+            law.test(subject, law.limit)
+        except AssertionError as error:
+            message, held = re.sub(r"\Aassert_\w+: ", "", str(error)), False
+            if law.explain is not None:
+                why = law.explain(subject, why)
+        except (TypeError, ValueError) as error:
+            # Not of the bloom itself: report has called it before.
+            message, held = str(error), None
+    limited = [one for one in found if not math.isinf(one.allowed)] if held is not None else []
+    worst = max(limited, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
+    figures: dict[str, float] = {}
+    for one in found:
+        figures[one.name] = max(one.off, figures.get(one.name, -math.inf))
+    return LawRow(
+        name=law.name,
+        held=held,
+        off=worst.off if worst else math.nan,
+        limit=worst.allowed if worst else math.nan,
+        figures=MappingProxyType(figures),
+        law=worst.law if worst else law.formula,
+        message=message,
+        why=why,
+    )

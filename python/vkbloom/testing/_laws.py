@@ -1,0 +1,422 @@
+"""Laws of a complete blur or bloom, for any callable that maps an image to an image.
+
+The message of a failed assertion has the law, the largest deviation with its position, and the
+expected value there. The allowed deviation is the sum of the errors of all values that a law uses;
+`vkbloom.testing.Probe` defines the error of a single value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import compare_with_law
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = [
+    "assert_additive",
+    "assert_bounded_fireflies",
+    "assert_gain",
+    "assert_no_ringing",
+    "assert_superposition",
+    "assert_symmetric",
+]
+
+_DEFAULT = Probe()
+
+
+@checked
+def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+    """Assert that the bloom of a mixture of two images is the mixture of their blooms.
+
+    The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
+    additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
+    with a threshold, a clamp or a firefly filter is not linear.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+        The kind of test image, and the allowed errors.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+
+    See Also
+    --------
+    assert_additive : The law of the picture with bloom.
+    assert_gain : The law of flat images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(blur_strength=1.0)
+    >>> testing.assert_superposition(lambda image: reference.blur(image, settings))
+
+    A square is not linear:
+
+    >>> testing.assert_superposition(lambda image: image**2)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    AssertionError: assert_superposition: ...
+    """
+    __tracebackhide__ = True
+    # Otherwise the dtype would round halves and quarters of the values in the test images.
+    a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
+    whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
+    of_a, error_a = probe.apply(bloom, a)
+    of_b, error_b = probe.apply(bloom, b)
+    compare_with_law(
+        "assert_superposition",
+        "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4",
+        whole,
+        of_a / 2 + of_b / 4,
+        whole_error + error_a / 2 + error_b / 4,
+    )
+
+
+@checked
+def assert_additive(
+    bloom: Bloom,
+    glow: Bloom | None = None,
+    intensity: float = 1.0,
+    probe: Probe = _DEFAULT,
+) -> None:
+    """Assert that an image with bloom is the image plus the bloom.
+
+    The law: F(a) = a + intensity * G(a), for an image of noise, where F is the image with bloom
+    and G the bloom alone. This is additive blending, as glare in a camera or an eye adds light
+    (Spencer et al., "Physically-Based Glare Effects for Digital Images", SIGGRAPH 1995). Without G
+    the law is F(a) >= a: light is added and none is removed. The composite "mix" removes light from
+    bright pixels, so it does not obey this law.
+
+    Parameters
+    ----------
+    bloom : callable
+        Maps an image to the image with bloom.
+    glow : callable, optional
+        Maps an image to the bloom alone.
+    intensity : float
+        Factor of the bloom, 0 or more.
+    probe : Probe
+        With integers, `value` must be low enough that image plus bloom is not clamped.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `intensity` is out of range.
+
+    See Also
+    --------
+    assert_superposition : Linearity of the bloom alone.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(blur_strength=1.0)
+    >>> def bloom(image):
+    ...     return reference.blur(image, settings)
+    >>> testing.assert_additive(lambda image: image + 0.5 * bloom(image), bloom, intensity=0.5)
+    """
+    __tracebackhide__ = True
+    check_number("intensity", intensity, 0.0, math.inf)
+    image = probe.noise(0, probe.value)
+    picture, error = probe.apply(bloom, image)
+    if glow is None:
+        compare_with_law(
+            "assert_additive",
+            "F(a) >= a: light is added, and none is removed",
+            picture,
+            np.maximum(picture, image),
+            error,
+        )
+        return
+    light, light_error = probe.apply(glow, image)
+    compare_with_law(
+        "assert_additive",
+        f"F(a) = a + {intensity:g} G(a)",
+        picture,
+        image + intensity * light,
+        error + intensity * light_error,
+    )
+
+
+@checked
+def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+    """Assert the gain of flat images.
+
+    The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
+    quarter of it. The gain is the sum of the kernel's weights. At the border it is the same if the
+    method clamps to the edge. A gain of 1 keeps the energy.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    gain : float
+        The expected gain; `vkbloom.reference.gain` computes it for vkbloom's custom methods.
+    probe : Probe
+        With integers, `value` times `gain` must be at most 1.
+    border : int
+        Pixels at each side that are ignored, for methods that read black outside the image.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    vkbloom.reference.gain : Gain of vkbloom's custom methods.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(2.0), blur_strength=1.0)
+    >>> testing.assert_gain(lambda image: reference.blur(image, settings), 1.0)
+    """
+    __tracebackhide__ = True
+    check_number("gain", gain, 0.0, math.inf)
+    for part in (1.0, 0.5, 0.25):
+        image = _divisible_by_four(probe, probe.flat(probe.value)) * part
+        result, error = probe.apply(bloom, image)
+        inner = _inner(probe, border)
+        compare_with_law(
+            "assert_gain",
+            f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}",
+            result[inner],
+            gain * image[inner],
+            error,
+            border=border,
+        )
+
+
+@checked
+def assert_symmetric(
+    bloom: Bloom,
+    probe: Probe = _DEFAULT,
+    *,
+    axes: Sequence[Literal["x", "y", "xy"]] = ("x", "y"),
+) -> None:
+    """Assert that the bloom of a mirrored image is the mirrored bloom.
+
+    The law: B(M a) = M B(a), for an image of noise and each reflection M. A kernel that is not
+    symmetric does not obey it, nor does a shift by a part of a pixel, such as a missing half texel.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    axes : sequence of {"x", "y", "xy"}
+        "x" swaps left and right, "y" top and bottom, "xy" rows and columns.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an axis is unknown.
+
+    See Also
+    --------
+    assert_centroid_kept : The law of shifts, as a distance.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.Separable())
+    >>> testing.assert_symmetric(bloom, axes=("x", "y", "xy"))
+    """
+    __tracebackhide__ = True
+    image = probe.noise(0, probe.value)
+    result, error = probe.apply(bloom, image)
+    for axis in axes:
+        if axis not in ("x", "y", "xy"):
+            raise ValueError(f"axes: {axis!r} is not one of x, y, xy")
+        mirrored, mirrored_error = probe.apply(bloom, _mirrored(image, axis))
+        law = {
+            "x": "left and right swapped before or after the bloom are the same",
+            "y": "top and bottom swapped before or after the bloom are the same",
+            "xy": "rows and columns swapped before or after the bloom are the same",
+        }[axis]
+        compare_with_law(
+            "assert_symmetric", law, _mirrored(mirrored, axis), result, error + mirrored_error
+        )
+
+
+@checked
+def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+    """Assert that the bloom of an edge has no dark or bright line beside the edge.
+
+    The law: across a step from black to `probe.value`, along x and along y, values do not decrease.
+    They stay between the values of the black image and of the flat bright image. The law holds if
+    no weight of the kernel is negative (Mitchell and Netravali, "Reconstruction Filters in Computer
+    Graphics", SIGGRAPH 1988, on ringing).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    border : int
+        Pixels at each side that are ignored, for methods that read black outside the image.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `border` is out of range.
+
+    See Also
+    --------
+    assert_gain : The law of flat images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_no_ringing(lambda image: reference.blur(image, settings))
+    """
+    __tracebackhide__ = True
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    bright, bright_error = probe.apply(bloom, probe.flat(probe.value))
+    inner = _inner(probe, border)
+    width, height = probe.size
+    for axis, across, lit in (
+        (1, "x", (slice(None), slice(width // 2, None))),
+        (0, "y", (slice(height // 2, None), slice(None))),
+    ):
+        step = probe.flat(0.0)
+        step[lit] = probe.value
+        result, error = probe.apply(bloom, step)
+        compare_with_law(
+            "assert_no_ringing",
+            f"a step along {across} stays between the bloom of black and of the flat image",
+            result[inner],
+            np.clip(result, dark, bright)[inner],
+            error + max(dark_error, bright_error),
+            border=border,
+        )
+        inside = result[inner]
+        # The running maximum. No later value may be lower.
+        compare_with_law(
+            "assert_no_ringing",
+            f"along {across}, values only rise across a step from black to bright",
+            inside,
+            np.maximum.accumulate(inside, axis=axis),
+            2 * error,
+            border=border,
+        )
+
+
+@checked
+def assert_bounded_fireflies(
+    bloom: Bloom,
+    limit: float = 1.0,
+    probe: Probe = _DEFAULT,
+    *,
+    brightness: Sequence[float] = (10.0, 1e3, 6e4),
+    period: int = 2,
+) -> None:
+    """Assert that one very bright pixel brightens other pixels by a limited amount.
+
+    The law: with a pixel of brightness L on a dark image, no other pixel becomes brighter by more
+    than `limit`, for each L and each position of the pixel. A linear bloom has no such limit,
+    because it spreads a share of L. In an animation, such a pixel flickers. Methods limit the
+    effect by a clamp, or by an average weighted by 1 / (1 + luminance) (Karis, "Tone Mapping",
+    2013).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    limit : float
+        The largest allowed increase of another pixel, in real units.
+    probe : Probe
+        A probe of floats; `value` is not used.
+    brightness : sequence of float
+        The values of L. Infinity is allowed: it must not spread either.
+    period : int
+        The law is tested at period x period positions of the pixel, because the result of a chain
+        of halved images depends on the position. Use 2 for one halving and 4 for two.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    vkbloom.Pyramid : Has the parameter `firefly_filter`.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> probe = testing.Probe(size=(32, 32))
+    >>> testing.assert_bounded_fireflies(lambda image: np.minimum(image, 1.0), probe=probe)
+    """
+    __tracebackhide__ = True
+    if probe.dtype.kind == "u":
+        raise TypeError(f"probe: {probe.dtype} has no values above 1; use a float dtype")
+    check_number("limit", limit, 0.0, math.inf)
+    if not 1 <= period <= min(probe.size):
+        raise ValueError(f"period: {period!r} is out of range, 1 to {min(probe.size)}")
+    left, top = (max(0, side // 2 - period // 2) for side in probe.size)
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    for light in brightness:
+        for place in ((left + x, top + y) for y in range(period) for x in range(period)):
+            image = probe.point(place, light)
+            result, error = probe.apply(bloom, image, exempt=place)
+            compare_with_law(
+                "assert_bounded_fireflies",
+                f"a pixel of {light:g} at x {place[0]}, y {place[1]} brightens others by "
+                f"{limit:g} at most",
+                result,
+                np.minimum(result, dark + limit),
+                error + dark_error,
+            )
+
+
+def _divisible_by_four(probe: Probe, image: Image) -> Image:
+    """Round values so that the sum of half of one and a quarter of another is exact.
+
+    Integers are rounded to multiples of four levels, floats to 256 levels; float16 represents an
+    eighth of such a level exactly.
+    """
+    levels = np.iinfo(probe.dtype).max / 4 if probe.dtype.kind == "u" else 256 / probe.value
+    whole: Image = np.floor(image * levels + 1e-9) / levels
+    return whole
+
+
+def _mirrored(image: Image, axis: str) -> Image:
+    if axis == "xy":
+        return image.swapaxes(0, 1)
+    return np.flip(image, 1 if axis == "x" else 0)
+
+
+def _inner(probe: Probe, border: int) -> tuple[slice, slice]:
+    width, height = probe.size
+    if not 0 <= border < min(width, height) / 2:
+        raise ValueError(
+            f"border: {border!r} is out of range, 0 to under half of {min(width, height)}"
+        )
+    return slice(border, height - border), slice(border, width - border)

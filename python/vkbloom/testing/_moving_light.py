@@ -1,0 +1,481 @@
+"""Measures the bloom of a light that moves by fractions of a pixel."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_index, check_number
+from vkbloom.testing._deviations import fail, is_within
+from vkbloom.testing._point_spread import border_share, check_inside, point_spread
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = [
+    "LIMITS",
+    "MovingBloom",
+    "Stability",
+    "area_sampled",
+    "assert_stable",
+    "check_stable",
+    "stability",
+]
+
+#: A temporal bloom: takes the images of a sequence, in their order, and returns their blooms.
+MovingBloom = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
+
+PATHS: Final = ("x", "y", "xy")
+_FIGURES: Final = ("ripple", "jitter", "flicker", "growth")
+#: Limits of the figures of a moving light.
+LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
+# Side of the light in pixels.
+_LIGHT: Final = 0.5
+# A bloom with less than this share of the light of the brightest bloom has no centroid or radius.
+_DIM: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stability:
+    """Figures of the bloom of a light that moves along x, along y and along both.
+
+    There are 3 paths of N positions each. All figures are computed from the first channel, after
+    the bloom of a black image is subtracted.
+
+    Parameters
+    ----------
+    positions : ndarray of float64, shape (3, N, 2)
+        x and y of the light in pixels; the centre of the first pixel is (0, 0).
+    energy : ndarray of float64, shape (3, N)
+        Sum of the bloom.
+    shift : ndarray of float64, shape (3, N, 2)
+        Centroid of the bloom minus the centroid of the input image, in pixels; NaN without light.
+    peak : ndarray of float64, shape (3, N)
+        The largest value of the bloom.
+    ideal : ndarray of float64, shape (3, N)
+        The peak that a convolution has which spreads a lit pixel as the bloom does. It changes with
+        the light's shares of the pixels, and so does the peak of every bloom. 1 where the bloom of
+        a lit pixel is black.
+    radius : ndarray of float64, shape (3, N)
+        Root mean square distance of the bloom's light from its centroid, in pixels. The variance of
+        the input image changes with the position of the light inside its pixel. Therefore it is
+        replaced by the variance of the square light. NaN without light, or if the variance of the
+        bloom is negative.
+    at_border : float
+        The largest share of the light in the outermost pixels. If it is not small, the image cuts
+        off light, and the other figures apply only to the light inside the image.
+
+    See Also
+    --------
+    stability : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> found = testing.stability(lambda image: image, texel=2, steps=4)
+    >>> found.positions.shape
+    (3, 8, 2)
+    >>> float(found.energy.max())
+    1.0
+    """
+
+    positions: NDArray[np.float64]
+    energy: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    ideal: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    at_border: float
+
+    @property
+    def ripple(self) -> float:
+        """(largest - smallest energy) / mean energy; NaN without light."""
+        return _variation(self.energy)
+
+    @property
+    def jitter(self) -> float:
+        """Largest distance between the centroids of bloom and image, in pixels."""
+        return _largest(np.hypot(self.shift[..., 0], self.shift[..., 1]))
+
+    @property
+    def flicker(self) -> float:
+        """(largest - smallest peak) / mean peak; NaN without light."""
+        return _variation(self.peak)
+
+    @property
+    def shimmer(self) -> float:
+        """The same of the peak divided by `ideal`: what of the flicker the bloom itself adds."""
+        return _variation(self.peak / self.ideal)
+
+    @property
+    def growth(self) -> float:
+        """(largest - smallest radius) / mean radius."""
+        return _variation(self.radius)
+
+    def __str__(self) -> str:
+        """Return a table of each path."""
+        rows: list[tuple[str, ...]] = [("along", *_FIGURES)]
+        for index, path in enumerate(PATHS):
+            one = self._path(index)
+            figures = [getattr(one, name) for name in _FIGURES]
+            rows.append((path, *(f"{figure:.3g}" for figure in figures)))
+        return "\n".join("  ".join(cell.rjust(7) for cell in row) for row in rows)
+
+    def _path(self, index: int) -> Stability:
+        names = ("positions", "energy", "shift", "peak", "ideal", "radius")
+        arrays = {name: getattr(self, name)[index : index + 1] for name in names}
+        return dataclasses.replace(self, **arrays)
+
+
+@checked
+def stability(
+    bloom: Bloom | MovingBloom,
+    *,
+    texel: int = 8,
+    steps: float = 8,
+    temporal: bool = False,
+    settle: int = 0,
+    probe: Probe | None = None,
+) -> Stability:
+    """Measure how much the bloom of a small moving light changes.
+
+    The light is a square of half a pixel. It is area-sampled: each pixel gets the share of the
+    light that it covers, so all images have the same energy. The light moves over one texel of the
+    coarsest level along x, along y and along both. If the bloom is a convolution, its energy and
+    its radius are constant, and its centroid is that of the image. The peak then changes only
+    because the light is distributed over the pixels in different shares.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns the bloom alone, of the same height and width. With `temporal`:
+        takes a list of images, in their order, and returns an iterable of as many blooms.
+    texel : int
+        Length of each path in pixels, at least 1: the size of a texel of the coarsest level. For a
+        chain of N halvings this is 2^N.
+    steps : float
+        Positions for each pixel of a path, above 0.
+    temporal : bool
+        Whether `bloom` takes the images of a path as a sequence, as methods with a history do.
+    settle : int
+        With `temporal`: number of images before each path with the light at its first position.
+        They are not measured.
+    probe : Probe, optional
+        The kind of image; its `value` is the light's sum over all pixels. For a method with a
+        threshold, it must be large, because a pixel may get only a quarter of the light or less.
+        Default: 16 texels wide and high, at least 64 pixels.
+
+    Returns
+    -------
+    Stability
+        With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
+        of the peak, and `growth` of the radius.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the path leaves the image.
+
+    See Also
+    --------
+    assert_stable : Asserts limits of the figures.
+    assert_superposition, assert_centroid_kept : Laws that a threshold or a shift breaks.
+
+    Examples
+    --------
+    A pyramid whose first reduction drops every second pixel loses a small light half of the time:
+
+    >>> from vkbloom import testing
+    >>> def dropping(image):
+    ...     return image[::2, ::2].repeat(2, axis=0).repeat(2, axis=1)
+    >>> testing.stability(dropping, texel=2).ripple > 1
+    True
+    """
+    __tracebackhide__ = True
+    check_index("texel", texel, 1, 4096)
+    check_number("steps", steps, 1e-3, 1e3)
+    check_index("settle", settle, 0, 1_000_000)
+    if settle and not temporal:
+        raise ValueError(f"settle: {settle} is not 0; only a temporal bloom needs frames to settle")
+    probe = probe or _wide(texel)
+    if texel + 2 > min(probe.size):
+        raise ValueError(f"probe: a path of {texel} pixels leaves an image of {probe.size}")
+    along = (np.arange(max(1, round(texel * steps))) + 0.5) / max(1, round(texel * steps)) - 0.5
+    middle = (np.array(probe.size) - 1) / 2
+    positions = np.stack(
+        [
+            middle + texel * along[:, np.newaxis] * np.array(direction)
+            for direction in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+        ]
+    )
+    measure = _in_order if temporal else _one_by_one
+    spread = _of_a_pixel(bloom, probe, settle if temporal else None)
+    rows = [measure(bloom, probe, path, settle, spread) for path in positions]
+    energy, across, down, peak, ideal, radius, border = np.moveaxis(np.array(rows), -1, 0)
+    faint = ~(energy > _DIM * energy.max())
+    shift = np.where(faint[..., np.newaxis], math.nan, np.stack([across, down], axis=-1))
+    return Stability(
+        positions=positions,
+        energy=energy,
+        shift=shift,
+        peak=peak,
+        ideal=ideal,
+        radius=np.where(faint, math.nan, radius),
+        at_border=float(border.max()),
+    )
+
+
+@checked
+def assert_stable(
+    bloom: Bloom | MovingBloom,
+    *,
+    ripple: float = LIMITS["ripple"],
+    jitter: float = LIMITS["jitter"],
+    flicker: float = LIMITS["shimmer"],
+    growth: float = LIMITS["growth"],
+    texel: int = 8,
+    steps: float = 8,
+    temporal: bool = False,
+    settle: int = 0,
+    probe: Probe | None = None,
+) -> None:
+    """Assert that the bloom of a small moving light neither flickers nor jumps.
+
+    The law: while a light smaller than a pixel moves over one texel of the coarsest level, the
+    bloom's energy, peak and radius change by no more than a share of their mean, and its centroid
+    is no further from that of the image than `jitter`.
+
+    Parameters
+    ----------
+    bloom : callable
+        As for `stability`.
+    ripple, flicker, growth : float
+        Allowed difference of the largest and the smallest energy, peak and radius, relative to
+        the mean. The peak is judged beside that of a convolution: `Stability.shimmer`.
+    jitter : float
+        Allowed distance of the centroids in pixels.
+    texel, steps, temporal, settle, probe
+        As for `stability`. The image must be large enough that no light reaches the border.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, there is no light, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+
+    See Also
+    --------
+    stability : Returns the figures.
+    assert_bounded_fireflies : The law of a single bright pixel.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(3.0), blur_strength=1.0)
+    >>> testing.assert_stable(lambda image: reference.blur(image, settings), texel=1)
+    """
+    __tracebackhide__ = True
+    limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
+    for name, limit in limits.items():
+        check_number(name, limit, 0.0, math.inf)
+    probe = probe or _wide(texel)
+    found = stability(
+        bloom, texel=texel, steps=steps, temporal=temporal, settle=settle, probe=probe
+    )
+    check_stable(found, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
+
+
+def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) -> None:
+    """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
+    __tracebackhide__ = True
+    if not found.energy.max() > 0:
+        fail(
+            "assert_stable",
+            "the bloom of a light is not black",
+            f"the largest sum of the bloom is {found.energy.max():.3g}: only sums above 0 are "
+            "allowed",
+        )
+    check_inside(found.at_border, probe.size)
+    told = {
+        "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
+        "jitter": (
+            np.hypot(found.shift[..., 0], found.shift[..., 1]),
+            "the centroid of the bloom",
+            "is {:.3g} pixels from that of the image",
+        ),
+        "shimmer": (
+            found.peak / found.ideal,
+            "the peak of the bloom",
+            "changes by {:.3g} of its mean, beside that of a convolution",
+        ),
+        "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
+    }
+    laws = {
+        name: f"{told[name][1]} stays the same while a light smaller than a pixel moves"
+        for name in limits
+    }
+    off = {name: getattr(found, name) for name in limits}
+    over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
+    for name in over[:1]:
+        values, what, how = told[name]
+        fail(
+            "assert_stable",
+            laws[name],
+            f"{what} {how.format(off[name])}, {_extremes(found, values)}: {limits[name]:.3g} "
+            "allowed" + f"; also above their limits: {', '.join(over[1:])}" * bool(over[1:]),
+        )
+
+
+def area_sampled(
+    size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
+) -> Image:
+    """Return the share of each pixel that a rectangle covers.
+
+    - `size`: Width and height of the image in pixels.
+    - `centre`: x and y in pixels; the centre of the first pixel is (0, 0).
+    - `sides`: Width and height of the rectangle in pixels.
+    - Returns: ndarray of float64, shape (H, W): 0 to 1. Their sum is the rectangle's area, as far
+      as it is inside.
+    """
+    covered = []
+    for count, place, side in zip(size, centre, sides, strict=True):
+        edges = np.arange(count + 1) - 0.5
+        covered.append(np.diff(np.clip(edges, place - side / 2, place + side / 2)))
+    return np.outer(covered[1], covered[0])
+
+
+def _wide(texel: int) -> Probe:
+    side = max(64, 16 * texel)
+    return Probe(size=(side, side))
+
+
+def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the image of the light in the probe's dtype."""
+    share = area_sampled(probe.size, (place[0], place[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
+    return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
+
+
+def _one_by_one(
+    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
+) -> list[tuple[float, ...]]:
+    """Return the figures of each position, for a bloom of single images."""
+    __tracebackhide__ = True
+    dark = probe.apply(bloom, probe.flat(0.0))[0][:, :, 0]
+    found = []
+    for place in path:
+        given = _light(probe, place)
+        result = probe.values(bloom(given), given)[0][:, :, 0]
+        found.append(_figures(result - dark, probe, given, spread))
+    return found
+
+
+def _in_order(
+    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
+) -> list[tuple[float, ...]]:
+    """Return the figures of each position, for a bloom of a sequence."""
+    __tracebackhide__ = True
+    black = probe.given(probe.flat(0.0))
+    dark = _results(bloom, probe, [black])[0]
+    still = [_light(probe, path[0])] * settle
+    images = still + [_light(probe, place) for place in path]
+    results = _results(bloom, probe, images)
+    pairs = zip(results[settle:], images[settle:], strict=True)
+    return [_figures(result - dark, probe, given, spread) for result, given in pairs]
+
+
+def _of_a_pixel(bloom: Any, probe: Probe, settle: int | None) -> Image:
+    """Return the first channel of the point spread; `settle` is None for single images."""
+    __tracebackhide__ = True
+    if not callable(bloom):
+        raise TypeError(f"bloom: {bloom!r} is not callable")
+    if settle is None:
+        return point_spread(bloom, probe)[:, :, 0]
+    images = [probe.given(probe.point(probe.centre, value)) for value in (0.0, probe.value)]
+    dark, lit = (_results(bloom, probe, [image] * (settle + 1))[-1] for image in images)
+    return (lit - dark) / probe.value
+
+
+def _convolved_peak(spread: Image, image: Image) -> float:
+    """Return the largest value of the convolution of a plane with a light; 1 if it is black."""
+    lit = np.argwhere(image)
+    # (Where the peak lies does not matter.)
+    parts = [image[y, x] * np.roll(spread, (y, x) - lit[0], (0, 1)) for y, x in lit]
+    peak = float(np.sum(parts, axis=0).max())
+    return peak if peak > 0 else 1.0
+
+
+def _results(bloom: Any, probe: Probe, images: list[NDArray[Any]]) -> list[Image]:
+    """Return the first channel of each result of a temporal bloom."""
+    __tracebackhide__ = True
+    results = [np.array(result) for result in bloom(list(images))]
+    if len(results) != len(images):
+        raise ValueError(f"bloom: it returns {len(results)} images for {len(images)}")
+    return [
+        probe.values(result, given)[0][:, :, 0]
+        for result, given in zip(results, images, strict=True)
+    ]
+
+
+def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:
+    """Return energy, x and y of the shift, peak, ideal, radius, and the share at the border."""
+    image = probe.values(given, given)[0][:, :, 0]
+    energy, place, variance = _moments(bloom)
+    _, from_place, from_variance = _moments(image)
+    # Replace the variance of the sampled light by that of the square.
+    left = variance - from_variance + _LIGHT**2 / 6
+    return (
+        energy,
+        place[0] - from_place[0],
+        place[1] - from_place[1],
+        float(bloom.max()),
+        _convolved_peak(spread, image),
+        math.sqrt(left) if left >= 0 else math.nan,
+        border_share(bloom),
+    )
+
+
+def _moments(plane: Image) -> tuple[float, tuple[float, float], float]:
+    """Return sum, centroid (x, y) and variance; the latter are NaN without light."""
+    total = float(plane.sum())
+    if total == 0:
+        return total, (math.nan, math.nan), math.nan
+    centroid, variance = [], 0.0
+    for axis in (0, 1):
+        profile = plane.sum(axis=axis) / total
+        distance = np.arange(len(profile), dtype=np.float64)
+        middle = float(profile @ distance)
+        centroid.append(middle)
+        variance += float(profile @ (distance - middle) ** 2)
+    return total, (centroid[0], centroid[1]), variance
+
+
+def _variation(values: NDArray[np.float64]) -> float:
+    """Return (largest - smallest) / mean; NaN if the mean is not above 0."""
+    known = values[np.isfinite(values)]
+    if not (known.size and known.mean() > 0):
+        return math.nan
+    return float(np.ptp(known) / known.mean())
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.max()) if known.size else math.nan
+
+
+def _extremes(found: Stability, values: NDArray[np.float64]) -> str:
+    """Return a text with the positions of the smallest and the largest value."""
+    parts = []
+    for index in (np.nanargmin(values), np.nanargmax(values)):
+        place = np.unravel_index(int(index), values.shape)
+        x, y = found.positions[place]
+        parts.append(f"{values[place]:.4g} with the light at x {x:.4g}, y {y:.4g}")
+    return f"from {parts[0]} to {parts[1]}"

@@ -1,0 +1,500 @@
+"""The point spread of a blur or bloom, and the laws of its shape."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import compare_with_law, fail, is_within
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = [
+    "Response",
+    "assert_centroid_kept",
+    "assert_separable",
+    "assert_spread",
+    "border_share",
+    "check_inside",
+    "measured_spread",
+    "point_spread",
+    "response",
+]
+
+_DEFAULT = Probe()
+# Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
+# that light, which moves a centroid by a thousandth of half the image.
+_AT_THE_BORDER: Final = 1e-3
+
+
+@checked
+def point_spread(
+    bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
+) -> Image:
+    """Return the point-spread function of a bloom.
+
+    h(x, y) = (B(v d) - B(0)) / v, where d is an image with one pixel of 1 and v the probe's value.
+    A linear, shift-invariant blur is the convolution with h (Goodman, "Introduction to Fourier
+    Optics", chapter 2).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+    at : (int, int), optional
+        x and y of the pixel. Default: the middle of the image.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W, C)
+        h around the pixel `at`; it is not shifted to the middle.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `at` is outside the image.
+
+    See Also
+    --------
+    response : Figures of the point spread, along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable(weights=(0.5, 0.25), blur_strength=1.0)
+    >>> probe = testing.Probe(size=(9, 9))
+    >>> spread = testing.point_spread(lambda image: reference.blur(image, settings), probe)
+    >>> spread[3:6, 3:6, 0]
+    array([[0.0625, 0.125 , 0.0625],
+           [0.125 , 0.25  , 0.125 ],
+           [0.0625, 0.125 , 0.0625]])
+    """
+    __tracebackhide__ = True
+    return measured_spread(bloom, probe, at)[0]
+
+
+@checked
+def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+    """Assert that the point spread is the product of a row and a column.
+
+    The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
+    value. Equivalently, h as a matrix has rank 1, and its second singular value is 0 (Treitel and
+    Shanks, "The Design of Multistage Separable Planar Filters", IEEE Transactions on Geoscience
+    Electronics, 1971). A sum of separable layers is not separable.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns the bloom alone, of the same height and width. The picture with
+        bloom is a sum of two layers and fails.
+    probe : Probe
+        `value` must be low enough that nothing is clamped.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+
+    See Also
+    --------
+    point_spread : Returns the point spread.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_separable(lambda image: reference.blur(image, settings))
+    """
+    __tracebackhide__ = True
+    spread, error = measured_spread(bloom, probe, None)
+    _check_lit("assert_separable", spread, error)
+    product = np.empty_like(spread)
+    shares = []
+    for channel in range(spread.shape[2]):
+        plane = spread[:, :, channel]
+        y, x = np.unravel_index(int(np.abs(plane).argmax()), plane.shape)
+        product[:, :, channel] = np.outer(plane[:, x], plane[y]) / plane[y, x]
+        singular = np.linalg.svd(plane, compute_uv=False)
+        shares.append(float(singular[1] / singular[0]) if len(singular) > 1 else 0.0)
+    compare_with_law(
+        "assert_separable",
+        "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
+        spread,
+        product,
+        # The law has four values. None is larger than the divisor.
+        4 * error,
+        note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
+    )
+
+
+@checked
+def assert_centroid_kept(
+    bloom: Bloom,
+    probe: Probe = _DEFAULT,
+    *,
+    at: tuple[int, int] | None = None,
+    within: float = 0.01,
+) -> None:
+    """Assert that the light of a pixel is centred on that pixel.
+
+    The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the lit pixel.
+    A chain of halved images keeps the centroid only on average over all positions. Use a larger
+    `within` for such a method.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    probe : Probe
+        Its image must be large enough that no light reaches the border.
+    at : (int, int), optional
+        x and y of the lit pixel. Default: the middle of the image.
+    within : float
+        Allowed distance along each axis in pixels, in addition to the effect of the errors of
+        single values.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+
+    See Also
+    --------
+    assert_symmetric : The law of mirrored images.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> settings = vkbloom.Separable()
+    >>> testing.assert_centroid_kept(lambda image: reference.blur(image, settings))
+    """
+    __tracebackhide__ = True
+    check_number("within", within, 0.0, math.inf)
+    spread, error = measured_spread(bloom, probe, at)
+    _check_lit("assert_centroid_kept", spread, error)
+    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
+    place = at or probe.centre
+    for channel in range(spread.shape[2]):
+        for axis, name in ((0, "x"), (1, "y")):
+            profile = spread[:, :, channel].sum(axis=axis)
+            distance = np.arange(len(profile), dtype=np.float64) - place[axis]
+            off = float((profile * distance).sum() / profile.sum())
+            allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
+            law = "the centroid of the light of a pixel is that pixel"
+            if not is_within(law, abs(off), allowed):
+                fail(
+                    "assert_centroid_kept",
+                    law,
+                    f"the centroid is {name} {place[axis] + off:.6g}, {off:+.3g} pixels from "
+                    f"{name} {place[axis]}, channel {channel}: {allowed:.3g} allowed",
+                )
+
+
+@checked
+def assert_spread(
+    bloom: Bloom,
+    sigma: float | tuple[float, float],
+    probe: Probe = _DEFAULT,
+    *,
+    rtol: float = 0.02,
+) -> None:
+    """Assert how far light spreads.
+
+    The law: the standard deviation of the point spread along x and y is sigma. A convolution adds
+    variances (Bracewell, "The Fourier Transform and Its Applications", chapter 8), so the sigma of
+    several passes is the root of the sum of squares. A kernel with weights w_i at distances d_i
+    has the variance sum w_i d_i^2 / sum w_i.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width.
+    sigma : float or (float, float)
+        Standard deviation in pixels: one number for both axes, or one for x and one for y.
+    probe : Probe
+        Its image must be large enough that no light reaches the border.
+    rtol : float
+        Allowed relative difference. The default allows for a Gaussian that is cut off at three
+        sigma, whose standard deviation is 1.3 % smaller.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, an argument is out of range, or the light reaches the
+        border.
+
+    See Also
+    --------
+    response : Measures sigma along a parameter.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> weights = vkbloom.gaussian_weights(2.0)
+    >>> settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    >>> testing.assert_spread(lambda image: reference.blur(image, settings), 2.0)
+    """
+    __tracebackhide__ = True
+    pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
+    for number in pair:
+        check_number("sigma", number, 0.0, math.inf)
+    check_number("rtol", rtol, 0.0, math.inf)
+    spread, error = measured_spread(bloom, probe, None)
+    _check_lit("assert_spread", spread, error)
+    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
+    for channel in range(spread.shape[2]):
+        for axis, name in ((0, "x"), (1, "y")):
+            profile = spread[:, :, channel].sum(axis=axis)
+            distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
+            found = _deviation(profile)
+            # The error of the variance is 2 sigma times the error of the standard deviation.
+            variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
+            allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
+            law = (
+                f"the standard deviation of the light of a pixel along {name} is "
+                f"{pair[axis]:.6g} pixels"
+            )
+            if not is_within(law, abs(found - pair[axis]), allowed):
+                fail(
+                    "assert_spread",
+                    law,
+                    f"it is {found:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
+                    f"{channel}: off by {abs(found - pair[axis]):.3g}, {allowed:.3g} allowed",
+                )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Response:
+    """Figures of a bloom's point spread for each value of a parameter.
+
+    All figures are of the first channel.
+
+    Parameters
+    ----------
+    parameter : str
+        Name of the parameter.
+    values : tuple
+        The N values of the parameter.
+    gain : ndarray of float64, shape (N,)
+        The sum of the light of a pixel of 1.
+    peak : ndarray of float64, shape (N,)
+        The largest value.
+    shift : ndarray of float64, shape (N, 2)
+        Shift of the centroid in pixels along x and y; NaN if there is no light.
+    sigma : ndarray of float64, shape (N, 2)
+        Standard deviation along x and y in pixels; NaN if there is no light, or if negative values
+        make the variance negative.
+    at_border : ndarray of float64, shape (N,)
+        Share of the light in the outermost pixels. If it is not small, the image cuts off light
+        and the other figures are too small.
+
+    See Also
+    --------
+    response : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, blur_scale):
+    ...     return reference.blur(image, vkbloom.Separable(blur_scale=blur_scale))
+    >>> found = testing.response(bloom, "blur_scale", [1.0, 2.0])
+    >>> bool(found.sigma[1, 0] > 1.9 * found.sigma[0, 0])
+    True
+    """
+
+    parameter: str
+    values: tuple[Any, ...]
+    gain: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    at_border: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        """Return a table."""
+        rows = [(self.parameter, "gain", "peak", "shift x, y", "sigma x, y", "at border")]
+        for index, value in enumerate(self.values):
+            rows.append(
+                (
+                    str(value),
+                    f"{self.gain[index]:.5g}",
+                    f"{self.peak[index]:.5g}",
+                    "{:.3g}, {:.3g}".format(*self.shift[index]),
+                    "{:.4g}, {:.4g}".format(*self.sigma[index]),
+                    f"{self.at_border[index]:.2g}",
+                )
+            )
+        widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+        return "\n".join(
+            "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+            for row in rows
+        )
+
+
+@checked
+def response(
+    bloom: Callable[..., NDArray[Any]],
+    parameter: str,
+    values: Sequence[Any],
+    probe: Probe = _DEFAULT,
+) -> Response:
+    """Measure the point spread of a bloom for each value of a parameter.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and the parameter as a keyword; returns an image of the same height and
+        width.
+    parameter : str
+        Name of the keyword.
+    values : sequence
+        Values of the parameter.
+    probe : Probe
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or `values` is empty.
+
+    See Also
+    --------
+    point_spread : The image that is measured.
+    assert_spread : Asserts one sigma.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image, sigma):
+    ...     weights = vkbloom.gaussian_weights(sigma)
+    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    ...     return reference.blur(image, settings)
+    >>> testing.response(bloom, "sigma", [1.0, 2.0]).sigma[:, 0].round(1)
+    array([1., 2.])
+    """
+    __tracebackhide__ = True
+    if not len(values):
+        raise ValueError("values: the sequence is empty; give at least one value")
+    rows = []
+    for value in values:
+        one = functools.partial(bloom, **{parameter: value})
+        spread = point_spread(one, probe)[:, :, 0]
+        total = float(spread.sum())
+        profiles = [spread.sum(axis=0), spread.sum(axis=1)]
+        shifts = [math.nan, math.nan]
+        if total:
+            shifts = [
+                _centroid(profile) - place
+                for profile, place in zip(profiles, probe.centre, strict=True)
+            ]
+        rows.append(
+            (
+                total,
+                float(spread.max()),
+                shifts,
+                [_deviation(profile) for profile in profiles],
+                border_share(spread),
+            )
+        )
+    gain, peak, shift, sigma, at_border = (
+        np.array(column, np.float64) for column in zip(*rows, strict=True)
+    )
+    return Response(
+        parameter=parameter,
+        values=tuple(values),
+        gain=gain,
+        peak=peak,
+        shift=shift,
+        sigma=sigma,
+        at_border=at_border,
+    )
+
+
+def measured_spread(
+    bloom: Bloom, probe: Probe, at: tuple[int, int] | None = None
+) -> tuple[Image, float]:
+    """Return the point spread and the error of its values."""
+    __tracebackhide__ = True
+    place = at or probe.centre
+    if not all(0 <= number < side for number, side in zip(place, probe.size, strict=True)):
+        raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
+    lit, lit_error = probe.apply(bloom, probe.point(place, probe.value))
+    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
+    return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
+
+
+def _check_lit(assertion: str, spread: Image, error: float) -> None:
+    """Raise AssertionError if the point spread is black."""
+    __tracebackhide__ = True
+    for channel in range(spread.shape[2]):
+        largest = float(np.abs(spread[:, :, channel]).max())
+        if largest <= error or not spread[:, :, channel].sum() > 0:
+            fail(
+                assertion,
+                "the bloom of a lit pixel is not black",
+                f"the largest value in channel {channel} is {largest:.3g}; more than {error:.3g} "
+                "is needed",
+            )
+
+
+def check_inside(share: float, size: tuple[int, int]) -> None:
+    """Raise ValueError if too large a share of the light reaches the border of the image."""
+    if share > _AT_THE_BORDER:
+        raise ValueError(
+            f"probe: of the light, {100 * share:.3g} % lies in the outermost pixels of an image of "
+            f"{size[0]} x {size[1]}; a larger size is needed"
+        )
+
+
+def border_share(plane: Image) -> float:
+    """Return the share of the light in the outermost pixels."""
+    total = float(np.abs(plane).sum())
+    inside = float(np.abs(plane[1:-1, 1:-1]).sum())
+    return (total - inside) / total if total else 0.0
+
+
+def _centroid(profile: Image) -> float:
+    return float((profile * np.arange(len(profile))).sum() / profile.sum())
+
+
+def _deviation(profile: Image) -> float:
+    """Return the standard deviation of a profile; NaN if the variance is negative."""
+    total = float(profile.sum())
+    if not total:
+        return math.nan
+    distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
+    variance = float((profile * distance**2).sum() / total)
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def _moment_error(plane: Image, error: float, axis: int, weights: Image) -> float:
+    """Return the error of a moment, for values with independent errors.
+
+    Pixels without light are exactly 0 and have no error. Independent errors add as the root of the
+    sum of squares; three times that is allowed.
+    """
+    lit = plane != 0
+    along = np.broadcast_to(weights if axis == 0 else weights[:, np.newaxis], plane.shape)
+    return 3 * error * math.sqrt(float((along[lit] ** 2).sum())) / abs(float(plane.sum()))

@@ -1,0 +1,310 @@
+"""Test images for a blur or bloom, and the check of the returned images."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import check_index, check_number, check_size
+
+__all__ = ["Bloom", "Image", "Probe"]
+
+#: An image in real units: integers are scaled to 0..1.
+Image: TypeAlias = NDArray[np.float64]
+
+#: The bloom under test: takes an image and returns one of the same height and width.
+Bloom: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
+
+#: (atol, rtol) by a result's dtype; rtol is relative to the largest value. Integers: two levels,
+#: half a level for each rounding in up to four buffers. Half: four roundings of 2**-11. Float: the
+#: accuracy of lavapipe's linear filter; filters in shader code are a hundred times as exact.
+_ERRORS: Final[Mapping[str, tuple[float, float]]] = {
+    "uint8": (2 / 255, 0.0),
+    "uint16": (2 / 65535, 0.0),
+    "float16": (0.0, 2e-3),
+    "float32": (0.0, 1e-4),
+    "float64": (0.0, 1e-4),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probe:
+    """The kind of test image for the laws, and the allowed errors of the results.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels. For laws of the complete point spread, no light may reach the
+        border of the image.
+    channels : int or None
+        1 to 4; None: images of shape (H, W). A fourth channel is alpha: it is 1 in all test images
+        and ignored in results.
+    dtype : str or dtype
+        Dtype of the images: "uint8", "uint16" (both 0 to 1 in real units), "float16", "float32" or
+        "float64".
+    value : float
+        The brightest value of an image in real units, at most 1 for integers. A method that clamps
+        or has a threshold is linear only on one side of it.
+    atol, rtol : float or None
+        Allowed error of a value, absolute and relative to the largest value of the result. If both
+        are None, they follow from the result's dtype: two levels for integers, 2e-3 for half, 1e-4
+        for float.
+    seed : int
+        Seed of the noise images.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A field is out of range or of another type.
+
+    See Also
+    --------
+    assert_superposition : One of the laws that take a probe.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> probe = testing.Probe(size=(32, 24), dtype="float16", value=4.0)
+    >>> probe.centre
+    (16, 12)
+    >>> testing.assert_gain(lambda image: image, 1.0, probe)
+    """
+
+    size: tuple[int, int] = (65, 65)
+    channels: int | None = 3
+    dtype: Any = "float32"
+    value: float = 1.0
+    atol: float | None = None
+    rtol: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", check_size("size", self.size))
+        if self.channels is not None:
+            check_index("channels", self.channels, 1, 4)
+        try:
+            dtype = np.dtype(self.dtype)
+        except TypeError:
+            raise TypeError(f"dtype: {self.dtype!r} is not a dtype") from None
+        if dtype.name not in _ERRORS:
+            raise ValueError(f"dtype: {dtype} is not one of {', '.join(_ERRORS)}")
+        object.__setattr__(self, "dtype", dtype)
+        largest = 1.0 if dtype.kind == "u" else float(np.finfo(dtype).max)
+        check_number("value", self.value, math.ulp(0.0), largest)
+        for name in ("atol", "rtol"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), 0.0, math.inf)
+
+    @property
+    def centre(self) -> tuple[int, int]:
+        """X and y of the middle pixel."""
+        return self.size[0] // 2, self.size[1] // 2
+
+    @property
+    def colours(self) -> int:
+        """Number of channels without alpha."""
+        return 1 if self.channels is None else min(self.channels, 3)
+
+    def flat(self, value: float) -> Image:
+        """Return an image of one value.
+
+        See Also
+        --------
+        point, noise : Other test images.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> testing.Probe(size=(3, 2), channels=None).flat(0.5)[..., 0]
+        array([[0.5, 0.5, 0.5],
+               [0.5, 0.5, 0.5]])
+        """
+        return np.full((self.size[1], self.size[0], self.colours), value)
+
+    def point(self, place: tuple[int, int], value: float) -> Image:
+        """Return a black image with one lit pixel at (x, y).
+
+        See Also
+        --------
+        flat, noise : Other test images.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> testing.Probe(size=(3, 2), channels=None).point((1, 0), 4.0)[..., 0]
+        array([[0., 4., 0.],
+               [0., 0., 0.]])
+        """
+        image = self.flat(0.0)
+        image[place[1], place[0]] = value
+        return image
+
+    def noise(self, index: int, highest: float) -> Image:
+        """Return random values of 0 to `highest`, rounded to the dtype.
+
+        See Also
+        --------
+        flat, point : Other test images.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> probe = testing.Probe(size=(3, 2))
+        >>> one, other = probe.noise(0, 2.0), probe.noise(1, 2.0)
+        >>> bool(one.max() <= 2), bool((one == other).any())
+        (True, False)
+        """
+        generator = np.random.default_rng((self.seed, index))
+        image = generator.random((self.size[1], self.size[0], self.colours)) * highest
+        return self._real(self._stored(image))
+
+    def apply(
+        self, bloom: Bloom, image: Image, *, exempt: tuple[int, int] | None = None
+    ) -> tuple[Image, float]:
+        """Return the bloom of an image, and the allowed error of its values.
+
+        Parameters
+        ----------
+        bloom : callable
+        image : ndarray of float64, shape (H, W, C)
+            In real units, C as in `colours`.
+        exempt : (int, int), optional
+            x and y of a pixel to ignore; it is 0 in the result.
+
+        Returns
+        -------
+        result : ndarray of float64, shape (H, W, C)
+            The result in real units, without alpha.
+        error : float
+
+        Raises
+        ------
+        TypeError
+            The bloom is not callable, or does not return an array of numbers.
+        ValueError
+            The result has another height, width or number of channels.
+        AssertionError
+            The result is not finite.
+
+        See Also
+        --------
+        values : The same for a bloom that was already computed.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> probe = testing.Probe(size=(3, 2), dtype="uint8")
+        >>> result, error = probe.apply(lambda image: image // 2, probe.flat(1.0))
+        >>> round(float(result.max()) * 255), round(error * 255)
+        (127, 2)
+        """
+        __tracebackhide__ = True
+        if not callable(bloom):
+            raise TypeError(f"bloom: {bloom!r} is not callable")
+        given = self.given(image)
+        return self.values(bloom(given), given, exempt=exempt)
+
+    def given(self, image: Image) -> NDArray[Any]:
+        """Return an image in the probe's dtype and number of channels, as input of a bloom.
+
+        Parameters
+        ----------
+        image : ndarray of float64, shape (H, W, C)
+            In real units, C as in `colours`.
+
+        Returns
+        -------
+        ndarray, shape (H, W) or (H, W, channels)
+
+        See Also
+        --------
+        apply : Calls a bloom with the result.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> probe = testing.Probe(size=(1, 1), channels=4, dtype="uint8")
+        >>> probe.given(probe.flat(0.2))
+        array([[[ 51,  51,  51, 255]]], dtype=uint8)
+        """
+        stored = self._stored(image)
+        if self.channels == 4:
+            opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
+            alpha = np.full((*stored.shape[:2], 1), opaque, self.dtype)
+            stored = np.concatenate([stored, alpha], axis=2)
+        return np.ascontiguousarray(stored[:, :, 0] if self.channels is None else stored)
+
+    def values(
+        self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
+    ) -> tuple[Image, float]:
+        """Check the result of a bloom for the input `given`.
+
+        Parameters
+        ----------
+        result : array_like
+        given : ndarray
+        exempt : (int, int), optional
+            x and y of a pixel to ignore; it is 0 in the result.
+
+        Returns
+        -------
+        result, error
+            As for `apply`, which has the same errors.
+
+        See Also
+        --------
+        apply : Also calls the bloom.
+
+        Examples
+        --------
+        >>> from vkbloom import testing
+        >>> probe = testing.Probe(size=(1, 1), channels=4, dtype="uint8")
+        >>> given = probe.given(probe.flat(0.2))
+        >>> probe.values(given, given)[0].round(3)
+        array([[[0.2, 0.2, 0.2]]])
+        """
+        __tracebackhide__ = True
+        if isinstance(result, Mapping):
+            raise TypeError(
+                "bloom: it returns a mapping; name the framebuffer, for example "
+                "lambda image: renderer.apply(image, settings)['bloom']"
+            )
+        array = np.asarray(result)
+        if array.dtype.name not in _ERRORS:
+            raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
+        whole = array[:, :, np.newaxis] if array.ndim == 2 else array
+        if whole.ndim != 3 or whole.shape[:2] != given.shape[:2]:
+            raise ValueError(f"bloom: it returns shape {array.shape} for {given.shape}")
+        if whole.shape[2] < self.colours:
+            raise ValueError(f"bloom: it returns {whole.shape[2]} channels for {self.colours}")
+        real = self._real(whole[:, :, : self.colours])
+        if exempt is not None:
+            real[exempt[1], exempt[0]] = 0
+        if not np.isfinite(real).all():
+            y, x, channel = (int(index) for index in np.argwhere(~np.isfinite(real))[0])
+            raise AssertionError(
+                f"the result is {real[y, x, channel]} at x {x}, y {y}, channel {channel}\n"
+                "  law: the bloom of finite values is finite"
+            )
+        atol, rtol = _ERRORS[array.dtype.name]
+        if self.atol is not None or self.rtol is not None:
+            atol, rtol = self.atol or 0.0, self.rtol or 0.0
+        return real, atol + rtol * float(np.abs(real).max())
+
+    def _stored(self, image: Image) -> NDArray[Any]:
+        if self.dtype.kind == "u":
+            largest = np.iinfo(self.dtype).max
+            rounded: NDArray[Any] = np.rint(np.clip(image, 0, 1) * largest).astype(self.dtype)
+            return rounded
+        with np.errstate(over="ignore"):
+            return image.astype(self.dtype)
+
+    @staticmethod
+    def _real(array: NDArray[Any]) -> Image:
+        values: Image = array.astype(np.float64)
+        return values / np.iinfo(array.dtype).max if array.dtype.kind == "u" else values

@@ -1,0 +1,259 @@
+"""References of a test module: lossless images, and the adapter that made them.
+
+A folder contains, for each name, ``<name>.json`` and the images that it lists:
+``<name>.<framebuffer>.png`` for integers, ``.exr`` for half and float, and
+``<name>.<framebuffer>.2.png`` and so on for further, equally valid references.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._io import image_reading, image_writing, safe_writing
+from vkbloom._io.images import Picture
+
+__all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
+
+#: Allowed names of references and framebuffers: safe as file names on every system.
+NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
+_FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
+_FILE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]*")
+_FORMAT: Final = 1
+
+# Extension, and OpenImageIO's name of the number type, by the array's dtype.
+_FILES: Final[Mapping[str, tuple[str, str]]] = {
+    "uint8": (".png", "uint8"),
+    "uint16": (".png", "uint16"),
+    "float16": (".exr", "half"),
+    "float32": (".exr", "float"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """The adapter, machine and version that made images.
+
+    - `adapter`, `driver`: None if they are not known.
+    - `cpu_vendor`: Vendor of the machine's CPU; software renderers round differently by vendor.
+    - `version`: Version of vkbloom.
+    - `driver_sha256`: Hash of a driver whose results are bit-equal on every machine; None for other
+      drivers.
+    """
+
+    adapter: str | None
+    driver: str | None
+    cpu_vendor: str
+    version: str
+    driver_sha256: str | None = None
+
+    @property
+    def summary(self) -> str:
+        """All fields except the version on one line; the hash is shortened."""
+        sha256 = f"SHA-256 {self.driver_sha256[:12]}" if self.driver_sha256 else None
+        made_by = [text for text in (self.adapter, self.driver, sha256) if text]
+        return ", ".join([*(made_by or ["arrays without an adapter"]), self.cpu_vendor])
+
+    @property
+    def machine(self) -> tuple[str | None, ...]:
+        """The fields that identify a machine: all but the version."""
+        return self.adapter, self.driver, self.cpu_vendor, self.driver_sha256
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Reference:
+    """Reference images, and their origin.
+
+    `images`: Images by framebuffer, in the order of the data flow.
+    """
+
+    images: Mapping[str, NDArray[Any]]
+    origin: Origin
+
+
+class ReferenceFolder:
+    """The references of one test module.
+
+    `path`: It is created when the first reference is written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def file(self, name: str) -> Path:
+        """Return the file that lists the references of a name."""
+        return self.path / f"{name}.json"
+
+    def names(self) -> list[str]:
+        """List the names that have references."""
+        return sorted(file.name.removesuffix(".json") for file in self.path.glob("*.json"))
+
+    def load(self, name: str) -> list[Reference]:
+        """Read the references of a name."""
+        return [
+            Reference(
+                images={
+                    entry["name"]: self._image(entry, self.file(name))
+                    for entry in listed["framebuffers"]
+                },
+                origin=Origin(**listed["origin"]),
+            )
+            for listed in self._listed(name)
+        ]
+
+    def write(
+        self, name: str, images: Mapping[str, NDArray[Any]], origin: Origin, *, add: bool
+    ) -> None:
+        """Write a reference.
+
+        `images`: (H, W) or (H, W, C) of up to 4 channels, uint8, uint16, float16 or float32.
+        """
+        check_name(name)
+        for framebuffer, image in images.items():
+            _check_image(framebuffer, image)
+        listed = self._listed(name)
+        kept = [
+            entry for entry in listed if add and Origin(**entry["origin"]).machine != origin.machine
+        ]
+        used = {entry["number"] for entry in kept}
+        number = next(n for n in range(1, len(used) + 2) if n not in used)
+        self.path.mkdir(parents=True, exist_ok=True)
+        entries = [
+            self._write_image(name, framebuffer, image, number)
+            for framebuffer, image in images.items()
+        ]
+        new = {"number": number, "origin": asdict(origin), "framebuffers": entries}
+        self._write_list(name, [*kept, new])
+        still_there = {entry["file"] for each in [*kept, new] for entry in each["framebuffers"]}
+        for entry in (entry for each in listed for entry in each["framebuffers"]):
+            if entry["file"] not in still_there:
+                (self.path / entry["file"]).unlink(missing_ok=True)
+
+    def _listed(self, name: str) -> list[dict[str, Any]]:
+        file = self.file(name)
+        try:
+            stored = file.read_bytes()
+        except FileNotFoundError:
+            return []
+        try:
+            content = json.loads(stored.decode())
+            references = content["references"]
+            if content["format"] != _FORMAT:
+                raise ValueError(f"format {content['format']!r} is not {_FORMAT}")
+            for listed in references:
+                Origin(**listed["origin"])
+                int(listed["number"])
+                for entry in listed["framebuffers"]:
+                    tuple(entry["shape"])
+                    np.dtype(entry["dtype"])
+                    if not _FRAMEBUFFER.fullmatch(entry["name"]):
+                        raise ValueError(f"{entry['name']!r} cannot name a framebuffer")
+                    if not _FILE.fullmatch(entry["file"]):
+                        raise ValueError(f"{entry['file']!r} is not in this folder")
+        except KeyError as error:
+            raise ValueError(f"{file}: not a list of references: no {error}") from error
+        except (ValueError, TypeError, AttributeError, RecursionError) as error:
+            raise ValueError(f"{file}: not a list of references: {error}") from error
+        found: list[dict[str, Any]] = references
+        return found
+
+    def _image(self, entry: Mapping[str, Any], listed_in: Path) -> NDArray[Any]:
+        file = self.path / entry["file"]
+        pixels = image_reading.load(file).pixels
+        shape = tuple(entry["shape"])
+        if pixels.dtype != np.dtype(entry["dtype"]) or pixels.shape != _with_channels(shape):
+            raise ValueError(
+                f"{file}: holds {pixels.dtype} of shape {pixels.shape}, not "
+                f"{entry['dtype']} of shape {shape}, as {listed_in.name} says"
+            )
+        return pixels.reshape(shape)
+
+    def _write_image(
+        self, name: str, framebuffer: str, image: NDArray[Any], number: int
+    ) -> dict[str, Any]:
+        suffix, numbers = _FILES[image.dtype.name]
+        counted = f".{number}" if number > 1 else ""
+        file = self.path / f"{name}.{framebuffer}{counted}{suffix}"
+        pixels = image.reshape(_with_channels(image.shape))
+        is_grey = pixels.shape[2] < 3
+        if is_grey:
+            # Channels of a grey image in a `Picture`: grey three times, then alpha.
+            pixels = pixels[:, :, [0, 0, 0, *range(1, pixels.shape[2])]]
+        picture = Picture.of_values(np.ascontiguousarray(pixels), numbers)
+        image_writing.save(
+            Picture(
+                pixels=picture.pixels,
+                encoding=None,
+                numbers=numbers,
+                grey=is_grey,
+                stored=picture.stored,
+            ),
+            file,
+        )
+        entry = {
+            "name": framebuffer,
+            "file": file.name,
+            "dtype": image.dtype.name,
+            "shape": list(image.shape),
+        }
+        written = self._image(entry, self.file(name))
+        if not np.array_equal(written, image, equal_nan=image.dtype.kind == "f"):
+            raise OSError(f"{file}: the values read back differ from the values written")
+        return entry
+
+    def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
+        text = json.dumps({"format": _FORMAT, "references": references}, indent=2)
+        safe_writing.write_file(self.file(name), f"{text}\n".encode())
+
+
+def check_name(name: str) -> None:
+    """Raise TypeError or ValueError if the name is not allowed for a reference."""
+    __tracebackhide__ = True
+    if not isinstance(name, str):
+        raise TypeError(f"name: {name!r} is not a str")
+    if not NAME.fullmatch(name):
+        raise ValueError(
+            f"name: {name!r} cannot name a reference; up to 100 letters, digits and _+,=.- are "
+            "needed, the first a letter, a digit or _"
+        )
+
+
+def cpu_vendor() -> str:
+    """Return the vendor of this machine's CPU, as the CPU reports it."""
+    try:
+        information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        information = ""
+    found = re.search(r"^(?:vendor_id|CPU implementer)\s*:\s*(\S+)", information, re.MULTILINE)
+    if found:
+        return found[1]
+    return os.environ.get("PROCESSOR_IDENTIFIER") or platform.processor() or platform.machine()
+
+
+def _check_image(framebuffer: str, image: NDArray[Any]) -> None:
+    if not _FRAMEBUFFER.fullmatch(framebuffer):
+        raise ValueError(
+            f"{framebuffer!r} cannot name a framebuffer; up to 100 letters, digits, _ and - are "
+            "needed, the first a letter or _"
+        )
+    if image.dtype.name not in _FILES:
+        raise ValueError(
+            f"{framebuffer}: {image.dtype} cannot be stored without loss; use {', '.join(_FILES)}"
+        )
+    if image.ndim not in (2, 3) or image.size == 0 or _with_channels(image.shape)[2] > 4:
+        raise ValueError(
+            f"{framebuffer}: shape {image.shape} is not (H, W) or (H, W, C) of up to 4 channels"
+        )
+
+
+def _with_channels(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return (*shape, 1) if len(shape) == 2 else shape

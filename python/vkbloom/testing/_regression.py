@@ -1,0 +1,496 @@
+"""The fixture `frame_regression`: compares framebuffers with approved references."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._checks import native_order
+from vkbloom._renderer.frames import Frames
+from vkbloom._version import installed_version
+from vkbloom._views.tolerances import Tolerances
+from vkbloom.testing import _report_parts as report_parts
+from vkbloom.testing._judging import Verdict, first_failure, judge
+from vkbloom.testing._records import Record
+from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
+
+__all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
+
+
+class FrameDifferenceWarning(UserWarning):
+    """An image passed, but differs by more than ``warn``.
+
+    See Also
+    --------
+    Tolerances : Has the limit `warn`.
+
+    Examples
+    --------
+    Make such a warning an error of the test:
+
+    >>> import warnings
+    >>> from vkbloom import testing
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", testing.FrameDifferenceWarning)
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """The options of the command line.
+
+    - `update`: Whether to replace the references of failed checks.
+    - `add`: Whether to write further references for failed checks, and keep the existing ones.
+    - `allow_missing`: Whether a check without a reference passes.
+    - `expect_adapter`: A part of the name or driver of the adapter that frames must come from.
+    - `parts`: Folder for the report's pictures of failed checks; None: no report.
+    """
+
+    update: bool = False
+    add: bool = False
+    allow_missing: bool = False
+    expect_adapter: str | None = None
+    parts: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """The arguments of a check."""
+
+    name: str
+    images: Mapping[str, NDArray[Any]]
+    origin: Origin
+    tolerances: Tolerances
+
+
+class FrameRegression:
+    """Compares frames with references; the type of the fixture `frame_regression`.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the references of the test's module.
+    test : str
+        The test's id, for messages.
+    name : str
+        Default name of the reference.
+    mode : Mode
+    records : list of dict
+        Each check appends its result.
+
+    See Also
+    --------
+    pytest_vkbloom.frame_regression : The fixture that gives it.
+    Tolerances : The limits of a comparison.
+
+    Examples
+    --------
+    A test in a module ``test_blur.py``, whose references are made by ``pytest --bloom-update``:
+
+    >>> def test_blur(bloom_renderer, frame_regression):
+    ...     image = np.full((16, 16, 4), 0.5, np.float32)
+    ...     frames = bloom_renderer.apply(image, vkbloom.Pyramid(levels=2))
+    ...     frame_regression.check(frames, atol=1e-3)
+    """
+
+    def __init__(
+        self, *, folder: Path, test: str, name: str, mode: Mode, records: list[Record]
+    ) -> None:
+        self._folder = ReferenceFolder(folder)
+        self._test = test
+        self._name = name
+        self._mode = mode
+        self._records = records
+        self._has_used_name = False
+
+    def check(
+        self,
+        frames: Frames | Mapping[str, NDArray[Any]] | NDArray[Any],
+        name: str | None = None,
+        *,
+        atol: float | None = None,
+        rtol: float | None = None,
+        fail_percent: float = 0.0,
+        hard_fail: float | None = None,
+        ssim: float | None = None,
+        flip: float | None = None,
+        warn: float | None = None,
+        allow_nan: bool = False,
+        exact: bool = False,
+        info: Mapping[str, str] | None = None,
+    ) -> None:
+        """Compare frames with their reference, and fail if they differ.
+
+        Each framebuffer is checked for shape and dtype, finiteness, equality (equal framebuffers
+        pass), tolerances, SSIM and FLIP, in this order. All framebuffers are compared, so that the
+        message can name the first failed one in the order of the data flow. If there are several
+        references, the frames must match one of them.
+
+        Parameters
+        ----------
+        frames : Frames, mapping of str to ndarray, or ndarray
+            Frames of vkbloom; framebuffers of another renderer by name, in the order of the data
+            flow; or one image. Arrays of shape (H, W) or (H, W, C) with up to 4 channels, uint8,
+            uint16, float16 or float32, top row first.
+        name : str, optional
+            Name of the reference within the test's module. Default: the test's name.
+        atol, rtol, fail_percent, hard_fail, warn
+            See `vkbloom.testing.Tolerances`; integers are scaled to 0..1. A difference above
+            `warn` that passes issues a `FrameDifferenceWarning`.
+        ssim, flip : float, optional
+            Smallest SSIM (scikit-image) and largest mean FLIP (OpenImageIO), in addition to the
+            tolerances. With ``atol=math.inf`` only these decide.
+        allow_nan : bool, default False
+            Whether NaN and infinity pass if the reference has the same.
+        exact : bool, default False
+            Whether every value must be equal to the reference's. The reference must have been made
+            by a driver with the same hash, whose results are bit-equal on every CPU. `Frames` of
+            the package ``vkbloom-lavapipe`` have a hash. Excludes all tolerances.
+        info : mapping of str to str, optional
+            "adapter", "driver" and "driver_sha256" that made the images, stored with a new
+            reference. `Frames` have their own.
+
+        Raises
+        ------
+        AssertionError
+            The frames differ, or there is no reference. The message names the position and the
+            remedy.
+        TypeError, ValueError
+            An argument is wrong, or a reference's file is damaged; with `exact`, the driver of the
+            frames has no hash, or no reference has the same one.
+        OSError
+            A file cannot be read or written.
+
+        See Also
+        --------
+        compare : With frames of the same test as the reference.
+        Tolerances : The limits.
+
+        Examples
+        --------
+        >>> def test_blur(bloom_renderer, frame_regression):
+        ...     image = np.full((16, 16, 4), 0.5, np.float32)
+        ...     frame_regression.check(bloom_renderer.apply(image), "grey", ssim=0.999)
+        """
+        __tracebackhide__ = True
+        if exact:
+            _check_alone(
+                atol=atol,
+                rtol=rtol,
+                fail_percent=fail_percent or None,
+                hard_fail=hard_fail,
+                ssim=ssim,
+                flip=flip,
+                warn=warn,
+            )
+        tolerances = Tolerances(
+            atol=0.0 if exact else atol,
+            rtol=rtol,
+            fail_percent=fail_percent,
+            hard_fail=hard_fail,
+            ssim=ssim,
+            flip=flip,
+            warn=warn,
+            allow_nan=allow_nan,
+        )
+        given = _Given(
+            self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
+        )
+        self._check_adapter(given.origin)
+        references = self._folder.load(given.name)
+        if exact:
+            references = self._of_one_driver(references, given)
+        if not references:
+            self._without_reference(given)
+            return
+        reference, verdicts = _closest(references, given)
+        if first_failure(verdicts) and (self._mode.update or self._mode.add):
+            self._write(given)
+            return
+        self._conclude(given, reference, verdicts, len(references))
+
+    def compare(
+        self,
+        actual: Frames | Mapping[str, NDArray[Any]] | NDArray[Any],
+        expected: Frames | Mapping[str, NDArray[Any]] | NDArray[Any],
+        name: str | None = None,
+        *,
+        atol: float | None = None,
+        rtol: float | None = None,
+        fail_percent: float = 0.0,
+        hard_fail: float | None = None,
+        ssim: float | None = None,
+        flip: float | None = None,
+        warn: float | None = None,
+        allow_nan: bool = False,
+        info: Mapping[str, Any] | None = None,
+        expected_info: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Compare frames with others of the same test, and report as `check` does.
+
+        Parameters
+        ----------
+        actual, expected : Frames, mapping of str to ndarray, or ndarray
+            As for `check`; `expected` replaces the reference files.
+        name : str, optional
+            Name in messages and the report.
+        atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
+            As for `check`.
+        info, expected_info : mapping of str to object, optional
+            "adapter" and "driver" that made `actual` and `expected`, for messages and the report:
+            an engine's name, or `Frames.info`. `Frames` have their own.
+
+        Raises
+        ------
+        AssertionError
+            The frames differ.
+        TypeError, ValueError
+            An argument is wrong.
+
+        See Also
+        --------
+        check : With reference files.
+        read_frame : Reads frames of an engine.
+
+        Examples
+        --------
+        >>> def test_two_passes(bloom_renderer, frame_regression):
+        ...     image = np.full((16, 16, 4), 0.5, np.float32)
+        ...     one = bloom_renderer.apply(image, vkbloom.Separable(direct=True))["bloom"]
+        ...     two = bloom_renderer.apply(image, vkbloom.Separable())["bloom"]
+        ...     frame_regression.compare(two, one, atol=1e-3)
+        """
+        __tracebackhide__ = True
+        tolerances = Tolerances(
+            atol=atol,
+            rtol=rtol,
+            fail_percent=fail_percent,
+            hard_fail=hard_fail,
+            ssim=ssim,
+            flip=flip,
+            warn=warn,
+            allow_nan=allow_nan,
+        )
+        if name is not None:
+            check_name(name)
+        given = _Given(
+            name or self._name, _images("actual", actual), _origin(actual, info), tolerances
+        )
+        reference = Reference(
+            images=_images("expected", expected), origin=_origin(expected, expected_info)
+        )
+        self._conclude(given, reference, judge(reference.images, given.images, tolerances), None)
+
+    def _chosen_name(self, name: str | None) -> str:
+        __tracebackhide__ = True
+        if name is not None:
+            check_name(name)
+            return name
+        if self._has_used_name:
+            raise ValueError(
+                "name: the test already has a check without a name; give this one a name"
+            )
+        self._has_used_name = True
+        return self._name
+
+    def _check_adapter(self, origin: Origin) -> None:
+        __tracebackhide__ = True
+        wanted = self._mode.expect_adapter
+        if wanted is None or origin.adapter is None:
+            return
+        if wanted.lower() not in f"{origin.adapter} {origin.driver or ''}".lower():
+            raise ValueError(
+                f"--bloom-expect-adapter={wanted}: the frames come from {origin.summary}"
+            )
+
+    def _of_one_driver(self, references: list[Reference], given: _Given) -> list[Reference]:
+        """Return the references that the driver of the given frames made.
+
+        Raises ValueError if the driver has no hash, or no reference has the same hash.
+        """
+        __tracebackhide__ = True
+        origin = given.origin
+        if not origin.driver_sha256:
+            raise ValueError(
+                f"exact: the driver of the frames has no hash ({origin.summary}), so its "
+                "results may differ between machines; use the driver of vkbloom-lavapipe, or "
+                "tolerances"
+            )
+        same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
+        if references and not same and not (self._mode.update or self._mode.add):
+            made_by = "; ".join(one.origin.summary for one in references)
+            raise ValueError(
+                f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
+                f"({origin.summary}), only of {made_by}; install that version of "
+                "vkbloom-lavapipe, or write a reference with --bloom-update or --bloom-add"
+            )
+        return same
+
+    def _without_reference(self, given: _Given) -> None:
+        __tracebackhide__ = True
+        if self._mode.update or self._mode.add:
+            self._write(given)
+            return
+        record = self._record(given, "missing", None)
+        if not self._mode.allow_missing:
+            record["message"] = message = (
+                f"{given.name}: there is no reference {self._folder.file(given.name)}. Create it "
+                "with --bloom-update, view it, and commit it with the tests"
+            )
+            raise AssertionError(message)
+
+    def _write(self, given: _Given) -> None:
+        __tracebackhide__ = True
+        for framebuffer, image in given.images.items():
+            if not given.tolerances.allow_nan and not np.isfinite(image).all():
+                raise ValueError(
+                    f"{given.name}: {framebuffer} has NaN or infinity; set allow_nan=True to store "
+                    "it as a reference"
+                )
+        self._folder.write(given.name, given.images, given.origin, add=self._mode.add)
+        self._record(given, "written", None)
+
+    def _conclude(
+        self,
+        given: _Given,
+        reference: Reference,
+        verdicts: tuple[Verdict, ...],
+        count: int | None,
+    ) -> None:
+        """Record the result; raise AssertionError if a framebuffer failed.
+
+        `count` is the number of references; None if the test gave the expected frames.
+        """
+        __tracebackhide__ = True
+        failure = first_failure(verdicts)
+        record = self._record(given, "failed" if failure else "passed", reference)
+        record["has_files"] = count is not None
+        record["first_failure"] = failure.name if failure else None
+        record["framebuffers"] = [
+            report_parts.figures(verdict, given.images) for verdict in verdicts
+        ]
+        if failure is None:
+            for verdict in verdicts:
+                if verdict.warning:
+                    text = f"{given.name}: {verdict.warning}"
+                    warnings.warn(text, FrameDifferenceWarning, stacklevel=3)
+            return
+        record["message"] = _message(given, verdicts, reference, count)
+        if self._mode.parts is not None:
+            record["part"] = report_parts.write(
+                self._mode.parts, verdicts, reference.images, given.images
+            )
+        raise AssertionError(record["message"])
+
+    def _record(self, given: _Given, outcome: str, reference: Reference | None) -> Record:
+        record: Record = {
+            "test": self._test,
+            "name": given.name,
+            "folder": str(self._folder.path),
+            "has_files": True,
+            "outcome": outcome,
+            "origin": given.origin.summary,
+            "reference_origin": reference.origin.summary if reference else None,
+            "first_failure": None,
+            "message": None,
+            "framebuffers": [],
+            "part": None,
+        }
+        self._records.append(record)
+        return record
+
+
+def name_of_test(test: str) -> str:
+    """Return the name of a reference for a test's name."""
+    plain = test.replace("::", ".")
+    if plain.endswith("]") and "[" in plain:
+        head, _, parameters = plain[:-1].partition("[")
+        plain = f"{head}-{parameters}"
+    cleaned = re.sub(r"[^A-Za-z0-9_+,=.-]", "-", plain)
+    if cleaned != plain or len(cleaned) > 100:
+        cleaned = f"{cleaned[:91]}-{hashlib.sha256(test.encode()).hexdigest()[:8]}"
+    return cleaned
+
+
+def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
+    """Return framebuffers by name, in native byte order."""
+    __tracebackhide__ = True
+    if isinstance(frames, np.ndarray):
+        frames = {"image": frames}
+    if not isinstance(frames, Mapping) or not frames:
+        raise TypeError(
+            f"{field}: {frames!r} is not Frames, a mapping of names to arrays, or an array"
+        )
+    images = {}
+    for name, image in frames.items():
+        if not isinstance(image, np.ndarray):
+            raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
+        images[name] = native_order(image)
+    return images
+
+
+def _check_alone(**tolerances: float | None) -> None:
+    """Raise ValueError if a tolerance is given."""
+    __tracebackhide__ = True
+    given = [name for name, value in tolerances.items() if value is not None]
+    if given:
+        raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")
+
+
+def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
+    known: Mapping[str, Any] = info or (frames.info if isinstance(frames, Frames) else {})
+    return Origin(
+        adapter=known.get("adapter"),
+        driver=known.get("driver"),
+        cpu_vendor=cpu_vendor(),
+        version=installed_version(),
+        driver_sha256=known.get("driver_sha256"),
+    )
+
+
+def _closest(
+    references: Sequence[Reference], given: _Given
+) -> tuple[Reference, tuple[Verdict, ...]]:
+    """Return a reference that matches; otherwise the one that fails last in the data flow."""
+    judged = [(each, judge(each.images, given.images, given.tolerances)) for each in references]
+
+    def depth(pair: tuple[Reference, tuple[Verdict, ...]]) -> float:
+        failure = first_failure(pair[1])
+        return float("inf") if failure is None else pair[1].index(failure)
+
+    return max(judged, key=depth)
+
+
+def _message(
+    given: _Given, verdicts: tuple[Verdict, ...], reference: Reference, count: int | None
+) -> str:
+    before: list[str] = []
+    for verdict in verdicts:
+        if not verdict.passed:
+            break
+        before.append(verdict.name)
+    lines = [
+        f"{given.name}: the first framebuffer that differs is {verdicts[len(before)].name}"
+        + (f" ({', '.join(before)}: right)" if before else "")
+    ]
+    for verdict in verdicts:
+        if verdict.identical:
+            lines.append(f"  {verdict.name}: equal")
+        elif verdict.passed:
+            lines.append(f"  {verdict.name}: within the tolerances")
+        for reason in verdict.reasons:
+            lines.append(f"  {verdict.name}: FAILED ({verdict.failed_at}): {reason}")
+        if verdict.diagnosis is not None and verdict.diagnosis.cause is not None:
+            lines.append(f"  {verdict.name}: cause: {verdict.diagnosis.summary}")
+    of_several = f" (the closest of {count})" if count and count > 1 else ""
+    now = given.origin.summary
+    lines.append(f"  reference{of_several}: {reference.origin.summary}; now: {now}")
+    return "\n".join(lines)

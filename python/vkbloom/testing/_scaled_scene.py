@@ -1,0 +1,262 @@
+"""Measures whether a bloom depends on the resolution."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import fail, is_within
+from vkbloom.testing._moving_light import area_sampled
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = [
+    "ResolutionResponse",
+    "assert_resolution_independent",
+    "check_independent",
+    "resolution_response",
+]
+
+_DEFAULT = Probe(size=(128, 128))
+_SCALES: Final = (0.5, 1.0, 2.0, 4.0)
+# Rings that the light is sorted into, for each pixel of distance, and pixels of the shorter side.
+_RINGS: Final = 4
+_FINE: Final = 512
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResolutionResponse:
+    """Figures of the bloom of one scene at several sizes.
+
+    All figures are computed from the first channel, after the bloom of a black image is subtracted.
+
+    Parameters
+    ----------
+    sizes : tuple of (int, int)
+        The N widths and heights in pixels.
+    r50, r90 : ndarray of float64, shape (N,)
+        Radius around the centroid that has 50 % and 90 % of the bloom's light, as a share of the
+        height; NaN without light.
+    peak : ndarray of float64, shape (N,)
+        The largest value of the bloom relative to the value of the light.
+
+    See Also
+    --------
+    resolution_response : Returns it.
+
+    Examples
+    --------
+    >>> from vkbloom import testing
+    >>> found = testing.resolution_response(lambda image: image, scales=(1, 2))
+    >>> found.peak
+    array([1., 1.])
+    >>> print(found)  # doctest: +SKIP
+    """
+
+    sizes: tuple[tuple[int, int], ...]
+    r50: NDArray[np.float64]
+    r90: NDArray[np.float64]
+    peak: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        """Return a table."""
+        rows: list[tuple[str, ...]] = [("size", "r50", "r90", "peak")]
+        for index, (width, height) in enumerate(self.sizes):
+            figures = (self.r50[index], self.r90[index], self.peak[index])
+            rows.append((f"{width} x {height}", *(f"{figure:.4g}" for figure in figures)))
+        return "\n".join("  ".join(cell.rjust(11) for cell in row) for row in rows)
+
+
+@checked
+def resolution_response(
+    bloom: Bloom,
+    scales: Sequence[float] = _SCALES,
+    *,
+    light: float = 1 / 32,
+    probe: Probe = _DEFAULT,
+) -> ResolutionResponse:
+    """Measure the bloom of one scene at several sizes.
+
+    The scene is a bright square in the middle of a black image. It is area-sampled: each image
+    is the exact box-filtered reduction of the larger ones, also by factors that are not integers.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns the bloom alone, of the same height and width.
+    scales : sequence of float
+        The sizes of the images, as factors of the probe's; both sides must become integers.
+    light : float
+        Side of the square, as a share of the height, above 0 to 1.
+    probe : Probe
+        The kind of image; `value` is the brightness of the square.
+
+    Returns
+    -------
+    ResolutionResponse
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    assert_resolution_independent : Asserts that the figures are the same.
+    response : The point spread along a parameter.
+
+    Examples
+    --------
+    The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
+
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     return reference.blur(image, vkbloom.Separable(blur_scale=4.0))
+    >>> found = testing.resolution_response(bloom, scales=(1, 2))
+    >>> bool(found.r90[1] < 0.7 * found.r90[0])
+    True
+    """
+    __tracebackhide__ = True
+    check_number("light", light, math.ulp(0.0), 1.0)
+    sizes = _sizes(scales, probe.size)
+    rows = []
+    for width, height in sizes:
+        one = dataclasses.replace(probe, size=(width, height))
+        side = light * height
+        share = area_sampled(one.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
+        scene = probe.value * np.repeat(share[:, :, np.newaxis], one.colours, axis=2)
+        lit = one.apply(bloom, scene)[0][:, :, 0]
+        lit -= one.apply(bloom, one.flat(0.0))[0][:, :, 0]
+        radii = _radii(lit, (0.5, 0.9))
+        rows.append((radii[0] / height, radii[1] / height, float(lit.max()) / probe.value))
+    r50, r90, peak = np.array(rows).T
+    return ResolutionResponse(sizes=sizes, r50=r50, r90=r90, peak=peak)
+
+
+@checked
+def assert_resolution_independent(
+    bloom: Bloom,
+    scales: Sequence[float] = _SCALES,
+    *,
+    radius: float = 0.1,
+    peak: float = 0.2,
+    light: float = 1 / 32,
+    probe: Probe = _DEFAULT,
+) -> None:
+    """Assert that a bloom looks the same at all sizes of the frame.
+
+    The law: the radii that contain 50 % and 90 % of the light are the same share of the height at
+    all sizes, and the peak of the bloom is the same. A method with a radius in pixels, or with a
+    number of levels that does not depend on the height, does not obey it.
+
+    Parameters
+    ----------
+    bloom : callable
+        As for `resolution_response`.
+    scales, light, probe
+        As for `resolution_response`.
+    radius, peak : float
+        Allowed difference of the largest and the smallest value, relative to the mean, for both
+        radii and for the peak.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, there is no light, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or an argument is out of range.
+
+    See Also
+    --------
+    resolution_response : Returns the figures.
+    assert_stable : The law of moving lights.
+
+    Examples
+    --------
+    >>> from vkbloom import reference, testing
+    >>> def bloom(image):
+    ...     sigma = image.shape[0] / 16
+    ...     weights = vkbloom.gaussian_weights(sigma)
+    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
+    ...     return reference.blur(image, settings)
+    >>> testing.assert_resolution_independent(bloom, scales=(0.5, 1))
+    """
+    __tracebackhide__ = True
+    check_number("radius", radius, 0.0, math.inf)
+    check_number("peak", peak, 0.0, math.inf)
+    check_independent(resolution_response(bloom, scales, light=light, probe=probe), radius, peak)
+
+
+def check_independent(found: ResolutionResponse, radius: float, peak: float) -> None:
+    """Raise AssertionError if radii or peak change by more than a share of their mean."""
+    __tracebackhide__ = True
+    for name, what, values, allowed in (
+        ("r50", "the radius of 50 % of the light", found.r50, radius),
+        ("r90", "the radius of 90 % of the light", found.r90, radius),
+        ("peak", "the peak of the bloom", found.peak, peak),
+    ):
+        share = "the light's value" if values is found.peak else "the height"
+        if not values.mean() > 0:
+            fail(
+                "assert_resolution_independent",
+                "the bloom of a light is not black",
+                f"{what} is {values.min():.3g} of {share}: only values above 0 are allowed",
+            )
+        low, high = int(values.argmin()), int(values.argmax())
+        change = float((values[high] - values[low]) / values.mean())
+        law = f"{what} is the same share of {share} at all sizes"
+        if not is_within(law, change, allowed, name):
+            fail(
+                "assert_resolution_independent",
+                law,
+                f"{what} is {values[low]:.4g} of {share} at {_shown(found.sizes[low])} and "
+                f"{values[high]:.4g} at {_shown(found.sizes[high])}: off by {change:.3g} of the "
+                f"mean, {allowed:.3g} allowed",
+            )
+
+
+def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+    if not len(scales):
+        raise ValueError("scales: the sequence is empty; give at least one scale")
+    found = []
+    for scale in scales:
+        check_number("scales", scale, 1e-3, 1e3)
+        width, height = (float(side * scale) for side in size)
+        if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
+            raise ValueError(
+                f"scales: {scale!r} makes {width:g} x {height:g} of an image of {_shown(size)}, "
+                "not integers; choose a scale or a size with integer sides"
+            )
+        found.append((int(width), int(height)))
+    return tuple(found)
+
+
+def _radii(plane: Image, shares: Sequence[float]) -> list[float]:
+    """Return the radii around the centroid that have shares of the light; NaN without light."""
+    total = float(plane.sum())
+    if not total > 0:
+        return [math.nan] * len(shares)
+    # The light is spread over the area of a pixel. This matters if there are few pixels.
+    fine = -(-_FINE // min(plane.shape))
+    plane = plane.repeat(fine, axis=0).repeat(fine, axis=1)
+    total *= fine**2
+    height, width = plane.shape
+    x = float(plane.sum(axis=0) @ np.arange(width)) / total
+    y = float(plane.sum(axis=1) @ np.arange(height)) / total
+    distance = np.hypot(np.arange(width) - x, (np.arange(height) - y)[:, np.newaxis])
+    rings = np.bincount((distance * _RINGS).astype(np.intp).ravel(), plane.ravel())
+    held = np.cumsum(rings) / total
+    return [float((np.argmax(held >= share) + 1) / _RINGS / fine) for share in shares]
+
+
+def _shown(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]}"

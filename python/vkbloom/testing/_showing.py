@@ -1,0 +1,174 @@
+"""What was measured of a bloom, as text, as plain values for JSON, and as a page."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import click
+import numpy as np
+
+from vkbloom._fit.result import diagram
+from vkbloom._fit.translating import lights
+from vkbloom._views.pictures import picture, png
+from vkbloom.psf._sampled import samples
+from vkbloom.testing._law_report import LawReport, LawRow
+from vkbloom.testing._measuring import VIEW, Measured
+
+_STYLE: Final = (
+    "body{font:15px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;"
+    "color-scheme:light dark}td,th{padding:2px 12px 2px 0;vertical-align:top;text-align:left}"
+    "td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
+    "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
+)
+_OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
+#: Colours of rows in a terminal, as `law_report.COLOURS` in HTML.
+_COLOURS: Final = {"required": "red", "broken": "yellow", "untested": "bright_black"}
+
+
+def as_text(found: Measured) -> str:
+    """Return tables for a terminal; broken laws are red if they are required, else yellow."""
+    lines = [f"{found.name}, on {found.device}", ""]
+    width, height = found.size
+    lines.append(f"passes at {width} x {height}{'':<10} ms")
+    for name, seconds in found.passes.items():
+        lines.append(f"  {name:<24}{1000 * seconds:8.3f}")
+    lines.append(f"  {'together':<24}{1000 * sum(found.passes.values()):8.3f}")
+    lines += ["", "figures", *(f"  {name:<24}{text}" for name, text in figures(found).items()), ""]
+    report = found.report
+    kinds = {row.name: report.kind(row) for row in report.rows}
+    for line in str(report).splitlines():
+        kind = kinds.get(line.partition(" ")[0].rstrip(":"), "held")
+        lines.append(click.style(line, fg=_COLOURS[kind]) if kind in _COLOURS else line)
+    return "\n".join(lines)
+
+
+def figures(found: Measured) -> dict[str, str]:
+    """Return the figures as words, by their name."""
+    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
+    sizes = ", ".join(f"{height}" for _, height in response.sizes)
+    texts = {
+        "gain of flat images": f"{found.report.gain:.4g}",
+        "energy of a pixel": f"{spread.energy:.4g} ({100 * spread.at_border:.2g} % at the border)",
+        "point spread": f"50 % within {spread.r50:g} and 90 % within {spread.r90:g} pixels, "
+        f"peak {spread.peak:.3g}",
+        "moving light": f"ripple {_percent(steady.ripple)}, jitter {steady.jitter:.2g} pixels, "
+        f"flicker {_percent(steady.flicker)} ({_percent(steady.shimmer)} beside a convolution), "
+        f"growth {_percent(steady.growth)}",
+        "radius of 90 %": f"{', '.join(_percent(value) for value in response.r90)} of the height "
+        f"at heights of {sizes}",
+        "veiling glare index": f"{found.veiling_glare_index:.3g} %",
+        "nearest preset": f"{found.nearest[0]}, {_percent(found.nearest[1])} off"
+        if found.nearest[0]
+        else "none: the bloom is black",
+    }
+    if found.subject.reference:
+        texts["from its reference"] = ", ".join(
+            f"{name} {off:.2g}" for name, off in found.subject.reference.items()
+        )
+    return texts
+
+
+def as_values(found: Measured) -> dict[str, Any]:
+    """Return everything as plain values; what is not a number is None."""
+    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
+    value: dict[str, Any] = _plain(
+        {
+            "name": found.name,
+            "adapter": found.device,
+            "settings": None if found.settings is None else found.settings.to_dict(),
+            "size": found.size,
+            "passes": [{"name": name, "seconds": s} for name, s in found.passes.items()],
+            "laws": {
+                row.name: {name: getattr(row, name) for name in _OF_A_LAW}
+                for row in found.report.rows
+            },
+            "gain": found.report.gain,
+            "energy": spread.energy,
+            "psf": {
+                name: getattr(spread, name)
+                for name in ("r50", "r90", "peak", "at_border", "radii", "encircled")
+            },
+            "stability": {
+                name: getattr(steady, name)
+                for name in ("ripple", "jitter", "flicker", "shimmer", "growth")
+            },
+            "resolution": {
+                name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
+            },
+            "veiling_glare_index": found.veiling_glare_index,
+            "reference": found.subject.reference or None,
+            "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
+            "required": found.report.required,
+            "passed": not broken(found.report),
+        }
+    )
+    return value
+
+
+def broken(report: LawReport) -> list[LawRow]:
+    """Return the required laws that are not held."""
+    return [row for row in report.rows if row.name in report.required and not row.held]
+
+
+def as_page(found: Measured) -> str:
+    """Return a page with tables, the point spread with its curve, and pictures."""
+    spread, subject = found.spread, found.subject
+    scene = lights(VIEW)
+    pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
+    times = "".join(
+        f'<tr><th scope="row">{html.escape(name)}</th>'
+        f'<td class="n">{1000 * seconds:.3f} ms</td></tr>'
+        for name, seconds in found.passes.items()
+    )
+    words = "".join(
+        f'<tr><th scope="row">{name}</th><td>{html.escape(text)}</td></tr>'
+        for name, text in figures(found).items()
+    )
+    lit = spread.radii > 0
+    curve = diagram(
+        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
+    )
+    shown = (
+        {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
+    )
+    shown |= {name: png(picture(image, name)) for name, image in pictures.items()}
+    images = "".join(
+        f'<figure><img src="data:image/png;base64,{base64.b64encode(data).decode()}" '
+        f'alt="{name}" width="{_width(name)}"><figcaption>{name}</figcaption></figure>'
+        for name, data in shown.items()
+    )
+    name = html.escape(found.name)
+    width, height = found.size
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom check: {name}</title>'
+        f"<style>{_STYLE}</style><body><h1>{name}</h1><p>On {html.escape(found.device)}.</p>"
+        f"<h2>Pictures</h2>{images}{curve}<h2>Laws</h2>"
+        f"{found.report._repr_html_()}"
+        f"<h2>Figures</h2><table>{words}</table>"
+        f"<h2>Passes at {width} x {height}</h2><table>{times}</table></body></html>\n"
+    )
+
+
+def _width(name: str) -> int:
+    return 256 if name.startswith("point") else 384
+
+
+def _percent(share: float) -> str:
+    return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
+
+
+def _plain(value: Any) -> Any:
+    """Return a value for JSON, which has neither NaN nor infinity."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

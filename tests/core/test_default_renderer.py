@@ -1,0 +1,131 @@
+"""The default renderer of the process, and functions that take a renderer."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.images import picture
+from tests.processes import output
+
+IMAGE = picture(24, 16)
+
+
+def test_functions_equal_the_methods(renderer: vkbloom.Renderer) -> None:
+    expected = renderer.apply(IMAGE, vkbloom.presets["kino"].replace(threshold=0.5))
+    found = vkbloom.apply(IMAGE, "kino", threshold=0.5, renderer=renderer)
+    assert {name: array.tobytes() for name, array in found.items()} == {
+        name: array.tobytes() for name, array in expected.items()
+    }
+    scene = vkbloom.Scene.ufo()
+    drawn = vkbloom.render(scene, size=(32, 18), blur_scale=2, renderer=renderer)
+    settings = vkbloom.Separable(blur_scale=2)
+    assert np.array_equal(drawn["final"], renderer.render(scene, settings, (32, 18))["final"])
+
+
+@pytest.mark.parametrize("call", ["apply", "map", "sweep", "plan", "vjp", "grid"])
+def test_a_presets_name_is_a_settings(renderer: vkbloom.Renderer, call: str) -> None:
+    def called(settings: Any) -> Any:
+        if call == "vjp":
+            return vkbloom.vjp(IMAGE, settings, renderer=renderer)[0]["final"].tobytes()
+        if call == "grid":
+            axes = {"intensity": [0.5, 1.0]}
+            return vkbloom.grid(IMAGE, settings, axes, progress=False, renderer=renderer)["final"]
+        if call == "plan":
+            return renderer.plan(IMAGE, settings)
+        if call == "apply":
+            return renderer.apply(IMAGE, settings)["final"].tobytes()
+        images, many = ([IMAGE], settings) if call == "map" else (IMAGE, [settings])
+        return [frames["final"].tobytes() for frames in getattr(renderer, call)(images, many)]
+
+    found, expected = called("kino"), called(vkbloom.presets["kino"])
+    assert found.equals(expected) if call == "grid" else found == expected
+    with pytest.raises(ValueError, match="unknown preset 'kinoo'; did you mean 'kino'"):
+        called("kinoo")
+
+
+def test_a_field_that_the_settings_lack_is_named(renderer: vkbloom.Renderer) -> None:
+    with pytest.raises(TypeError, match="'blur_scale'"):
+        vkbloom.apply(IMAGE, "kino", blur_scale=2, renderer=renderer)
+
+
+@pytest.mark.parametrize(("suffix", "preset"), [(".png", "photo"), (".exr", "bevy_natural")])
+def test_a_file_starts_from_the_settings_of_its_type(
+    renderer: vkbloom.Renderer, tmp_path: Path, suffix: str, preset: str
+) -> None:
+    path = vkbloom.write(tmp_path / f"a{suffix}", picture(24, 16, 3, dtype="float32"))
+    image = vkbloom.read(path, expand=4 if preset == "photo" else None)
+    for given in (path, str(path)):
+        frames = vkbloom.apply(given, renderer=renderer)
+        assert frames.settings == vkbloom.presets[preset]
+        assert np.array_equal(frames["final"], renderer.apply(image, preset)["final"])
+    plain = renderer.apply(vkbloom.read(path), "kino")["final"]
+    assert np.array_equal(vkbloom.apply(path, "kino", renderer=renderer)["final"], plain)
+
+
+def test_threads_share_one_renderer() -> None:
+    found: list[vkbloom.Renderer] = []
+    barrier = threading.Barrier(8)
+
+    def ask() -> None:
+        barrier.wait()
+        found.append(vkbloom.default_renderer())
+
+    threads = [threading.Thread(target=ask) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    try:
+        assert len(found) == 8
+        assert len({*map(id, found)}) == 1
+    finally:
+        found[0].close()
+    again = vkbloom.default_renderer()
+    assert again is not found[0]
+    again.close()
+
+
+# A thread holds the lock of the default renderer while the process forks.
+FORKED = """
+import os, threading, warnings
+import numpy as np
+import vkbloom
+from vkbloom._renderer import default
+warnings.simplefilter("ignore")
+image = np.ones((8, 8, 3), np.float32)
+parent = vkbloom.apply(image)["final"]
+first = vkbloom.default_renderer()
+with default._DEFAULT.lock:
+    child = os.fork()
+if child == 0:
+    same = np.array_equal(vkbloom.apply(image)["final"], parent)
+    print("child", same, vkbloom.default_renderer() is not first, flush=True)
+    raise SystemExit
+assert os.waitpid(child, 0)[1] == 0
+print("parent", vkbloom.default_renderer() is first)
+"""
+
+
+def test_a_forked_child_opens_its_own() -> None:
+    assert output("-c", FORKED).split() == ["child", "True", "True", "parent", "True"]
+
+
+# At exit, other functions may still use it; the validation layer reports what is not destroyed.
+AT_EXIT = """
+import atexit
+import numpy as np
+import vkbloom
+image = np.ones((8, 8, 3), np.float32)
+print(vkbloom.apply(image)["final"].shape)
+atexit.register(lambda: print(vkbloom.apply(image)["final"].shape))
+"""
+
+
+def test_the_exit_of_the_interpreter() -> None:
+    assert output("-c", AT_EXIT).split("\n")[:2] == ["(8, 8, 3)"] * 2

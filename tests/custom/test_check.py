@@ -1,0 +1,367 @@
+"""`vkbloom check`: planted faults are named by the law that they break."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from numpy.typing import NDArray
+from scipy import ndimage
+
+import vkbloom
+from vkbloom import Renderer, testing
+from vkbloom._cli.program import program
+from vkbloom._custom.compiler import find_compiler
+from vkbloom.testing import _measuring as measuring
+from vkbloom.testing._law_report import law_report
+from vkbloom.testing._programs import Program
+
+pytestmark = pytest.mark.usefixtures("kept_renderers")
+
+# Small images: the figures are the same, the blooms narrow.
+SMALL = ["--measure-size", "64x64", "--size", "64x48"]
+
+GAUSSIAN = """\
+vec4 hook() {{
+    vec4 sum = vec4(0.0), total = vec4(0.0);
+    for (int i = -12; i <= 12; i++) {{
+        float w = exp(-0.5 * float(i * i) / 9.0);
+        sum += w * {source}_texOff(vec2({along})), total += w;
+    }}
+    return sum / total;
+}}
+"""
+
+
+def chain(first: str, sizes: str = "") -> str:
+    """Return a file whose first pass is given; a Gaussian along both axes follows."""
+    return (
+        f"//!HOOK MAIN\n//!BIND GLOW\n{sizes}//!SAVE FIRST\nvec4 hook() {{ {first} }}\n"
+        "//!HOOK MAIN\n//!BIND FIRST\n//!SAVE ROWS\n//!WIDTH GLOW.w\n//!HEIGHT GLOW.h\n"
+        + GAUSSIAN.format(source="FIRST", along="i, 0")
+        + "//!HOOK MAIN\n//!BIND ROWS\n//!SAVE BLOOM\n//!WIDTH GLOW.w\n//!HEIGHT GLOW.h\n"
+        + GAUSSIAN.format(source="ROWS", along="0, i")
+    )
+
+
+SOUND = chain("return GLOW_texOff(0);")
+EIGHTH = "//!WIDTH GLOW.w 8 /\n//!HEIGHT GLOW.h 8 /\n"
+#: The laws that a correct Gaussian holds.
+HELD = [
+    "superposition",
+    "gain",
+    "symmetric",
+    "transposed",
+    "centroid_kept",
+    "separable",
+    "no_ringing",
+    "additive",
+    "unclamped",
+    "energy",
+    "colour",
+    "grey",
+    "channels",
+    "stability",
+    "finite",
+]
+
+
+@pytest.fixture(scope="module")
+def compiler() -> None:
+    try:
+        find_compiler()
+    except vkbloom.ShaderError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(autouse=True)
+def two_presets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Search the nearest of two presets, since all take seconds."""
+    few = {name: vkbloom.presets[name] for name in ("dual_kawase", "tutorial")}
+    monkeypatch.setattr(measuring, "presets", few)
+
+
+def checked(*words: str) -> tuple[Result, dict[str, Any]]:
+    done = CliRunner().invoke(program, ["check", *words, "--json"])
+    assert done.exit_code in {0, 1}, done.output
+    return done, json.loads(done.stdout)
+
+
+def of_text(folder: Path, text: str, *words: str) -> tuple[Result, dict[str, Any]]:
+    file = folder / "planted.hook"
+    file.write_text(text)
+    return checked(str(file), *SMALL, *words)
+
+
+@pytest.mark.usefixtures("compiler")
+def test_a_sound_bloom(tmp_path: Path) -> None:
+    done, found = of_text(tmp_path, SOUND, "--require", ",".join(HELD))
+    assert done.exit_code == 0, done.output
+    assert {name for name, law in found["laws"].items() if law["held"]} == set(HELD)
+    assert [one["name"] for one in found["passes"]][1:4] == ["first", "rows", "bloom"]
+    assert found["gain"] == 1
+    assert found["energy"] == pytest.approx(1, abs=1e-5)
+    # A Gaussian of 3 pixels: half of the light is within 1.18 sigma.
+    assert found["psf"]["r50"] == pytest.approx(1.1774 * 3, abs=0.5)
+    assert found["reference"] is None
+
+
+@pytest.mark.usefixtures("compiler")
+@pytest.mark.parametrize(
+    ("text", "laws"),
+    [
+        (chain("return GLOW_texOff(0.5);"), {"symmetric", "centroid_kept"}),
+        (chain("return 0.9 * GLOW_texOff(0);"), {"gain", "energy"}),
+        (
+            chain("return max(GLOW_texOff(0) - 0.4, 0.0);"),
+            {"superposition", "colour", "gain", "energy"},
+        ),
+        (
+            chain("return texelFetch(GLOW_raw, 8 * ivec2(gl_FragCoord), 0);", EIGHTH),
+            {"stability"},
+        ),
+    ],
+    ids=["half a texel", "lost energy", "a threshold per channel", "a pyramid that shimmers"],
+)
+def test_a_planted_fault_is_named(tmp_path: Path, text: str, laws: set[str]) -> None:
+    done, found = of_text(tmp_path, text, "--require", ",".join(laws))
+    assert done.exit_code == 1
+    for law in laws:
+        assert found["laws"][law]["held"] is False, law
+        assert f"required law {law}" in done.stderr
+    if "stability" not in laws:
+        unbroken = set(HELD) - laws - {"transposed", "no_ringing", "additive", "stability"}
+        assert all(found["laws"][law]["held"] for law in unbroken), found["laws"]
+
+
+@pytest.mark.usefixtures("compiler")
+def test_a_twin_page_and_parameters(tmp_path: Path) -> None:
+    examples = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
+    page = tmp_path / "page.html"
+    words = [str(examples / "forty_lines.hook"), "--spread", "2", *SMALL, "--html", str(page)]
+    twin = ["--reference", f"{examples / 'references.py'}:forty_lines", "--require", "reference"]
+    done, found = checked(*words, *twin)
+    assert done.exit_code == 0, done.output
+    assert found["settings"]["spread"] == 2
+    assert set(found["reference"]) == {"half", "rows", "bloom", "final"}
+    text = page.read_text()
+    assert text.count("data:image/png") == 3
+    assert "encircled energy" in text
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text("def twin(image, settings):\n    return {'bloom': 2 * image}\n")
+    done, found = checked(*words, "--reference", f"{wrong}:twin", "--require", "reference")
+    assert done.exit_code == 1
+    assert "bloom is off by" in found["laws"]["reference"]["message"]
+
+
+def test_a_preset() -> None:
+    done, found = checked("--preset", "dual_kawase", *SMALL, "--require", "symmetric,reference")
+    assert done.exit_code == 0, done.output
+    assert found["laws"]["bounded_fireflies"]["held"] is False
+    assert found["nearest_preset"]["name"] == "tutorial"
+
+
+FIREFLIES = {"unclamped"}
+#: Laws on colours and bright pixels that the formulas of engines break, and by what.
+BY_FORMULA = {
+    "jimenez2014": FIREFLIES,
+    "bevy_natural": FIREFLIES,
+    "unity_hdrp": FIREFLIES,
+    "photo": FIREFLIES,
+    # A limit for each channel, or a scale by the largest one.
+    "filament": {"unclamped", "colour"},
+    "godot_4_5": {"unclamped", "colour"},
+    "godot_4_6": {"unclamped", "colour"},
+    # A threshold of HSV's value, and colours of the ghosts and of the ends of the streaks.
+    "blender_simple_star": {"colour"},
+    "blender_ghosts": {"colour", "grey"},
+    "blender_streaks": {"colour", "grey"},
+    # Kernels whose channels differ.
+    "unreal_convolution": {"colour", "grey"},
+    "iris_6": {"colour", "grey"},
+    # Light leaves the picture, so that a flat one darkens towards its border.
+    "spencer_photopic": {"colour"},
+    "camera_lens": {"colour"},
+}
+
+
+@pytest.mark.parametrize("name", vkbloom.presets)
+def test_presets_are_blamed_for_what_their_formulas_do(renderer: Renderer, name: str) -> None:
+    subject = measuring.of_settings(renderer, vkbloom.presets[name], (48, 48), None)
+    report = law_report(subject, ("unclamped", "colour", "grey", "channels", "finite"))
+    assert {row.name for row in report.rows if not row.held} == BY_FORMULA.get(name, set())
+
+
+PROGRAM = """\
+import sys, vkbloom
+image = vkbloom.read(sys.argv[1])
+settings = vkbloom.Separable(weights=(0.5, 0.25), blur_strength=1.0)
+vkbloom.write(sys.argv[2], vkbloom.reference.blur(image, settings).astype("float32"))
+"""
+
+
+@pytest.fixture
+def copying(tmp_path: Path) -> str:
+    """A fast program: cp."""
+    return "cp {input} {output}"
+
+
+def every_other_pixel(image: NDArray[Any]) -> NDArray[Any]:
+    kept = np.zeros_like(image)
+    kept[::2, ::2] = 4 * image[::2, ::2]
+    return np.asarray(ndimage.gaussian_filter(kept, (4, 4, 0)))
+
+
+@pytest.mark.parametrize(
+    ("bloom", "words", "laws"),
+    [
+        (every_other_pixel, [], {"stability"}),
+        (lambda image: 0.97 * image, [], {"gain", "energy"}),
+        (lambda image: 1.97 * image, ["--less-input"], {"gain", "energy"}),
+        (lambda image: 0.97 * image, ["--gain", "0.97"], set()),
+        (lambda image: image[..., ::-1], [], {"colour", "channels"}),
+        (lambda image: np.minimum(image, 1), [], {"unclamped"}),
+        (lambda image: np.where(np.isnan(image).any(), np.nan, image), [], {"finite"}),
+        (lambda image: image, [], set()),
+    ],
+)
+def test_a_fault_of_a_program_is_named(
+    monkeypatch: pytest.MonkeyPatch, bloom: Callable[..., Any], words: list[str], laws: set[str]
+) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: bloom(image))
+    every = "stability,gain,energy,colour,channels,grey,unclamped,finite"
+    run = ["--command", "engine {input} {output}", *SMALL, *words, "--require", every]
+    monkeypatch.setattr(measuring, "presets", {})
+    monkeypatch.setattr(measuring, "nearest_preset", lambda *_: ("", math.nan))
+    done, found = checked(*run)
+    broken = {name for name in every.split(",") if found["laws"][name]["held"] is False}
+    if bloom is every_other_pixel:
+        broken &= laws
+    assert broken == laws
+    assert done.exit_code == bool(laws)
+
+
+def test_programs_and_files_move_the_same_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: image)
+    program = measuring.of_program(
+        Program(["cp", "{input}", "{output}"], ".exr", 1), (32, 32), None, less_input=False
+    )
+    alone = testing.stability(lambda image: image, steps=2, probe=testing.Probe(size=(32, 32)))
+    np.testing.assert_array_equal(program.stability.positions, alone.positions)
+    assert program.stability.flicker == alone.flicker == pytest.approx(0.75)
+    assert program.stability.shimmer == 0
+
+
+def test_what_is_required_is_tested(copying: str) -> None:
+    """A law that cannot be tested, as that of a reference, is not held."""
+    done, found = checked("--command", copying, *SMALL, "--require", "reference")
+    assert done.exit_code == 1
+    assert found["laws"]["reference"]["held"] is None
+
+
+@pytest.mark.parametrize(("require", "colour"), [("", "33"), ("symmetric,energy", "31")])
+def test_required_laws_have_another_colour(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, require: str, colour: str
+) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: 0.9 * np.roll(image, 1, 1))
+    page = tmp_path / "page.html"
+    words = ["--command", "a {input} {output}", *SMALL, "--require", require, "--html", str(page)]
+    text = CliRunner().invoke(program, ["check", *words], color=True).output
+    for law in ("symmetric", "energy"):
+        assert f"\x1b[{colour}m{law}" in text
+    assert ("color:#c33" in page.read_text()) == bool(require)
+    assert "+1 pixels along x (half a texel of the level at 1/2 of the size)" in text
+
+
+def test_a_program(copying: str) -> None:
+    done, found = checked("--command", copying, *SMALL, "--require", "superposition,gain,symmetric")
+    assert done.exit_code == 0, done.output
+    assert found["psf"]["r90"] == 0
+    assert found["settings"] is None
+    assert list(found["passes"][0]) == ["name", "seconds"]
+
+
+def test_a_program_that_blurs(tmp_path: Path) -> None:
+    script = tmp_path / "blur.py"
+    script.write_text(PROGRAM)
+    bloom = testing.command([sys.executable, str(script), "{input}", "{output}"])
+    image = np.zeros((9, 9, 3), np.float32)
+    image[4, 4] = 1
+    assert bloom(image)[3:6, 4, 0] == pytest.approx([0.125, 0.25, 0.125])
+
+
+@pytest.mark.parametrize(
+    ("script", "error", "words"),
+    [
+        ("sleep 9", TimeoutError, "did not end within 0.3 s"),
+        ("echo no licence; exit 3", ChildProcessError, "status 3; it said: no licence"),
+        ("kill -SEGV $$", ChildProcessError, "was ended by SIGSEGV"),
+        ("true", FileNotFoundError, "wrote no file"),
+        ("echo junk > $2", ValueError, "cannot be read"),
+        ("cp small.exr $2", ValueError, "wrote 4 x 3 pixels for 8 x 8"),
+        ("cp nan.exr $2", ValueError, "wrote nan at x 2, y 1"),
+    ],
+)
+def test_what_a_program_does_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, error: type, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    vkbloom.write("small.exr", np.ones((3, 4, 3), np.float32))
+    broken = np.ones((8, 8, 3), np.float32)
+    broken[1, 2] = np.nan
+    vkbloom.write("nan.exr", broken)
+    bloom = testing.command(["bash", "-c", script, "bash", "{input}", "{output}"], timeout=0.3)
+    with pytest.raises(error, match=words):
+        bloom(np.ones((8, 8, 3), np.float32))
+
+
+def test_a_program_of_8_bits_is_noted(copying: str) -> None:
+    bloom = testing.command(copying.split(), suffix=".png")
+    with pytest.warns(UserWarning, match="8 bits"):
+        bloom(np.full((8, 8, 3), 0.5, np.float32))
+    done, found = checked("--command", copying, "--suffix", ".png", *SMALL)
+    assert "it writes 8 bits" in done.stderr
+    assert found["laws"]["symmetric"]["held"]
+    assert found["laws"]["gain"]["held"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "give FILE, --preset NAME"),
+        (["missing.hook"], "there is no such file"),
+        (["--preset", "kino", "--require", "beauty"], "'beauty' is not one of superposition"),
+        (["--preset", "kino", "--command", "cp {input} {output}"], "cannot be combined"),
+        (["--command", "cp {input}"], "has no {output}"),
+        (["--preset", "kino", "--reference", "a.py:b"], "needs FILE"),
+    ],
+)
+def test_wrong_use(words: list[str], message: str) -> None:
+    done = CliRunner().invoke(program, ["check", *words])
+    assert done.exit_code == 2
+    assert message in done.output
+
+
+def test_a_program_that_fails_is_one_line() -> None:
+    done = CliRunner().invoke(program, ["check", "--command", "false {input} {output}"])
+    assert done.exit_code == 1
+    assert (
+        done.output == "vkbloom: command 'false': it failed with exit status 1; it said: nothing\n"
+    )
+
+
+def test_veiling_glare_of_a_flat_share() -> None:
+    """A bloom that spreads a tenth of the mean of the image."""
+    index = testing.veiling_glare_index(
+        lambda image: np.full_like(image, 0.1 * image.mean()), size=(40, 20), patch=(20, 10)
+    )
+    assert index == pytest.approx(100 * 0.1 * 0.75)
+    with pytest.raises(ValueError, match="patch: "):
+        testing.veiling_glare_index(lambda image: image, size=(40, 20), patch=20)

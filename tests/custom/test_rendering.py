@@ -1,0 +1,340 @@
+"""Custom methods are rendered as libplacebo renders them, by the renderer of all other methods."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom import Renderer, Settings, load_method, reference
+from vkbloom._cli.program import program
+from vkbloom._custom.compiler import find_compiler
+from vkbloom._settings.registry import METHODS
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
+COPY = "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return HOOKED_texOff(0); }\n"
+
+Array = NDArray[Any]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiler() -> None:
+    try:
+        find_compiler()
+    except vkbloom.ShaderError as error:
+        pytest.skip(str(error))
+
+
+def picture(width: int = 24, height: int = 16) -> Array:
+    random = np.random.default_rng(3)
+    return random.random((height, width, 4), np.float32) * 2
+
+
+def own(text: str, name: str = "tried", **fields: Any) -> Settings:
+    return load_method(text, name=name)(**{"format": "rgba32float", **fields})
+
+
+def difference(got: Array, want: Array) -> float:
+    return float(np.abs(got.astype(np.float64) - want).max())
+
+
+def test_frames_that_libplacebo_drew(renderer: Renderer, shared_data: Path) -> None:
+    folder = shared_data / "hooks"
+    inputs, outputs = np.load(folder / "inputs.npz"), np.load(folder / "outputs.npz")
+    for case in json.loads((folder / "index.json").read_text())["renders"]:
+        (file,) = case["hooks"]
+        settings = load_method(folder / file)(format="rgba32float", **case["params"])
+        frames = renderer.map([inputs[case["input"]]] * case["frames"], settings)
+        got = list(frames)[-1]["final"].astype(np.float64)
+        want = outputs[case["key"]].astype(np.float64)
+        error = np.abs(got - want)
+        assert (error <= case["atol"] + case["rtol"] * np.abs(want)).all(), case["key"]
+        assert error.mean() <= case["mean_atol"] + case["rtol"] * np.abs(want).mean(), case["key"]
+
+
+@pytest.mark.parametrize("name", ["forty_lines", "karis", "streak", "compute"])
+@pytest.mark.parametrize("size", [(40, 24), (33, 17)])
+def test_the_examples_and_their_twins(renderer: Renderer, name: str, size: tuple[int, int]) -> None:
+    twin = runpy.run_path(str(EXAMPLES / "references.py"))[name]
+    settings = load_method(EXAMPLES / f"{name}.hook", reference=twin)(format="rgba32float")
+    image = picture(*size)
+    expected = reference.apply(image, settings)
+    frames = renderer.apply(image, settings)
+    assert set(expected) | {"glow"} == set(frames)
+    for framebuffer, array in expected.items():
+        assert difference(frames[framebuffer], array) < 2e-4, framebuffer
+
+
+def test_a_file_without_bloom_makes_the_picture(renderer: Renderer) -> None:
+    image = picture()
+    settings = own(COPY.replace("return", "return 2.0 *"))
+    frames = renderer.apply(image, settings)
+    assert difference(frames["final"], 2 * image) < 1e-5
+    assert difference(frames["bloom"][..., :3], image[..., :3]) < 1e-5
+    with pytest.raises(ValueError, match="composites by itself"):
+        settings.replace(intensity=0.5)
+
+
+def test_saved_textures_are_framebuffers_and_a_param_runs_only_its_passes(
+    renderer: Renderer,
+) -> None:
+    settings = load_method(EXAMPLES / "forty_lines.hook")()
+    image = picture(64, 48)
+    assert list(renderer.apply(image, settings)) == [
+        "glow",
+        "half",
+        "rows",
+        "bloom",
+        "final",
+    ]
+    again = renderer.apply(image, settings.replace(spread=3.5))
+    assert list(again.timings) == ["rows", "bloom_own", "bloom", "final"]
+    again = renderer.apply(image, settings.replace(spread=3.5, exposure=1.0))
+    assert list(again.timings) == ["final"]
+
+
+RESOURCES = """\
+//!TEXTURE line
+//!SIZE 4
+//!FORMAT r8
+//!FILTER LINEAR
+//!BORDER REPEAT
+ff 00 00 00
+//!TEXTURE cube
+//!SIZE 2 1 2
+//!FORMAT rg16u
+0100 0200 0300 0400  0500 0600 0700 0800
+//!TEXTURE kept
+//!SIZE 8 8
+//!FORMAT r32f
+//!STORAGE
+
+//!BUFFER numbers
+//!VAR vec3 a
+//!VAR float b
+//!VAR float c[2]
+0000803f 00000040 00004040 00008040 0000a040 000000000000000000000000
+0000c040 000000000000000000000000
+//!BUFFER counts
+//!VAR uint n
+//!STORAGE
+
+//!HOOK MAIN
+//!BIND counts
+//!BIND kept
+//!COMPUTE 8 8
+//!WIDTH 8
+//!HEIGHT 8
+//!SAVE NOTHING
+void hook() {
+    ivec2 at = ivec2(gl_GlobalInvocationID);
+    if (at == ivec2(0)) n += 2u;
+    imageStore(kept, at, imageLoad(kept, at) + 0.5);
+    imageStore(out_image, at, vec4(0.0));
+}
+//!HOOK MAIN
+//!BIND HOOKED
+//!BIND line
+//!BIND cube
+//!BIND kept
+//!BIND numbers
+//!BIND counts
+vec4 hook() {
+    uvec4 texel = texelFetch(cube, ivec3(1, 0, 1), 0);
+    return vec4(float(n) + texture(line, 1.125).r, imageLoad(kept, ivec2(3)).r,
+                a.z + b + c[1], float(texel.r * 10u + texel.g) + float(frame) / 100.0);
+}
+"""
+
+
+def test_textures_buffers_and_their_state(renderer: Renderer) -> None:
+    settings = own(RESOURCES)
+    image = picture()
+    frames = [one["final"][2, 3] for one in renderer.map([image] * 3, settings)]
+    for place, values in enumerate(frames):
+        count = place + 1
+        expected = [2 * count + 1, 0.5 * count, 13, 78 + 0.02 * count]
+        np.testing.assert_allclose(values, expected, rtol=1e-6)
+    # Each call begins anew, also with the same image.
+    for _ in range(2):
+        assert renderer.apply(image, settings)["final"][2, 3, 0] == 3
+
+
+def test_the_random_number_repeats_and_differs_between_passes(renderer: Renderer) -> None:
+    text = "//!HOOK MAIN\n//!SAVE A\nvec4 hook() { return vec4(random); }\n"
+    settings = own(
+        text + text.replace("SAVE A", "BIND A").replace("random", "random, A_texOff(0).r, 0, 1")
+    )
+    values = [renderer.apply(picture(), settings)["final"][0, 0, :2] for _ in range(2)]
+    assert (values[0] == values[1]).all()
+    assert values[0][0] != values[0][1]
+    assert (values[0] >= 0).all()
+    assert (values[0] < 1).all()
+    other = renderer.apply(picture(), settings.replace(dither_seed=5))["final"][0, 0, :2]
+    assert (other != values[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("header", "line", "cause"),
+    [
+        ("//!WIDTH 0", 3, "a side of 0 pixels"),
+        ("//!HEIGHT 0 3 -", 3, "a side of -3 pixels"),
+        ("//!WIDTH 99999", 3, "out of range, 1 to 16384"),
+        ("//!WIDTH 1 0 /", 3, "1 0 / is not a finite number"),
+        ("//!WHEN 0 0 /", 3, "0 0 / is not a finite number"),
+        ("//!WIDTH 5", 1, r"\(5, 16\) at the end, not the frame's, \(24, 16\)"),
+    ],
+)
+def test_faults_that_depend_on_the_image(
+    renderer: Renderer, header: str, line: int, cause: str
+) -> None:
+    settings = own(COPY.replace("vec4 hook", f"{header}\nvec4 hook"))
+    with pytest.raises(ValueError, match=f"^<text>:{line}: .*{cause}"):
+        renderer.apply(picture(), settings)
+
+
+def test_a_later_stage_cannot_change_the_size(renderer: Renderer) -> None:
+    settings = own(COPY.replace("HOOK MAIN", "HOOK OUTPUT\n//!WIDTH 5"))
+    with pytest.raises(ValueError, match="only the stages RGB, NATIVE, MAIN"):
+        renderer.apply(picture(), settings)
+
+
+def test_a_texture_whose_pass_does_not_run_is_an_error(renderer: Renderer) -> None:
+    first = COPY.replace("BIND HOOKED", "BIND HOOKED\n//!SAVE A\n//!WHEN HOOKED.w 100 >")
+    settings = own(first + "//!HOOK MAIN\n//!BIND A\nvec4 hook() { return A_texOff(0); }\n")
+    with pytest.raises(ValueError, match=r"^<text>:7: BIND: 'A' was not saved"):
+        renderer.apply(picture(), settings)
+
+
+def test_a_method_is_registered_and_stored() -> None:
+    text = "//!PARAM radius\n//!TYPE int\n//!MINIMUM 1\n//!MAXIMUM 30\n4\n" + COPY
+    kind: Any = load_method(text, name="stored_one")
+    settings = kind(radius=20)
+    assert METHODS["stored_one"] is kind
+    assert Settings.from_json(settings.to_json()) == settings
+    assert pickle.loads(pickle.dumps(settings)) == settings
+    stored = settings.to_dict()
+    assert len(stored["sha256"]) == 64
+    load_method(text + "\n", name="stored_one")
+    with pytest.raises(ValueError, match="has another text"):
+        Settings.from_dict(stored)
+    METHODS.unregister("stored_one")
+    with pytest.raises(ValueError, match="load_method"):
+        Settings.from_dict(stored)
+    # A process that has not loaded it gets the text.
+    assert pickle.loads(pickle.dumps(settings)).radius == 20
+    METHODS.unregister("stored_one")
+
+
+def test_names_that_are_not_possible() -> None:
+    with pytest.raises(ValueError, match="'pyramid' is a method of vkbloom"):
+        load_method(COPY, name="pyramid")
+    with pytest.raises(ValueError, match="'a b' is not an identifier"):
+        load_method(COPY, name="a b")
+    with pytest.raises(ValueError, match="<text>:1: PARAM: 'exposure' is a name that all"):
+        load_method("//!PARAM exposure\n//!TYPE float\n1\n" + COPY)
+
+
+def test_values_of_parameters() -> None:
+    text = "//!PARAM mode\n//!TYPE ENUM int\nsoft\nhard\n"
+    text += "//!PARAM gain\n//!TYPE float\n//!MINIMUM 0\n1\n"
+    kind: Any = load_method(text + COPY, name="tried")
+    assert kind(mode="hard").mode == "hard"
+    assert kind(mode=1) == kind(mode="hard")
+    with pytest.raises(ValueError, match="mode: 'off' is not one of soft, hard"):
+        kind(mode="off")
+    with pytest.raises(ValueError, match="gain: -1"):
+        kind(gain=-1)
+
+
+def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:
+    text = "//!PARAM reference_white\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 1000\n100\n"
+    settings = own(text + COPY.replace("return", "return 0.01 * reference_white *"))
+    image = picture()
+    assert settings.reference_white == 100
+    assert difference(renderer.apply(image, settings)["final"], image) < 1e-6
+    doubled = renderer.apply(image, settings.replace(reference_white=200))
+    assert difference(doubled["final"], 2 * image) < 1e-6
+    for value in (0.5, 1001):
+        with pytest.raises(ValueError, match="reference_white"):
+            settings.replace(reference_white=value)
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_a_scene(renderer: Renderer, shading: Any) -> None:
+    settings = own(COPY.replace("return", "return 0.5 *"), format="rgba16float")
+    frames = renderer.render(vkbloom.Scene.ufo(), settings, (48, 32), shading=shading)
+    scene = frames["scene"][..., :3].astype(np.float64)
+    drawn = scene if shading == "forward" else 255 * scene
+    assert difference(frames["final"][..., :3], np.clip(0.5 * drawn, 0, 255)) <= 1
+
+
+def test_a_command_takes_a_file(tmp_path: Path) -> None:
+    vkbloom.write(tmp_path / "in.exr", picture()[..., :3])
+    words = ["apply", str(tmp_path / "in.exr"), "-o", str(tmp_path / "out.exr")]
+    words += ["--method", str(EXAMPLES / "forty_lines.hook"), "--spread"]
+    result = CliRunner().invoke(program, [*words, "3"])
+    assert result.exit_code == 0, result.output
+    result = CliRunner().invoke(program, [*words, "30"])
+    assert result.exit_code == 2
+    assert "spread: 30.0 is out of range, 0.5 to 6" in result.output
+
+
+LEVEL = """\
+//!HOOK MAIN
+//!BIND GLOW
+//!SAVE SMALL
+//!WIDTH GLOW.w 2 /
+//!HEIGHT GLOW.h 2 /
+#include "vkbloom/sampling.glsl"
+vec4 hook() {{ return {down}; }}
+//!HOOK MAIN
+//!BIND SMALL
+//!SAVE BLOOM
+//!WIDTH HOOKED.w
+//!HEIGHT HOOKED.h
+#include "vkbloom/sampling.glsl"
+vec4 hook() {{ return {up}; }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("down", "up", "like"),
+    [
+        (
+            "thirteen_taps(GLOW_raw, GLOW_pos)",
+            "tent(SMALL_raw, SMALL_pos, 1.5)",
+            vkbloom.Pyramid(levels=1, radius=1.5, format="rgba32float"),
+        ),
+        (
+            "kawase_down(GLOW_raw, GLOW_pos, 1.25)",
+            "kawase_up(SMALL_raw, SMALL_pos, 1.25)",
+            vkbloom.DualKawase(levels=1, offset=1.25, format="rgba32float"),
+        ),
+    ],
+    ids=["pyramid", "dual kawase"],
+)
+def test_the_filters_of_the_library(renderer: Renderer, down: str, up: str, like: Settings) -> None:
+    image = picture(40, 24)
+    wanted = reference.apply(image, like)["bloom"]
+    got = renderer.apply(image, own(LEVEL.format(down=down, up=up)))["bloom"]
+    assert difference(got[..., :3], wanted[..., :3]) < 3e-4
+
+
+def test_the_threshold_of_the_library(renderer: Renderer) -> None:
+    text = (
+        '//!HOOK MAIN\n//!BIND HOOKED\n//!SAVE BLOOM\n#include "vkbloom/light.glsl"\n'
+        "vec4 hook() {\n    vec4 c = HOOKED_texOff(0);\n"
+        "    return vec4(c.rgb * above_threshold(c.rgb, 1.0, 0.5), 1.0);\n}\n"
+    )
+    image = picture()
+    glow = renderer.apply(image, own(text, threshold=1.0, knee=0.5))
+    assert difference(glow["bloom"][..., :3], glow["glow"][..., :3]) < 1e-5

@@ -1,0 +1,275 @@
+"""Passes that are given at run time: SPIR-V and the names of what it reads."""
+
+from __future__ import annotations
+
+import gc
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom import Renderer, Scene, _core
+from vkbloom._renderer.sources import scene_arguments
+
+compiler = shutil.which("glslangValidator") or shutil.which("glslang")
+pytestmark = pytest.mark.skipif(compiler is None, reason="needs glslang")
+
+HEAD = "#version 450\nlayout(location = 0) out vec4 colour;\n"
+BLOCK = "layout(set = 0, binding = 0, std140) uniform Values { vec4 tint; } values;\n"
+FIRST = "layout(set = 0, binding = 1) uniform sampler2D first;\n"
+SECOND = "layout(set = 0, binding = 2) uniform sampler2D second;\n"
+TINT = (
+    HEAD + BLOCK + FIRST + "void main() { colour = values.tint * "
+    "textureLod(first, gl_FragCoord.xy / textureSize(first, 0), 0.0); }"
+)
+SUM = (
+    HEAD + FIRST + SECOND + "void main() { colour = texelFetch(first, ivec2(gl_FragCoord.xy), 0) "
+    "+ texelFetch(second, ivec2(gl_FragCoord.xy), 0); }"
+)
+COMPUTE = (
+    "#version 450\nlayout(local_size_x = 8, local_size_y = 4) in;\n"
+    + BLOCK
+    + FIRST
+    + "layout(set = 0, binding = 2) uniform writeonly image2D target;\n"
+    "void main() { ivec2 place = ivec2(gl_GlobalInvocationID.xy);\n"
+    "if (all(lessThan(place, imageSize(target))))\n"
+    "imageStore(target, place, values.tint * texelFetch(first, place, 0)); }"
+)
+
+Image = NDArray[np.float32]
+
+
+class Own:
+    """Settings of a method whose passes are given."""
+
+    method = "own"
+    format = "rgba32float"
+
+    def __init__(self, *passes: tuple[Any, ...], **fields: Any) -> None:
+        self.passes = passes
+        self.asked: list[Any] = []
+        vars(self).update(fields)
+
+    def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> Any:
+        self.asked.append((frame, buffers))
+        return self.passes
+
+
+@pytest.fixture(scope="module")
+def spirv(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("spirv")
+    return {
+        name: compiled(folder, text, stage)
+        for name, text, stage in (
+            ("tint", TINT, "frag"),
+            ("sum", SUM, "frag"),
+            ("compute", COMPUTE, "comp"),
+        )
+    }
+
+
+def compiled(folder: Path, text: str, stage: str) -> bytes:
+    source, target = folder / f"one.{stage}", folder / "one.spv"
+    source.write_text(text)
+    assert compiler
+    subprocess.run([compiler, "-V", str(source), "-o", str(target)], check=True)
+    return target.read_bytes()
+
+
+def floats(*values: float) -> bytes:
+    return struct.pack(f"{len(values)}f", *values)
+
+
+def picture(width: int = 32, height: int = 20) -> Image:
+    random = np.random.default_rng(5)
+    return random.random((height, width, 4), np.float32) * 3
+
+
+def run(renderer: Renderer, image: Image, settings: Own) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return all framebuffers, and the times of the passes that ran."""
+    source = _core.image_source(image)
+    return finish(renderer, source, settings)
+
+
+def finish(
+    renderer: Renderer, source: _core.Source, settings: Own
+) -> tuple[dict[str, Any], dict[str, float]]:
+    plan = renderer._core.plan(source, settings, None)
+    arrays = {name: np.empty(shape, dtype) for name, shape, dtype in plan.outputs}
+    times, _ = renderer._core.run(source, (plan,), (tuple(arrays.values()),)).wait()
+    return arrays, times[0]
+
+
+def tint(
+    spirv: dict[str, bytes], name: str, reads: str, *share: float, **more: Any
+) -> tuple[Any, ...]:
+    shader = _core.shader("tint", spirv["tint"])
+    size, shown = more.get("size", (32, 20)), more.get("shown", True)
+    return (name, shader, size, more.get("format"), (reads,), shown, floats(*share), None)
+
+
+def test_passes_make_the_bloom(renderer: Renderer, spirv: dict[str, bytes]) -> None:
+    image = picture()
+    half = tint(spirv, "half", "MAIN", 0.5, 0.5, 0.5, 0.5)
+    double = tint(spirv, "double", "GLOW", 2, 2, 2, 2, shown=False)
+    both = (
+        "bloom",
+        _core.shader("sum", spirv["sum"]),
+        (32, 20),
+        None,
+        ("half", "double"),
+        True,
+        b"",
+        None,
+    )
+    settings = Own(half, double, both, threshold=1.5, intensity=0.25)
+    frames, _ = run(renderer, image, settings)
+    assert settings.asked == [((32, 20), (32, 20))]
+    assert list(frames) == ["glow", "half", "bloom", "final"]
+    np.testing.assert_allclose(frames["half"], image / 2, rtol=1e-6)
+    luminance = image[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    glow = np.where(luminance[..., None] > 1.5, image[..., :3], 0)
+    np.testing.assert_allclose(frames["glow"][..., :3], glow, rtol=1e-6)
+    bloom = image[..., :3] / 2 + 2 * glow
+    np.testing.assert_allclose(frames["bloom"][..., :3], bloom, rtol=1e-6)
+    np.testing.assert_allclose(frames["final"][..., :3], image[..., :3] + bloom / 4, rtol=1e-6)
+
+
+def test_small_bloom_is_enlarged(renderer: Renderer, spirv: dict[str, bytes]) -> None:
+    small = tint(spirv, "bloom", "GLOW", 1, 1, 1, 1, size=(16, 10))
+    frames, _ = run(renderer, np.ones((20, 32, 4), np.float32), Own(small))
+    assert frames["bloom"].shape == (20, 32, 4)
+    np.testing.assert_allclose(frames["bloom"], 1, rtol=1e-6)
+
+
+def test_own_picture_takes_the_place_of_the_frame(
+    renderer: Renderer, spirv: dict[str, bytes]
+) -> None:
+    image = picture()
+    main = tint(spirv, "main", "MAIN", 3, 2, 1, 1)
+    frames, _ = run(renderer, image, Own(main, exposure=1.0))
+    assert list(frames) == ["glow", "main", "final"]
+    np.testing.assert_allclose(frames["final"][..., :3], image[..., :3] * (6, 4, 2), rtol=1e-6)
+
+
+@pytest.mark.parametrize("shading", ["forward", "deferred"])
+def test_passes_read_a_drawn_scene(
+    renderer: Renderer, spirv: dict[str, bytes], shading: Literal["forward", "deferred"]
+) -> None:
+    source = _core.scene_source(*scene_arguments(Scene.ufo(), (32, 20), shading, 0.0))
+    frames, _ = finish(renderer, source, Own(tint(spirv, "bloom", "MAIN", 1, 1, 1, 1)))
+    scene = frames["scene"].astype(np.float32) / (255 if shading == "forward" else 1)
+    np.testing.assert_allclose(frames["bloom"][..., :3], scene[..., :3], rtol=1e-6)
+
+
+def test_compute_pass_has_its_own_groups(renderer: Renderer, spirv: dict[str, bytes]) -> None:
+    image = picture(33, 19)
+    shader = _core.shader("compute", spirv["compute"])
+    one = ("bloom", shader, (33, 19), None, ("MAIN",), True, floats(2, 3, 4, 1), (8, 4))
+    frames, _ = run(renderer, image, Own(one))
+    np.testing.assert_allclose(frames["bloom"][..., :3], image[..., :3] * (2, 3, 4), rtol=1e-6)
+
+
+def test_gpu_runs_the_compute_shader_of_a_pass_in_its_place(
+    spirv: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    twin = COMPUTE.replace("values.tint *", "values.tint +").replace("y = 4", "y = 8")
+    shader = _core.shader("twin", spirv["tint"], compiled(tmp_path, twin, "comp"))
+    one = ("bloom", shader, (32, 20), None, ("MAIN",), True, floats(1, 1, 1, 1), None)
+    image = picture()
+    for variants, expected in (("gpu", image + 1), ("cpu", image), ("fragment", image)):
+        monkeypatch.setenv("VKBLOOM_VARIANT", variants)
+        with Renderer("software", validation=True) as renderer:
+            frames, _ = run(renderer, image, Own(one))
+        np.testing.assert_allclose(frames["bloom"], expected, rtol=1e-6)
+
+
+def test_changed_bytes_run_only_the_passes_after_them(
+    renderer: Renderer, spirv: dict[str, bytes]
+) -> None:
+    image = picture()
+
+    def settings(first: float, second: float) -> Own:
+        return Own(
+            tint(spirv, "first", "GLOW", *[first] * 4), tint(spirv, "bloom", "first", *[second] * 4)
+        )
+
+    run(renderer, image, settings(1, 1))
+    assert set(run(renderer, image, settings(1, 2))[1]) == {"bloom", "final"}
+    assert not run(renderer, image, settings(1, 2))[1]
+    assert set(run(renderer, image, settings(3, 2))[1]) == {"first", "bloom", "final"}
+
+
+def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
+    renderer: Renderer, spirv: dict[str, bytes], tmp_path: Path
+) -> None:
+    image = picture()
+    other = compiled(tmp_path, TINT.replace("values.tint *", "values.tint + "), "frag")
+
+    def settings(code: bytes) -> Own:
+        one = ("bloom", _core.shader("one", code), (32, 20), None, ("MAIN",), True)
+        return Own((*one, floats(1, 1, 1, 1), None))
+
+    run(renderer, image, settings(spirv["tint"]))
+    before = renderer._core.pipeline_count
+    gc.collect()
+    assert not run(renderer, image, settings(spirv["tint"]))[1]
+    assert renderer._core.pipeline_count == before
+    frames, times = run(renderer, image, settings(other))
+    assert set(times) == {"bloom", "final"}
+    assert renderer._core.pipeline_count == before + 1
+    np.testing.assert_allclose(frames["bloom"][..., :3], image[..., :3] + 1, rtol=1e-6)
+
+
+def test_shader_has_a_name_and_a_hash(spirv: dict[str, bytes]) -> None:
+    one, same = (_core.shader(name, spirv["tint"]) for name in ("one", "same"))
+    assert (one.name, one.hash) == ("one", same.hash)
+    assert len(one.hash) == 32
+    assert one.hash != _core.shader("one", spirv["sum"]).hash
+
+
+@pytest.mark.parametrize("code", [b"", b"\x03\x02\x23\x07", b"abcd" * 9, None])
+def test_what_is_not_spirv_is_refused(spirv: dict[str, bytes], code: bytes | None) -> None:
+    with pytest.raises(ValueError, match="is not SPIR-V"):
+        _core.shader("one", spirv["tint"][:-1] if code is None else code)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({0: ""}, "the name '' has not 1 to 31 bytes"),
+        ({0: "n" * 32}, "has not 1 to 31 bytes"),
+        ({0: "glow"}, "two images named glow"),
+        ({0: "other"}, "none writes bloom or main"),
+        ({0: "main", 2: (5, 5)}, "main is 5 x 5, which is not the frame's size, 32 x 20"),
+        ({2: (0, 5)}, "a size of 0 x 5"),
+        ({2: (1 << 20, 5)}, "out of this adapter's range"),
+        ({3: "bgra8unorm"}, "'bgra8unorm' is not a format of bloom buffers"),
+        ({4: ("bloom",)}, "bloom reads bloom, which no pass before it writes"),
+        ({4: ("later",)}, "reads later"),
+        ({4: ("MAIN",) * 17}, "reads 17 images, more than 16"),
+        ({6: bytes(1025)}, "1025 bytes of parameters, more than 1024"),
+        ({7: (0, 1)}, "a block without pixels"),
+    ],
+)
+def test_faulty_pass_is_refused(
+    renderer: Renderer, spirv: dict[str, bytes], change: dict[int, Any], message: str
+) -> None:
+    one = list(tint(spirv, "bloom", "MAIN", 1, 1, 1, 1))
+    for place, value in change.items():
+        one[place] = value
+    with pytest.raises(ValueError, match=message):
+        run(renderer, picture(), Own(tuple(one)))
+
+
+@pytest.mark.parametrize("passes", [5, [1], (1,), ((1, 2),)])
+def test_passes_that_are_no_tuples_are_refused(renderer: Renderer, passes: Any) -> None:
+    settings = Own()
+    settings.passes = passes
+    with pytest.raises(TypeError):
+        run(renderer, picture(), settings)
