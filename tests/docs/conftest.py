@@ -26,8 +26,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     save(Picture.of_values(photo, "half"), "photo.exr")
     write("photo.jpg", photo.astype(np.float32))
     np.save("picture.npy", photo)
-    (grid,) = blocks(ROOT / "docs" / "grids.md", "toml")
-    Path("grid.toml").write_text(grid)
     (own,) = blocks(ROOT / "docs" / "custom_methods.md", "glsl")
     Path("soft.hook").write_text(own)
     (twin,) = [

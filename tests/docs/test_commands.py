@@ -36,7 +36,6 @@ NOT_RUN: Final = {
     "python -m benchmarks --quick": "the same",
     "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
     "vkbloom view": "does not end, and needs a screen; tests/cli/test_view.py does",
-    "vkbloom grid --from grid.toml": "starts four workers; tests/cli/test_cli_grid.py does",
     "vkbloom grid --axis time=0:1:24": "needs the scheduler of a cluster",
 }
 # What `vkbloom check` measures, for the same laws in less time.

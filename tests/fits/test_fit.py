@@ -164,27 +164,24 @@ class TestFound:
         assert found.loss < 1e-3 < found.start_loss
         assert found.loss_name == (loss if isinstance(loss, str) else "<lambda>")
 
-    def test_coarse_to_fine(self, renderer: Renderer) -> None:
+    def test_coarse_to_fine(self, renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
         image = lamps(800, 96)
         sizes = []
         truth = Separable(blur_scale=2.4, threshold=1.2, knee=0.5)
+        target = target_of(truth, image=image)
+        apply = renderer.apply
 
-        class Watched:
-            """A renderer that keeps the widths of what it is given."""
+        def watched(image: vkbloom.Image, *arguments: Any, **options: Any) -> Any:
+            sizes.append(image.shape[1])
+            return apply(image, *arguments, **options)
 
-            def __getattr__(self, name: str) -> Any:
-                return getattr(renderer, name)
-
-            def apply(self, image: vkbloom.Image, *arguments: Any, **options: Any) -> Any:
-                sizes.append(image.shape[1])
-                return renderer.apply(image, *arguments, **options)
-
+        monkeypatch.setattr(renderer, "apply", watched)
         found = vkbloom.fit(
             image,
-            target_of(truth, image=image),
+            target,
             Separable(threshold=0.5, knee=0.5),
             ["blur_scale", "threshold"],
-            renderer=cast("Renderer", Watched()),
+            renderer=renderer,
             framebuffer="bloom",
         )
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(2.4, rel=0.01)
