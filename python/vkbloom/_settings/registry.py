@@ -53,14 +53,6 @@ class Registry(Named[type[Any]]):
         """Return whether the class was added at run time."""
         return isinstance(self._entries.get(name), type)
 
-    def class_named(self, name: str) -> type[Any] | None:
-        """Return the class with this name in Python; None if there is none."""
-        for key, source in self._entries.items():
-            own = source.partition(":")[2] if isinstance(source, str) else source.__name__
-            if own == name:
-                return self[key]
-        return None
-
 
 class Methods(Registry):
     """The settings classes of the methods, and the methods in NumPy."""
