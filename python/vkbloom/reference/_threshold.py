@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ._sampling import Array, sample
 from ._tape import joined
 
-__all__ = ["apply_threshold", "brightest", "firefly_weight", "luminance", "masked", "soften"]
+__all__ = [
+    "apply_threshold",
+    "brightest",
+    "firefly_weight",
+    "luminance",
+    "masked",
+    "smooth_step",
+    "soften",
+    "with_alpha",
+]
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -47,6 +58,18 @@ def firefly_weight(brightness: Array) -> Array:
     """Return 1 / (1 + brightness), with negative brightness as 0 (Karis, 2013)."""
     weight: Array = 1 / (1 + np.maximum(brightness, 0.0))
     return weight
+
+
+def smooth_step(share: Array) -> Array:
+    """Return x^2 (3 - 2 x) of a share x, clamped to 0..1."""
+    x = np.clip(share, 0, 1)
+    step: Array = x * x * (3 - 2 * x)
+    return step
+
+
+def with_alpha(colour: Sequence[float], channels: int) -> Array:
+    """Return the factors of an image's channels: of rgb the colour, of a fourth channel 1."""
+    return np.array([*colour, 1.0])[:channels]
 
 
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:

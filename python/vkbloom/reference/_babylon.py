@@ -1,0 +1,81 @@
+"""Bloom of Babylon.js' DefaultRenderingPipeline.
+
+From BabylonJS/Babylon.js: extractHighlights.fragment.fx @ bc81a5f32960, kernelBlur.fragment.fx
+@ 445b0404049f, bloomMerge.fragment.fx @ 02e530f440cd, thinBlurPostProcess.ts @ 076e49a15333,
+bloomEffect.ts @ 05c105649f04.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._image import BlurInput
+from ._sampling import Array, sample
+from ._threshold import luminance, masked
+
+if TYPE_CHECKING:
+    from vkbloom._methods.babylon import BabylonBloom
+
+__all__ = ["gain", "passes"]
+
+
+def passes(source: BlurInput, settings: BabylonBloom) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    "bright" has `scale` times the size of the frame, floored: one bilinear tap, which is kept where
+    its luminance is at least threshold^(1 / 2.2). down_0 is "bright", blurred along x, then along
+    y; each sample is two taps of a Gaussian. The bloom is down_0, bilinear.
+    """
+    height, width, _ = source.image.shape
+    size = (
+        max(1, math.floor(width * settings.scale)),
+        max(1, math.floor(height * settings.scale)),
+    )
+    bright = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
+    taps = _taps(settings)
+    horizontal = source.store(sample(bright, size, x_taps=taps))
+    blurred = source.store(sample(horizontal, size, y_taps=taps))
+    bloom = source.store.end(sample(blurred, source.size))
+    return {"bright": bright, "down_0": blurred, "bloom": bloom}
+
+
+def gain(settings: BabylonBloom, size: tuple[int, int]) -> float:
+    """Return the bloom of a flat image of 1: 1, or 0 above the threshold."""
+    weights = sum(weight for _, weight in _taps(settings))
+    return float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]) * weights**2
+
+
+def _prefilter(rgb: Array, settings: BabylonBloom) -> Array:
+    if settings.threshold is None:
+        return rgb
+    return np.where(luminance(rgb) >= settings.threshold ** (1 / 2.2), rgb, 0.0)
+
+
+def _tap_count(settings: BabylonBloom) -> int:
+    """Return the number of weights: the nearest to the kernel's size that is 1 modulo 4."""
+    wanted = math.floor(max(settings.kernel * settings.scale, 1) + 0.5)
+    for step in (0, -1, 1, -2, 2):
+        if wanted + step > 0 and (wanted + step) % 4 == 1:
+            return max(wanted + step, 3)
+    return max(wanted, 3)
+
+
+def _taps(settings: BabylonBloom) -> list[tuple[float, float]]:
+    """Return offset and weight of each sample, in pixels."""
+    count = _tap_count(settings)
+    middle = (count - 1) // 2
+    weights = np.exp(-4.5 * (2 * np.arange(count) / (count - 1) - 1) ** 2)
+    weights /= weights.sum()
+    taps = []
+    for i in range(0, middle + 1, 2):
+        j = min(i + 1, middle)
+        if i == j:
+            taps.append((0.0, float(weights[middle])))
+            continue
+        offset = i - middle + weights[j] / (weights[i] + weights[j])
+        weight = weights[i] + weights[j] / (2 if j == middle else 1)
+        taps += [(float(offset), float(weight)), (float(-offset), float(weight))]
+    return taps

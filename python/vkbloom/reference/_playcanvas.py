@@ -1,0 +1,62 @@
+"""Bloom of PlayCanvas' CameraFrame.
+
+From playcanvas/engine 2.23: frame-pass-bloom.js and downsample.js @ 1f7213d06f78, 2.22.0-beta.20
+@ 0aaef5e432c4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._image import BlurInput
+from ._levels import halved
+from ._pyramid import downsample
+from ._sampling import Array, sample
+from ._threshold import masked, soften
+from ._upsampling import combine, linear, tent
+
+if TYPE_CHECKING:
+    from vkbloom._methods.playcanvas import PlayCanvasBloom
+
+__all__ = ["gain", "passes"]
+
+
+def passes(source: BlurInput, settings: PlayCanvasBloom) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    "half" is one bilinear tap at half of the frame's size. down_0 has half of that size, and each
+    further level half of the one above, by 13 taps. The threshold is applied to down_0. up_k =
+    down_k + tent(up_k+1); the bloom is up_0, bilinear.
+    """
+    height, width, _ = source.image.shape
+    level = halved((width, height))
+    half = source.store(np.maximum(sample(source.image, level), 0))
+    image, downs = half, []
+    for k in range(_level_count(level, settings)):
+        level = halved(level)
+        image = downsample(image, level)
+        image = source.store(
+            masked(_thresholded(image, settings), source.mask) if k == 0 else image
+        )
+        downs.append(image)
+    return {"half": half, **combine(downs, source, upsample=tent, last=linear)}
+
+
+def gain(settings: PlayCanvasBloom, size: tuple[int, int]) -> float:
+    """Return the bloom of a flat image of 1: the number of levels."""
+    first = float(_thresholded(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    return first * _level_count(halved(size), settings)
+
+
+def _level_count(half: tuple[int, int], settings: PlayCanvasBloom) -> int:
+    return min(max(math.floor(math.log2(min(half))), 1), settings.blur_level)
+
+
+def _thresholded(rgb: Array, settings: PlayCanvasBloom) -> Array:
+    if not settings.threshold:
+        return rgb
+    half_width = settings.threshold / 2
+    return soften(rgb, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)

@@ -1,0 +1,99 @@
+"""Bloom of Unity's Post Processing Stack v2.
+
+From Unity-Technologies/PostProcessing @ 32c3155207d3: PostProcessing/Shaders/Builtins/Bloom.shader,
+PostProcessing/Shaders/Sampling.hlsl, PostProcessing/Runtime/Effects/Bloom.cs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._image import BlurInput
+from ._levels import halved
+from ._pyramid import downsample
+from ._sampling import Array, sample
+from ._threshold import masked, soften, with_alpha
+from ._upsampling import combine, tent
+
+if TYPE_CHECKING:
+    from vkbloom._methods.unity import PostProcessingBloom
+
+__all__ = ["gain", "passes"]
+
+
+def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    down_0 has half the size of the frame, less reduced along one axis by `anamorphic_ratio`; it is
+    clamped and thresholded. Each further level has half the size of the one above. All read 13
+    taps, with `fast` the mean of four. up_k = down_k + tent(up_k+1) and bloom = tent(up_0), whose
+    radius is a texel times a factor of 0.5 to 1.5 that follows from `diffusion` and the size; with
+    `fast` the tent is the mean of four samples.
+    """
+    height, width, channels = source.image.shape
+    first, count, radius = _plan((width, height), settings)
+
+    def reduced(image: Array, size: tuple[int, int]) -> Array:
+        return _box(image, size, 1.0) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
+
+    def enlarged(image: Array, size: tuple[int, int]) -> Array:
+        return _box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
+
+    level = first
+    downs = [source.store(masked(_prefilter(reduced(source.image, level), settings), source.mask))]
+    for _ in range(1, count):
+        level = halved(level)
+        downs.append(source.store(reduced(downs[-1], level)))
+    return combine(
+        downs,
+        source,
+        upsample=enlarged,
+        last=enlarged,
+        gain=with_alpha(settings.color, channels),
+    )
+
+
+def gain(settings: PostProcessingBloom, size: tuple[int, int]) -> float | Array:
+    """Return the bloom of a flat image of 1: the number of levels, times the colour."""
+    first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    total = first * _plan(size, settings)[1] * np.asarray(settings.color)
+    return total if np.ptp(total) else float(total[0])
+
+
+def _plan(
+    size: tuple[int, int], settings: PostProcessingBloom
+) -> tuple[tuple[int, int], int, float]:
+    """Return the size of the first level, the number of levels and the radius of the tent."""
+    ratio = settings.anamorphic_ratio
+    width = max(1, math.floor(size[0] / (2 - max(-ratio, 0))))
+    height = max(1, math.floor(size[1] / (2 - max(ratio, 0))))
+    halvings = math.log2(max(width, height)) + min(settings.diffusion, 10) - 10
+    count = min(max(math.floor(halvings), 1), 16)
+    return (width, height), count, 0.5 + halvings - math.floor(halvings)
+
+
+def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
+    limit = min(65504.0, _linear(settings.clamp))
+    # The clamp is not applied to alpha.
+    kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
+    if settings.threshold is None:
+        return kept
+    threshold = _linear(settings.threshold)
+    half_width = threshold * settings.knee + 1e-5
+    return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
+
+
+def _linear(value: float) -> float:
+    """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
+    if value > 1:
+        return float(value**2.2)
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+
+
+def _box(image: Array, size: tuple[int, int], distance: float) -> Array:
+    """Return the mean of four samples at a distance along both axes, in texels of the image."""
+    taps = [(-distance, 0.5), (distance, 0.5)]
+    return sample(image, size, taps, taps)
