@@ -6,49 +6,43 @@
 #include <stdio.h>
 #include <string.h>
 
-// A family of passes. Those whose weights depend on the brightness have an adjoint of their own.
+// A family of passes.
 struct family {
     const struct vkb_shader *shader;
-    vkb_transpose *transpose, *weighted;
+    vkb_transpose *transpose;
 };
 
 static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
 {
     static const struct family families[] = {
-        {&vkb_shader_composite_frag, vkb_transpose_composite, NULL},
-        {&vkb_shader_threshold_frag, vkb_transpose_threshold, NULL},
-        {&vkb_shader_blur_frag, vkb_transpose_blur, NULL},
-        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_groups},
-        {&vkb_shader_pyramid_up_frag, vkb_transpose_up, NULL},
-        {&vkb_shader_gather_frag, vkb_transpose_gather, NULL},
-        {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down, NULL},
-        {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up, NULL},
-        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_groups},
-        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_urp_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_kino_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_pygfx_down_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_filament_prefilter_frag, vkb_transpose_filament_reduction, NULL},
-        {&vkb_shader_filament_down_frag, vkb_transpose_filament_down, NULL},
-        {&vkb_shader_hdrp_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_hdrp_blur_frag, vkb_transpose_hdrp_blur, NULL},
-        {&vkb_shader_godot_blur_frag, vkb_transpose_godot_blur, NULL},
-        {&vkb_shader_godot_final_frag, vkb_transpose_godot_composite, NULL},
-        {&vkb_shader_blender_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_blender_down_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_blender_end_frag, vkb_transpose_blender_end, NULL},
-        {&vkb_shader_streaks_frag, vkb_transpose_streaks, NULL},
-        {&vkb_shader_ghosts_frag, vkb_transpose_flare, NULL},
-        {&vkb_shader_halo_frag, vkb_transpose_flare, NULL},
-        {&vkb_shader_dirt_frag, vkb_transpose_dirt, NULL},
-        {&vkb_shader_simple_star_comp, vkb_transpose_star, NULL},
-        {&vkb_shader_sun_beams_frag, vkb_transpose_sun_beams, NULL},
+        {&vkb_shader_composite_frag, vkb_transpose_composite},
+        {&vkb_shader_threshold_frag, vkb_transpose_threshold},
+        {&vkb_shader_blur_frag, vkb_transpose_blur},
+        {&vkb_shader_filter_frag, vkb_transpose_filter},
+        {&vkb_shader_pyramid_down_frag, vkb_transpose_groups},
+        {&vkb_shader_gather_frag, vkb_transpose_gather},
+        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_urp_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_kino_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_filament_prefilter_frag, vkb_transpose_filament_reduction},
+        {&vkb_shader_hdrp_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_hdrp_blur_frag, vkb_transpose_hdrp_blur},
+        {&vkb_shader_godot_blur_frag, vkb_transpose_godot_blur},
+        {&vkb_shader_godot_final_frag, vkb_transpose_godot_composite},
+        {&vkb_shader_blender_prefilter_frag, vkb_transpose_groups},
+        {&vkb_shader_blender_end_frag, vkb_transpose_blender_end},
+        {&vkb_shader_streaks_frag, vkb_transpose_streaks},
+        {&vkb_shader_ghosts_frag, vkb_transpose_flare},
+        {&vkb_shader_halo_frag, vkb_transpose_flare},
+        {&vkb_shader_dirt_frag, vkb_transpose_dirt},
+        {&vkb_shader_simple_star_comp, vkb_transpose_star},
+        {&vkb_shader_sun_beams_frag, vkb_transpose_sun_beams},
     };
 
     for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
         if (families[i].shader == pass->shader)
-            return pass->constants.firefly_filter ? families[i].weighted : families[i].transpose;
+            return families[i].transpose;
     return NULL;
 }
 

@@ -57,10 +57,10 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
         if (!vkb_levels_down(&levels, level, error))
             return false;
-        const struct vkb_pass_row row =
-            level ? vkb_scaled_down_row(&levels, false, from, levels.downs[level])
-                  : first_row(&levels, from);
-        if (!vkb_graph_add_pass(graph, &row, error))
+        const struct vkb_pass_row row = first_row(&levels, source->glow);
+        if (level ? !vkb_levels_reduce(&levels, settings->values.scale_x, settings->values.scale_y,
+                                       from, levels.downs[level], error)
+                  : !vkb_graph_add_pass(graph, &row, error))
             return false;
     }
     for (uint32_t level = 0; level + 1 < levels.count; ++level) {

@@ -1,7 +1,7 @@
 // Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
 // Assets/Kino/Bloom/Bloom.cs.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 #include <math.h>
 
@@ -17,6 +17,21 @@ static double choose_sizes(struct vkb_levels *levels)
     while (levels->count < count)
         levels->sizes[levels->count++] = size = vkb_halved(size);
     return 0.5 + lg - trunc(lg);
+}
+
+// A box of 4 x 4 texels, as four diagonal taps at a distance of one texel.
+static bool add_box(const struct vkb_levels *levels, bool firefly_filter, uint32_t from,
+                    uint32_t to, struct vkb_error *error)
+{
+    const struct vkb_side_taps sides = {1.0, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+
+    if (firefly_filter) {
+        row = vkb_groups_row(levels, GROUPS_BOX, from, to);
+        return vkb_graph_add_pass(levels->graph, &row, error);
+    }
+    vkb_filter_add(&row, 0, sides, sides);
+    return vkb_filter_end(levels, &row, error);
 }
 
 bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
@@ -38,11 +53,8 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
         if (!vkb_levels_down(&levels, level, error))
             return false;
-        struct vkb_pass_row row =
-            vkb_pyramid_row(&levels, &vkb_shader_box_down_frag, from, levels.downs[level]);
-        row.constants.groups = GROUPS_BOX;
-        row.constants.firefly_filter = settings->values.anti_flicker && level == 0;
-        if (!vkb_graph_add_pass(graph, &row, error))
+        if (!add_box(&levels, settings->values.anti_flicker && level == 0, from,
+                     levels.downs[level], error))
             return false;
     }
     return vkb_levels_combine(&levels, &combination, bloom, error);

@@ -1,17 +1,20 @@
 // This package's own chains of levels: the pyramid, which adds each level while it upsamples, and
 // dual Kawase, which does not.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
 {
+    const struct vkb_values *values = &levels->settings->values;
     const uint32_t from = level ? levels->downs[level - 1] : levels->source->glow;
 
     if (!vkb_levels_down(levels, level, error))
         return false;
-    const bool firefly_filter = levels->settings->values.firefly_filter && level == 0;
-    const struct vkb_pass_row row =
-        vkb_scaled_down_row(levels, firefly_filter, from, levels->downs[level]);
+    if (!values->firefly_filter || level > 0)
+        return vkb_levels_reduce(levels, values->scale_x, values->scale_y, from,
+                                 levels->downs[level], error);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_PYRAMID, from, levels->downs[level]);
+    vkb_set_steps(&row, values->scale_x, values->scale_y);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 
@@ -37,19 +40,35 @@ bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom
     return vkb_levels_combine(&levels, &combination, bloom, error);
 }
 
-static bool add_kawase(const struct vkb_levels *levels, const struct vkb_shader *fragment,
-                       uint32_t from, uint32_t to, struct vkb_error *error)
+// Dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times the
+// centre, and four diagonal taps at a distance of half a texel times the offset.
+static bool add_kawase_down(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                            struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0};
+    const struct vkb_side_taps sides = {0.5 * levels->settings->values.offset, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
 
-    row.block = VKB_BLOCK_kawase;
-    vkb_params_read(row.block, &levels->settings->values, &row.params);
-    // The threshold pass has applied it.
-    row.params.kawase.threshold = 0.0f;
-    row.params.kawase.knee = 0.0f;
-    VKB_SET_TARGET(&row, kawase, &levels->graph->images[to]);
-    row.reach += row.params.kawase.offset;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_filter_add(&row, 0, centre, centre);
+    vkb_filter_add(&row, 1, sides, sides);
+    return vkb_filter_end(levels, &row, error);
+}
+
+// Up: four axial taps at a distance of one texel of the smaller level times the offset, and four
+// diagonal ones at half that distance with twice the weight.
+static bool add_kawase_up(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                          struct vkb_error *error)
+{
+    const double distance = levels->settings->values.offset;
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {distance, 1.0, 0.0};
+    const struct vkb_side_taps diagonal = {0.5 * distance, 1.0, 0.0};
+    const struct vkb_side_taps twice = {0.5 * distance, 2.0, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0 / 12.0);
+
+    vkb_filter_add(&row, 0, axial, centre);
+    vkb_filter_add(&row, 1, centre, axial);
+    vkb_filter_add(&row, 2, diagonal, twice);
+    return vkb_filter_end(levels, &row, error);
 }
 
 bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
@@ -61,12 +80,12 @@ bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_b
     vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
     for (uint32_t level = 0; level < levels.count; ++level, from = to)
         if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &to, error)
-            || !add_kawase(&levels, &vkb_shader_kawase_down_frag, from, to, error))
+            || !add_kawase_down(&levels, from, to, error))
             return false;
     for (uint32_t level = levels.count - 1; level-- > 0; from = to)
         if (!vkb_levels_image(&levels, "up_%u", level, levels.sizes[level], &to, error)
-            || !add_kawase(&levels, &vkb_shader_kawase_up_frag, from, to, error))
+            || !add_kawase_up(&levels, from, to, error))
             return false;
     return vkb_levels_image(&levels, "bloom", 0, source->final, bloom, error)
-        && add_kawase(&levels, &vkb_shader_kawase_up_frag, from, *bloom, error);
+        && add_kawase_up(&levels, from, *bloom, error);
 }

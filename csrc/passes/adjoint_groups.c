@@ -92,9 +92,8 @@ static void take_params(const struct vkb_pass_row *pass, struct vkb_prefilter_pa
     memset(params, 0, sizeof *params);
     params->target_width = pass->params.pyramid.target_width;
     params->target_height = pass->params.pyramid.target_height;
-    const bool unit = pass->shader != &vkb_shader_pyramid_down_frag;
-    params->step_x = unit ? 1.0f : pass->params.pyramid.step_x;
-    params->step_y = unit ? 1.0f : pass->params.pyramid.step_y;
+    params->step_x = pass->params.pyramid.step_x;
+    params->step_y = pass->params.pyramid.step_y;
 }
 
 // The groups by the shader of the forward pass.
@@ -104,7 +103,6 @@ static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
         const struct vkb_shader *shader;
         enum vkb_mode groups;
     } known[] = {
-        {&vkb_shader_box_down_frag, GROUPS_BOX},
         {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
         {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
         {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},

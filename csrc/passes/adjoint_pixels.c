@@ -62,7 +62,8 @@ static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 static bool is_clamped(const struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].shader == &vkb_shader_pygfx_down_frag
+        if (graph->passes[i].constants.groups == GROUPS_PYGFX
+            || graph->passes[i].constants.groups == GROUPS_PYGFX_KARIS
             || graph->passes[i].shader == &vkb_shader_urp_prefilter_frag)
             return true;
     return false;

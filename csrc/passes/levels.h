@@ -71,19 +71,14 @@ void vkb_reach_nine(struct vkb_pass_row *row);
 // Makes a prefilter multiply its result by the mask of the source, if there is one.
 void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
 
-// The row of a downsampling with the pyramid's 13 taps, with or without a firefly filter.
-struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                 uint32_t from, uint32_t to);
+// The row of a downsampling that weights groups of its taps by brightness (GROUPS_*): the pyramid's
+// 13, or some of them, one texel apart.
+struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
+                                   uint32_t from, uint32_t to);
 
-// The same with the settings' scale of the taps' distances.
-struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                        uint32_t from, uint32_t to);
-
-// Whether a row is such a downsampling from exactly twice the size, or an upsampling to exactly
-// twice the size. Then its taps are on integer texels. (Not with a firefly filter, which weights
-// groups of taps.)
-bool vkb_halves(const struct vkb_pass_row *pass);
-bool vkb_doubles(const struct vkb_pass_row *pass);
+// A pass that downsamples with the pyramid's 13 taps, whose inner ones are at these distances.
+bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
+                       uint32_t to, struct vkb_error *error);
 
 // The kernel of a separable blur while downsampling.
 struct vkb_kernel {

@@ -1,9 +1,8 @@
 // Variants of downsampling to exactly half the size and of upsampling to exactly twice the size.
 #include "variants/variant.h"
 
-#include "passes/levels.h"
+#include "passes/filter.h"
 
-#include <math.h>
 #include <string.h>
 
 static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
@@ -11,8 +10,6 @@ static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_
 static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(halve_taps);
 static const struct vkb_shader *const reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
-static const struct vkb_shader *const grid_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(halve_grid);
 static const struct vkb_shader *const shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
 static const struct vkb_shader *const godot_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(godot_rows);
@@ -69,52 +66,28 @@ static bool loads_to_double(const struct vkb_variant_choice *choice,
              : choice->device->limits.maxComputeWorkGroupInvocations >= invocations;
 }
 
-// If a threshold pass writes the larger level, adds a fused pass that reads the image itself. It
-// may replace `halving`, the variant of `pass`.
-static bool add_halved_image(const struct vkb_variant_choice *choice,
-                             const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
-                             struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    struct vkb_pass_row row;
-
-    if (!threshold)
-        return true;
-    memcpy(&row, halving, sizeof row);
-    row.reads[0] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    row.constants.format =
-        vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
-    VKB_TAKE_THRESHOLD(&row, pyramid, threshold);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
     struct vkb_pass_row row;
 
-    *fits = vkb_halves(pass) && loads(choice, pass);
+    *fits = vkb_filter_exact(pass) == EXACT_HALF && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
+    vkb_drop_reads(&row, 1);
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && add_halved_image(choice, pass, &row, error);
+        && vkb_add_thresholded(choice, pass, &row, error);
 }
 
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
-    if (pass->shader == &vkb_shader_pyramid_down_frag)
-        return pass->params.pyramid.step_x == 1.0f && pass->params.pyramid.step_y == 1.0f;
-    return !pass->constants.masked
-        && (pass->shader == &vkb_shader_pygfx_down_frag
-            || pass->shader == &vkb_shader_blender_down_frag
-            || pass->shader == &vkb_shader_box_down_frag);
+    return pass->block == VKB_BLOCK_pyramid && pass->params.pyramid.step_x == 1.0f
+        && pass->params.pyramid.step_y == 1.0f && !pass->constants.masked;
 }
 
 // Whether the target has exactly half of the size of the image that the pass reads.
@@ -151,7 +124,7 @@ bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vk
          && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
          && vkb_fits_words(choice, pass);
     return !*fits
-        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, FILTER_ROWS, error);
+        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, GATHER_ROWS, error);
 }
 
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -248,58 +221,8 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
          && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
     if (!*fits)
         return true;
-    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
+    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, GATHER_ROWS, error)
                 : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
-}
-
-// Turns a pass with bilinear taps in three rows and columns into one of halve_grid.comp. False: it
-// has none, or they are at other distances.
-static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
-{
-    struct vkb_kawase_params *params = &row->params.kawase;
-
-    memcpy(row, pass, sizeof *row);
-    row->block = VKB_BLOCK_kawase;
-    if (pass->shader == &vkb_shader_filament_down_frag) {
-        memset(&row->params, 0, sizeof row->params);
-        // The distance of the taps is half of the offset.
-        params->offset = 2.0f * (float)FILAMENT_OFFSET;
-        params->limit = pass->params.pyramid.limit;
-        params->row_offset = pass->params.pyramid.row_offset;
-    } else if (pass->shader != &vkb_shader_kawase_down_frag) {
-        return false;
-    }
-    const float distance = 0.5f * params->offset;
-    const bool next = floorf(0.5f + distance) == 2.0f && floorf(0.5f - distance) == -2.0f;
-    row->constants.groups =
-        pass->shader == &vkb_shader_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
-    row->constants.sampling = 0;
-    row->constants.next_pixel = next;
-    return params->row_offset == 0 && (next || distance <= 0.5f);
-}
-
-bool vkb_add_halved_grid(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                         bool *fits, struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold;
-    struct vkb_pass_row row;
-
-    *fits = read_grid(pass, &row) && is_half(&choice->plain, pass) && loads(choice, pass);
-    if (!*fits)
-        return true;
-    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
-    vkb_make_words(&row, grid_words[format], GRID_COLUMNS, HALVE_WORDS_ROWS);
-    if (!vkb_graph_add_pass(choice->graph, &row, error))
-        return false;
-    threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    if (!threshold)
-        return true;
-    row.reads[0] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    row.constants.format = vkb_stored_as(choice->device, format);
-    VKB_TAKE_THRESHOLD(&row, kawase, threshold);
-    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -309,7 +232,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_format format = plain->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
-    *fits = vkb_doubles(pass) && loads_to_double(choice, pass);
+    *fits = vkb_filter_exact(pass) == EXACT_DOUBLE && loads_to_double(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -329,14 +252,14 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     const struct vkb_graph *plain = &choice->plain;
     const struct vkb_pass_row *up = NULL;
     struct vkb_pass_row row;
-    struct vkb_double_final_params *params = &row.params.double_final;
+    struct vkb_filter_final_params *params = &row.params.filter_final;
     const enum vkb_format format = plain->images[pass->targets[0]].format;
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
     // The shader is compiled for one format. The levels of a published method may have their own.
-    *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
-         && plain->images[pass->reads[0]].format == format
+    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && !up->constants.add_own
+         && !pass->constants.masked && plain->images[pass->reads[0]].format == format
          && plain->images[pass->reads[1]].format == format
          && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
          && loads_to_double(choice, pass);
@@ -350,11 +273,11 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
     vkb_drop_reads(&row, 2);
-    row.block = VKB_BLOCK_double_final;
-    params->coarse = up->params.pyramid.coarse;
-    VKB_TAKE_COMPOSITE(&row, double_final, pass);
+    row.block = VKB_BLOCK_filter_final;
+    params->coarse = up->params.filter.coarse;
+    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
     row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
-    memcpy(params->taps, up->params.pyramid.taps, sizeof params->taps);
+    memcpy(params->taps, up->params.filter.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -11,7 +11,6 @@ static const struct vkb_shader *const kino_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(kino_bright);
 static const struct vkb_shader *const highlights_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(highlights);
-static const struct vkb_shader *const scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
 
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -39,9 +38,7 @@ static const struct vkb_shader *const *unfiltered_shaders(const struct vkb_graph
         return NULL;
     return pass->shader == &vkb_shader_kino_prefilter_frag    ? kino_shaders
          : pass->shader == &vkb_shader_blender_prefilter_frag ? highlights_shaders
-         : pass->shader == &vkb_shader_pyramid_up_frag && vkb_only_scales(graph, pass)
-             ? scale_shaders
-             : NULL;
+                                                              : NULL;
 }
 
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first

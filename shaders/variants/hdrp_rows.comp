@@ -10,7 +10,7 @@ UNIFORM_BLOCK(PYRAMID_BLOCK);
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = HDRP_OUTPUTS, ROWS = FILTER_ROWS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
+const int COLUMNS = HDRP_OUTPUTS, ROWS = GATHER_ROWS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
