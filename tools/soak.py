@@ -1,8 +1,8 @@
 """Render many frames of changing size and settings, and check that the process does not grow.
 
-``python tools/soak.py [FRAMES]`` (20,000) prints memory in bytes, file descriptors and
-threads of the process after every tenth of the frames. It returns 1 if memory grows in the second half by more
-than a page for a hundred frames, or if the descriptors or threads change; of less than 1,000
+``python tools/soak.py [FRAMES]`` (20,000) prints memory in bytes, file descriptors and threads of
+the process after every tenth of the frames. It returns 1 if memory grows in the second half by
+more than a page for a hundred frames, or if the descriptors or threads change; of less than 1,000
 frames it judges nothing. Linux with glibc 2.33 or newer.
 """
 

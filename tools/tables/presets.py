@@ -10,8 +10,8 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from click.testing import CliRunner
 from cells import rounded, table
+from click.testing import CliRunner
 from numpy.typing import NDArray
 from tqdm import tqdm
 
