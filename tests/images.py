@@ -24,10 +24,10 @@ def picture(
     """
     values = np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
     values = values**power if power > 1 else values
-    if np.dtype(dtype).kind == "u":
-        return np.rint(values * float(np.iinfo(dtype).max)).astype(dtype)
-    scaled: NDArray[Any] = (values * np.float32(highest)).astype(dtype)
-    return scaled
+    is_integer = np.dtype(dtype).kind == "u"
+    scaled: Any = values * np.float32(np.iinfo(dtype).max if is_integer else highest)
+    result: NDArray[Any] = (np.rint(scaled) if is_integer else scaled).astype(dtype)
+    return result
 
 
 def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 0) -> NDArray[Any]:

@@ -169,16 +169,13 @@ def test_the_random_number_repeats_and_differs_between_passes(renderer: Renderer
     settings = own(
         text + text.replace("SAVE A", "BIND A").replace("random", "random, A_texOff(0).r, 0, 1")
     )
-    values = [
-        renderer.apply(picture(24, 16, highest=2), settings)["final"][0, 0, :2] for _ in range(2)
-    ]
+    image = picture(24, 16)
+    values = [renderer.apply(image, settings)["final"][0, 0, :2] for _ in range(2)]
     assert (values[0] == values[1]).all()
     assert values[0][0] != values[0][1]
     assert (values[0] >= 0).all()
     assert (values[0] < 1).all()
-    other = renderer.apply(picture(24, 16, highest=2), settings.replace(dither_seed=5))["final"][
-        0, 0, :2
-    ]
+    other = renderer.apply(image, settings.replace(dither_seed=5))["final"][0, 0, :2]
     assert (other != values[0]).all()
 
 
