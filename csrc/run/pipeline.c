@@ -389,14 +389,15 @@ static bool create_module(const struct vkb_device *device, const struct vkb_shad
 
     if (!vkb_specialize(shader, constants, &code, &size, error))
         return false;
-    const bool done = VK(error, device->vk.vkCreateShaderModule(
-                                    device->handle,
-                                    &(VkShaderModuleCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                                        .codeSize = size,
-                                        .pCode = code,
-                                    },
-                                    NULL, module));
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
     vkb_free(code);
     return done;
 }
