@@ -29,7 +29,6 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "overhead": "the constant cost of a call",
         "own": "a custom method against the same rows built in, and loading it",
         "startup": "import, renderer and first frame, in fresh processes",
-        "separable": "two passes of N taps against one of N x N",
         "convolution": "convolution with large kernels against SciPy's transforms",
         "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",
         "adjoint": "derivatives by the image against the framebuffer and against PyTorch",
