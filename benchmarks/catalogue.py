@@ -27,7 +27,7 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "requests": "many requests with one image, against single calls",
         "cost": "cost against pixels, kernel length and levels",
         "overhead": "the constant cost of a call",
-        "own": "a custom method against the same rows built in, and loading it",
+        "custom": "a custom method against the same rows built in, and loading it",
         "startup": "import, renderer and first frame, in fresh processes",
         "convolution": "convolution with large kernels against SciPy's transforms",
         "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",

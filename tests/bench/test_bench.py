@@ -419,6 +419,8 @@ def test_the_list_names_every_benchmark() -> None:
     result = bench("--list")
     assert result.exit_code == 0
     assert [line.split()[0] for line in result.stdout.splitlines()] == list(BENCHMARKS)
+    for name in BENCHMARKS:
+        assert callable(importlib.import_module(f"benchmarks.{name.replace('-', '_')}").run)
 
 
 @pytest.mark.parametrize(
