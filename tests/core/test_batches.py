@@ -148,12 +148,6 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
 
 
-def test_settings_that_are_not_a_sequence_are_refused(renderer: Renderer) -> None:
-    wrong: Any = Separable()
-    with pytest.raises(TypeError, match=r"^settings: "):
-        list(renderer.sweep(picture(4, 4, 3, seed=5), wrong))
-
-
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
     assert list(renderer.sweep(picture(4, 4, 3, seed=5), [])) == []
     assert list(renderer.sweep(scene, [], size=SIZE)) == []
@@ -360,18 +354,6 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
         next(frames)
     with pytest.raises(KeyError, match="mine"):
         next(frames)
-
-
-def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) -> None:
-    wrong: Any = [[0.0]]
-    with pytest.raises(TypeError, match="source"):
-        renderer.sweep(wrong, [Separable()])
-    with pytest.raises(TypeError, match="framebuffers"):
-        renderer.sweep(picture(4, 4, 3, seed=19), [Separable()], framebuffers=wrong)
-    with pytest.raises(ValueError, match="shading"):
-        renderer.sweep(scene, [Separable()], shading=wrong)
-    with pytest.raises(TypeError):
-        renderer.sweep(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to
