@@ -4,7 +4,6 @@ errors."""
 from __future__ import annotations
 
 import gc
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -223,39 +222,6 @@ def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
     for (of_image, of_scene), (right_image, right_scene) in zip(both, expected, strict=True):
         assert_same(of_image, right_image)
         assert_same(of_scene, right_scene)
-
-
-def test_threads(renderer: Renderer, scene: Scene) -> None:
-    images = [picture(30, 20, 3, seed=10), picture(30, 20, 4, seed=11), picture(17, 40, 4, seed=12)]
-    settings = [Separable(blur_strength=strength / 8) for strength in range(20)]
-    many = [[renderer.apply(image, s) for s in settings] for image in images]
-    single = renderer.render(scene, None, SIZE)
-    start = threading.Barrier(5)
-
-    def sequences(which: int) -> None:
-        start.wait()
-        for _ in range(3):
-            got = renderer.sweep(images[which], settings)
-            for frames, right in zip(got, many[which], strict=True):
-                assert_same(frames, right)
-
-    def abandoned() -> None:
-        start.wait()
-        for step in range(12):
-            got = renderer.sweep(images[step % 3], settings)
-            for index in range(step % 5):
-                assert_same(next(got), many[step % 3][index])
-
-    def singles() -> None:
-        start.wait()
-        for _ in range(30):
-            assert_same(renderer.render(scene, None, SIZE), single)
-
-    with ThreadPoolExecutor(5) as pool:
-        work = [pool.submit(sequences, which) for which in range(3)]
-        work += [pool.submit(abandoned), pool.submit(singles)]
-        for result in work:
-            result.result()
 
 
 def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:

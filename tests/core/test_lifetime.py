@@ -9,7 +9,6 @@ import sys
 import threading
 import weakref
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,7 @@ from tests.core.descriptors import open_descriptors
 from tests.exhaustive import EXHAUSTIVE
 from tests.framebuffers import assert_same
 from tests.processes import output
-from tests.screens import noise, screen
-from vkbloom import Frames, Renderer, Scene, Separable, adapters, gaussian_weights
+from vkbloom import Renderer, Scene, Separable, adapters, gaussian_weights
 
 SIZE = (64, 36)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -189,73 +187,6 @@ def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
 
 
 # Threads
-
-VARIANTS = [
-    Separable(),
-    Separable(blur_strength=0.4, bloom_size=(100, 60)),
-    Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rgba16float"),
-    Separable(direct=True, tonemap="aces"),
-]
-
-
-def test_four_threads_and_one_renderer(renderer: Renderer, scene: Scene) -> None:
-    other_scene = screen(noise((16, 9)), SIZE)
-    requests = [
-        (which, settings, index / 4)
-        for which in (scene, other_scene)
-        for index, settings in enumerate(VARIANTS)
-    ]
-    right = [renderer.render(which, settings, SIZE, time=t) for which, settings, t in requests]
-    start = threading.Barrier(4)
-
-    def work(thread: int) -> None:
-        start.wait()
-        for step in range(3 * len(requests)):
-            # Each thread goes through all requests in an order of its own.
-            number = (thread + (2 * thread + 1) * step) % len(requests)
-            which, settings, t = requests[number]
-            assert_same(renderer.render(which, settings, SIZE, time=t), right[number])
-
-    with ThreadPoolExecutor(4) as pool:
-        for result in [pool.submit(work, thread) for thread in range(4)]:
-            result.result()
-
-
-def test_a_renderer_for_each_of_four_threads(scene: Scene) -> None:
-    def work(settings: Separable) -> Frames:
-        with Renderer(validation=True) as renderer:
-            return renderer.render(scene, settings, SIZE)
-
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(work, VARIANTS))
-    for settings, frames in zip(VARIANTS, together, strict=True):
-        assert_same(frames, work(settings))
-
-
-def test_close_while_other_threads_render(scene: Scene) -> None:
-    renderer = Renderer(validation=True)
-    right = renderer.render(scene, None, SIZE)
-    started = threading.Semaphore(0)
-
-    def work() -> int:
-        for done in range(10_000):
-            try:
-                frames = renderer.render(scene, None, SIZE)
-            except ValueError:
-                assert renderer.closed
-                return done
-            assert_same(frames, right)
-            started.release()
-        return -1
-
-    with ThreadPoolExecutor(3) as pool:
-        results = [pool.submit(work) for _ in range(3)]
-        for _ in range(6):
-            assert started.acquire(timeout=120)
-        renderer.close()
-        counts = [result.result() for result in results]
-    assert min(counts) >= 0
-    assert sum(counts) >= 6
 
 
 def ticks_during(work: Callable[[], object]) -> int:
