@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.framebuffers import INFO, TIMINGS, make, mixed, noise
+from tests.framebuffers import INFO, TIMINGS, make, mixed
+from tests.images import noise
 from vkbloom import Separable
 from vkbloom._renderer.frames import Frames, dimensions
 

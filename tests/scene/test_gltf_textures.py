@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
+from tests.images import noise
 from tests.scene.gltf_documents import (
     BYTE,
     FLOAT,
@@ -62,12 +63,6 @@ def encoded(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any
     return data
 
 
-def noise(width: int, height: int, channels: int = 3, dtype: str = "uint8") -> Array:
-    highest = np.iinfo(dtype).max
-    generator = np.random.default_rng((width, height, channels))
-    return generator.integers(0, highest, (height, width, channels), dtype, endpoint=True)
-
-
 def linear(pixels: Array) -> NDArray[np.float64]:
     """Decode sRGB from its definition in IEC 61966-2-1, apart from vkbloom."""
     encoded = pixels[..., :3] / np.iinfo(pixels.dtype).max
@@ -96,7 +91,7 @@ def load(tmp_path: Path) -> Callable[[Document], Mesh]:
 
     def load_it(document: Document) -> Mesh:
         if not (tmp_path / "a.png").exists():
-            (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+            (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             return document.load(tmp_path)
@@ -115,7 +110,7 @@ Load = Callable[[Document], Mesh]
 def test_images_are_decoded_from_srgb(
     load: Load, tmp_path: Path, channels: int, dtype: str
 ) -> None:
-    pixels = noise(40, 30, channels, dtype)
+    pixels = noise(30, 40, channels, dtype=dtype)
     # A file's own words on its colours do not count.
     data = encoded(pixels, tmp_path, **{"oiio:ColorSpace": "lin_rec709_scene"})
     (tmp_path / "a.png").write_bytes(data)
@@ -138,7 +133,7 @@ def test_jpeg(load: Load, tmp_path: Path) -> None:
 
 
 def test_images_wherever_they_lie(load: Load, tmp_path: Path) -> None:
-    data = encoded(noise(5, 4), tmp_path)
+    data = encoded(noise(4, 5, 3, dtype="uint8"), tmp_path)
     (tmp_path / "a.png").write_bytes(data)
     (tmp_path / "inner").mkdir()
     # The name and the MIME type say nothing: the first bytes do.
@@ -185,7 +180,7 @@ def test_factor_times_vertex_colour_times_texture(
     renderer: Renderer, load: Load, tmp_path: Path
 ) -> None:
     size = (8, 6)
-    colours, lights = noise(*size), noise(4, 3)
+    colours, lights = noise(*size[::-1], 3, dtype="uint8"), noise(3, 4, 3, dtype="uint8")
     (tmp_path / "a.png").write_bytes(encoded(colours, tmp_path))
     (tmp_path / "b.png").write_bytes(encoded(lights, tmp_path))
     document = textured(sampler=0)
@@ -370,7 +365,7 @@ def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
     material["emissiveTexture"] = {"index": 1}
     document.json["textures"].append({"extensions": {"KHR_texture_basisu": {"source": 0}}})
     document.json["extensionsUsed"] = ["KHR_texture_basisu"]
-    (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+    (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
     with pytest.warns(UserWarning, match="left out") as caught:
         mesh = document.load(tmp_path)
     assert len(caught) == 1
@@ -437,7 +432,7 @@ def test_damage_is_named(tmp_path: Path, path: Any, value: Any, message: str) ->
     folder = tmp_path / "model"
     folder.mkdir()
     document = textured()
-    (folder / "a.png").write_bytes(encoded(noise(4, 3), folder))
+    (folder / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), folder))
     (tmp_path / "a.png").write_bytes((folder / "a.png").read_bytes())
     (folder / "link.png").symlink_to(tmp_path / "a.png")
     if path == ("samplers",):
@@ -471,7 +466,7 @@ def test_too_few_texture_coordinates(load: Load) -> None:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 def test_an_image_cut_anywhere_is_refused(tmp_path: Path, suffix: str) -> None:
-    data = encoded(noise(16, 16), tmp_path, suffix)
+    data = encoded(noise(16, 16, 3, dtype="uint8"), tmp_path, suffix)
     for length in [*range(0, len(data) // 2, len(data) // 12), len(data) - 40]:
         (tmp_path / "a.png").write_bytes(data[:length])
         with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]") as caught:
@@ -513,7 +508,7 @@ def test_without_openimageio_the_message_says_what_to_install(
 
 def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
     document = textured(sampler=0)
-    data = encoded(noise(4, 3), tmp_path)
+    data = encoded(noise(3, 4, 3, dtype="uint8"), tmp_path)
     document.json["images"] = [{"bufferView": document.view(data), "mimeType": "image/png"}]
     document.json["samplers"] = [
         {"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9986}
