@@ -210,20 +210,6 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
         calls[index % len(calls)]()
 
 
-def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
-    image = picture(40, 30, 3, seed=9)
-    settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
-    expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
-    both = zip(
-        renderer.sweep(image, settings),
-        renderer.sweep(scene, settings, size=SIZE),
-        strict=True,
-    )
-    for (of_image, of_scene), (right_image, right_scene) in zip(both, expected, strict=True):
-        assert_same(of_image, right_image)
-        assert_same(of_scene, right_scene)
-
-
 def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
     image = picture(30, 20, 3, seed=13)
     settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
@@ -252,15 +238,6 @@ def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int,
         del frames
         gc.collect()
         assert_same(renderer.apply(image, LOW), right)
-
-
-def test_a_sequence_forgotten_with_its_renderer() -> None:
-    renderer = Renderer(validation=True)
-    frames = renderer.sweep(picture(40, 30, 3, seed=15), SEQUENCE)
-    for _ in range(4):
-        next(frames)
-    del renderer, frames
-    gc.collect()
 
 
 def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Renderer]) -> None:
@@ -410,13 +387,6 @@ def test_of_two_errors_the_first_is_raised() -> None:
     assert len(results) == 4
 
 
-def test_nothing_fails() -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
-    results, error = run_failing(settings, {})
-    assert error is None
-    assert [point for point, _ in results] == settings
-
-
 # The core's own types
 
 
@@ -427,15 +397,6 @@ def submitted(
     plans = tuple(core.plan(source, one, None) for one in settings)
     arrays = tuple(new_arrays(core, plan) for plan in plans)
     return core.run(source, plans, arrays), arrays
-
-
-def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
-    source = _core.image_source(picture(8, 8, 4, seed=20))
-    both = [Separable(), Separable(blur_strength=1.0)]
-    submission, _ = submitted(renderer, source, both)
-    assert len(submission.wait()[0]) == 2
-    with pytest.raises(RuntimeError, match="already waited for"):
-        submission.wait()
 
 
 def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:

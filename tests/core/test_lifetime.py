@@ -6,9 +6,7 @@ import gc
 import json
 import os
 import sys
-import threading
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +14,8 @@ import pytest
 
 from tests.core.descriptors import open_descriptors
 from tests.exhaustive import EXHAUSTIVE
-from tests.framebuffers import assert_same
 from tests.processes import output
-from vkbloom import Renderer, Scene, Separable, adapters, gaussian_weights
+from vkbloom import Renderer, Scene, Separable, adapters
 
 SIZE = (64, 36)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -85,14 +82,6 @@ def test_a_renderer_that_is_not_closed_is_collected(scene: Scene) -> None:
     assert reference() is None
     assert in_use() == before
     np.testing.assert_array_equal(frames["final"], kept)
-
-
-def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
-    with Renderer(validation=True) as one, Renderer() as other:
-        right = one.render(scene, None, SIZE)
-        other.render(scene, Separable(loops=2), SIZE, time=0.3)
-        other.close()
-        assert_same(one.render(scene, None, SIZE), right)
 
 
 # Prints the exception of a renderer if there is a validation message.
@@ -172,56 +161,4 @@ def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
         assert in_use() == before
 
 
-def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
-    # Under validation, which at the close of the renderer reports any object that is left.
-    for step in range(30):
-        size = (1 + 7 * step % 50, 1 + 11 * step % 40)
-        settings = Separable(
-            bloom_size=(1 + step % 17, 1 + step % 23),
-            loops=1 + step % 3,
-            format="rgba16float" if step % 2 else "rgba8unorm",
-            direct=step % 5 == 0,
-        )
-        frames = renderer.render(scene, settings, size, time=step / 30)
-        assert frames["final"].shape == (size[1], size[0], 4)
-
-
 # Threads
-
-
-def ticks_during(work: Callable[[], object]) -> int:
-    """Return how often another Python thread ran during the work; it sleeps for a millisecond."""
-    stop = threading.Event()
-    ticking = threading.Event()
-    ticks = 0
-
-    def tick() -> None:
-        nonlocal ticks
-        while not stop.wait(0.001):
-            ticks += 1
-            ticking.set()
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    ticking.wait()
-    before = ticks
-    work()
-    during = ticks - before
-    stop.set()
-    thread.join()
-    return during
-
-
-def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
-    # 25 x 25 taps a pixel, filtered by hand: half a second of one core. With the lock held the
-    # other thread would come round once before the work takes it, and once after.
-    settings = Separable(
-        weights=gaussian_weights(10.0, 12),
-        blur_scale=0.5,
-        direct=True,
-        format="rgba32float",
-        bloom_size=(200, 200),
-    )
-    with Renderer() as renderer:
-        renderer.render(scene, settings, (4, 4))
-        assert ticks_during(lambda: renderer.render(scene, settings, (300, 200))) > 10

@@ -133,15 +133,7 @@ def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:
         surface.present(scene)
 
 
-REFUSED = """
-surface.present(scene, framebuffer="depth") -> ValueError: framebuffer: 'depth' has no colours to...
-surface.present(scene, framebuffer="all") -> ValueError: framebuffers: ...
-surface.present(scene, framebuffer="blur") -> ValueError: ...'blur'...
-surface.present(scene, size=(0, 5)) -> ValueError: size: (0, 5) is out of range...
-"""
-
-
-@pytest.mark.parametrize(("call", "error"), rows(REFUSED))
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "surfaces"))
 def test_a_wrong_value_is_refused(surface: Surface, scene: Scene, call: str, error: str) -> None:
     assert_refused(call, error, {"surface": surface, "scene": scene})
     assert surface.present(scene)
