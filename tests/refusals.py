@@ -23,8 +23,8 @@ def rows(test: str, heading: str) -> list[Any]:
     return [pytest.param(call.strip(), error, id=call.strip()) for call, _, error in pairs]
 
 
-def assert_refused(call: str, error: str, names: Mapping[str, Any]) -> None:
-    """Check that a call raises an error with this type and text."""
+def assert_refused(call: str, error: str, names: Mapping[str, Any]) -> str:
+    """Check that a call raises an error with this type and text, and return the text."""
     with pytest.raises(Exception) as caught:  # noqa: PT011  the type is part of the text
         eval(call, {**names})
     raised = caught.value
@@ -33,3 +33,4 @@ def assert_refused(call: str, error: str, names: Mapping[str, Any]) -> None:
     found = f"{type(raised).__name__}: {text}"
     pattern = ".*".join(map(re.escape, error.split("...")))
     assert re.fullmatch(pattern, found, re.DOTALL), f"{call} -> {found}"
+    return str(text)
