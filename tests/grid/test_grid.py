@@ -15,7 +15,7 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.framebuffers import noise
+from tests.images import noise
 from tests.processes import output
 from vkbloom import (
     Convolution,
