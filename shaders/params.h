@@ -112,13 +112,6 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A pass of the mip pyramid that weights groups of taps by brightness. The steps are the distances of the
-// taps in texels of the image that is read.
-#define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
-    SAMPLING_ROWS(B, INPUT) \
-    INPUT(B, float, step_x) \
-    INPUT(B, float, step_y)
-
 // A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size and of the
 // filtered image; the taps along rows and along columns. If the target is exactly twice as large, `taps`
 // has the same weights on integer texels.
@@ -141,8 +134,9 @@
     FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// The first pass of a published method, which reads the frame. The steps are the distances of its
-// taps in texels of the frame.
+// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by brightness, and
+// the first pass of a published method, which reads the frame. The steps are the distances of its taps in
+// texels of what it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -322,7 +316,6 @@
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
     BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
-    BLOCK(pyramid, PYRAMID_BLOCK) \
     BLOCK(filter, FILTER_BLOCK) \
     BLOCK(filter_final, FILTER_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
@@ -647,6 +640,11 @@
     NAME(QUALITY_MEDIUM, 1, medium) \
     NAME(QUALITY_LOW, 2, low)
 
+#define FILTER_NAMES(NAME) \
+    NAME(FILTER_GAUSSIAN, 0, gaussian) \
+    NAME(FILTER_KAWASE, 1, kawase) \
+    NAME(FILTER_DUAL, 2, dual)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
@@ -655,7 +653,8 @@
     CHOICE(texel, TEXEL_NAMES) \
     CHOICE(boundary, BOUNDARY_NAMES) \
     CHOICE(type, TYPE_NAMES) \
-    CHOICE(quality, QUALITY_NAMES)
+    CHOICE(quality, QUALITY_NAMES) \
+    CHOICE(filter, FILTER_NAMES)
 
 // Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
@@ -684,7 +683,7 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
-    NAME(GROUPS_PYRAMID, 0, pyramid) \
+    NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
     NAME(GROUPS_BLENDER, 3, blender) \
@@ -695,6 +694,8 @@
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KINO, 11, kino) \
+    NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
+    NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \

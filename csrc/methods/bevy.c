@@ -35,12 +35,9 @@ static void choose_sizes(struct vkb_levels *levels)
 // The pass from the frame to the first level.
 static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
 {
-    struct vkb_pass_row row =
-        vkb_prefilter_row(levels, &vkb_shader_bevy_prefilter_frag, from, levels->downs[0]);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BEVY, from, levels->downs[0]);
 
-    row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
-    row.params.prefilter.step_y = (float)levels->settings->values.scale_y;
-    row.reach += 2.0f * row.params.prefilter.step_y;
+    vkb_set_steps(&row, levels->settings->values.scale_x, levels->settings->values.scale_y);
     vkb_mask_prefilter(levels, &row);
     return row;
 }

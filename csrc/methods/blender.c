@@ -303,8 +303,8 @@ static bool add_highlights(struct glare *glare, struct vkb_error *error)
         return false;
     if (factor == 1)
         levels->downs[0] = glow;
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_blender_prefilter_frag,
-                                                source->glow, levels->downs[0]);
+    struct vkb_pass_row row =
+        vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
     if (factor > 1) {
         row.constants.radius = (int32_t)factor;
         row.reach = INFINITY;

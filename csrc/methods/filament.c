@@ -33,8 +33,7 @@ static void choose_sizes(struct vkb_levels *levels)
 static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                           struct vkb_error *error)
 {
-    struct vkb_pass_row row =
-        vkb_prefilter_row(levels, &vkb_shader_filament_prefilter_frag, from, to);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_FILAMENT, from, to);
 
     if (from == levels->source->glow)
         vkb_mask_prefilter(levels, &row);

@@ -44,8 +44,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     combination.radius_x = combination.radius_y = choose_sizes(&levels);
     if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
         return false;
-    struct vkb_pass_row prefilter =
-        vkb_prefilter_row(&levels, &vkb_shader_kino_prefilter_frag, source->glow, from);
+    struct vkb_pass_row prefilter = vkb_groups_row(&levels, GROUPS_KINO, source->glow, from);
     prefilter.constants.anti_flicker = settings->values.anti_flicker;
     vkb_mask_prefilter(&levels, &prefilter);
     if (!vkb_graph_add_pass(graph, &prefilter, error))

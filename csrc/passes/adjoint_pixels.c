@@ -64,7 +64,7 @@ static bool is_clamped(const struct vkb_graph *graph)
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (graph->passes[i].constants.groups == GROUPS_PYGFX
             || graph->passes[i].constants.groups == GROUPS_PYGFX_KARIS
-            || graph->passes[i].shader == &vkb_shader_urp_prefilter_frag)
+            || graph->passes[i].constants.groups == GROUPS_URP)
             return true;
     return false;
 }

@@ -91,3 +91,29 @@ bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
     row->reach = (float)(VKB_FILTER_REACH + rows);
     return vkb_graph_add_pass(levels->graph, row, error);
 }
+
+bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                     struct vkb_error *error)
+{
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0};
+    const struct vkb_side_taps sides = {0.5 * offset, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
+
+    vkb_filter_add(&row, 0, centre, centre);
+    vkb_filter_add(&row, 1, sides, sides);
+    return vkb_filter_end(levels, &row, error);
+}
+
+bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                   struct vkb_error *error)
+{
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
+    const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
+    const struct vkb_side_taps twice = {0.5 * offset, 2.0, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0 / 12.0);
+
+    vkb_filter_add(&row, 0, axial, centre);
+    vkb_filter_add(&row, 1, centre, axial);
+    vkb_filter_add(&row, 2, diagonal, twice);
+    return vkb_filter_end(levels, &row, error);
+}

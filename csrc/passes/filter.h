@@ -26,6 +26,15 @@ void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share);
 bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
                     struct vkb_error *error);
 
+// Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
+// the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial
+// taps at a distance of one texel of the smaller level times the offset, and four diagonal ones at
+// half that distance with twice the weight.
+bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                     struct vkb_error *error);
+bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                   struct vkb_error *error);
+
 // Whether a level of exactly twice the size is filtered with the pyramid's 13 taps, or the target
 // has exactly twice the size and four taps along each axis: EXACT_*; 0: neither.
 static inline enum vkb_mode vkb_filter_exact(const struct vkb_pass_row *pass)

@@ -101,20 +101,10 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
     return row;
 }
 
-struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
-                                    const struct vkb_shader *fragment, uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
-
-    row.block = VKB_BLOCK_pyramid;
-    VKB_SET_TARGET(&row, pyramid, &levels->graph->images[to]);
-    return row;
-}
-
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
-    row->params.pyramid.step_x = (float)step_x;
-    row->params.pyramid.step_y = (float)step_y;
+    row->params.prefilter.step_x = (float)step_x;
+    row->params.prefilter.step_y = (float)step_y;
     row->reach = (float)(VKB_FILTER_REACH + 2.0 * fabs(step_y));
 }
 
@@ -128,17 +118,6 @@ static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t sma
 {
     return graph->images[large].width == 2 * graph->images[small].width
         && graph->images[large].height == 2 * graph->images[small].height;
-}
-
-struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
-                                   uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_pyramid_down_frag, from, to);
-
-    row.constants.groups = groups;
-    vkb_set_steps(&row, 1.0, 1.0);
-    vkb_apply_mask(&row, VKB_NO_IMAGE);
-    return row;
 }
 
 bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
@@ -172,6 +151,16 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
     }
     VKB_SET_TARGET(&row, prefilter, &levels->graph->images[to]);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
+    return row;
+}
+
+struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
+                                   uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_prefilter_frag, from, to);
+
+    row.constants.groups = groups;
+    vkb_set_steps(&row, 1.0, 1.0);
     return row;
 }
 

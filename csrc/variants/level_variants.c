@@ -83,11 +83,25 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
         && vkb_add_thresholded(choice, pass, &row, error);
 }
 
+// What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
+static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
+{
+    return vkb_computes(pass, VKB_BLOCK_prefilter) ? (enum vkb_mode)pass->constants.groups : 0;
+}
+
+static bool has_unit_steps(const struct vkb_pass_row *pass)
+{
+    return pass->params.prefilter.step_x == 1.0f && pass->params.prefilter.step_y == 1.0f;
+}
+
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
-    return pass->block == VKB_BLOCK_pyramid && pass->params.pyramid.step_x == 1.0f
-        && pass->params.pyramid.step_y == 1.0f && !pass->constants.masked;
+    const enum vkb_mode groups = groups_of(pass);
+
+    return (groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX || groups == GROUPS_PYGFX_KARIS
+            || groups == GROUPS_BLENDER || groups == GROUPS_BOX)
+        && has_unit_steps(pass) && !pass->constants.masked;
 }
 
 // Whether the target has exactly half of the size of the image that the pass reads.
@@ -119,7 +133,7 @@ bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vk
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
 
-    *fits = pass->shader == &vkb_shader_godot_blur_frag
+    *fits = groups_of(pass) == GROUPS_GODOT_BLUR
          && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
          && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
          && vkb_fits_words(choice, pass);
@@ -138,26 +152,6 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
                      HALVE_WORDS_ROWS, error);
 }
 
-// What reduce.comp makes of its taps, as GROUPS_*; 0: it has no such taps.
-static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
-{
-    static const struct {
-        const struct vkb_shader *shader;
-        enum vkb_mode groups;
-    } rows[] = {
-        {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
-        {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
-        {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
-        {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
-        {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
-    };
-
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
-        if (pass->shader == rows[i].shader)
-            return rows[i].groups;
-    return 0;
-}
-
 // Adds the pass as one of words, and a fused pass that reads the image itself.
 static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                           const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
@@ -166,7 +160,6 @@ static bool add_prefilter(const struct vkb_variant_choice *choice, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    row.constants.groups = reduced_groups(pass);
     row.constants.sampling = 0;
     vkb_drop_reads(&row, 1);
     vkb_make_words(&row, shader, columns, rows);
@@ -178,11 +171,12 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
                      bool *fits, struct vkb_error *error)
 {
     const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
-    const enum vkb_mode groups = reduced_groups(pass);
+    const enum vkb_mode groups = groups_of(pass);
 
-    *fits = groups && groups != GROUPS_BEVY && !pass->constants.masked
-         && is_half(&choice->plain, pass) && pass->params.prefilter.row_offset == 0
-         && loads(choice, pass);
+    *fits = (groups == GROUPS_FILAMENT || groups == GROUPS_HDRP || groups == GROUPS_URP
+             || groups == GROUPS_UNREAL)
+         && !pass->constants.masked && is_half(&choice->plain, pass)
+         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
     return !*fits
         || add_prefilter(choice, pass, reduce_words[format], REDUCE_COLUMNS, HALVE_WORDS_ROWS,
                          error);
@@ -195,9 +189,8 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const uint32_t height =
         params->source_height ? (uint32_t)params->source_height : source->height;
-    const enum vkb_mode groups = reduced_groups(pass);
-    const bool taps = groups == GROUPS_FILAMENT
-                   || (groups == GROUPS_BEVY && params->step_x == 1.0f && params->step_y == 1.0f);
+    const enum vkb_mode groups = groups_of(pass);
+    const bool taps = groups == GROUPS_FILAMENT || (groups == GROUPS_BEVY && has_unit_steps(pass));
 
     *fits = taps && !pass->constants.masked && loads(choice, pass);
     if (!*fits)
@@ -216,9 +209,9 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const uint32_t word = 4 / vkb_formats[format].channel_size;
 
-    *fits = pass->shader == &vkb_shader_hdrp_blur_frag
+    *fits = groups_of(pass) == GROUPS_HDRP_BLUR
          && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-         && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
+         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
     if (!*fits)
         return true;
     return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, GATHER_ROWS, error)

@@ -25,12 +25,6 @@ bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
     return writers == 1;
 }
 
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
-{
-    while (row->read_count > read_count)
-        row->reads[--row->read_count] = 0;
-}
-
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height)
 {

@@ -83,9 +83,6 @@ bool vkb_is_factor(const struct vkb_pass_row *pass);
 // Whether the images that a pass reads are words of single floats.
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
-// Removes all images after the first `read_count` from the images that the pass reads.
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
-
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height);

@@ -5,7 +5,7 @@
 // samples are means of two texels. An invocation has each sample once for all pixels.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"

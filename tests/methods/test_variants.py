@@ -28,6 +28,7 @@ from vkbloom import (
     Separable,
     Settings,
     UnrealBloom,
+    UrpBloom,
     gaussian_weights,
     presets,
 )
@@ -71,6 +72,9 @@ BIT_EQUAL = {
     "bevy": BevyBloom(max_mip_dimension=32),
     "filament": FilamentBloom(resolution=32),
     "hdrp": HdrpBloom(),
+    # Taps that are in a window, and some that are too far apart for one.
+    "urp-kawase": UrpBloom(filter="kawase", format=None),
+    "urp-dual": UrpBloom(filter="dual", scatter=0.9, format=None),
 }
 
 # Methods with a blur into another size, and Fourier transforms, whose stages differ.
