@@ -323,9 +323,7 @@ def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
         (part.shape, part.dtype) for part in (np.asarray(image), as_array(emission, "emission"))
     ]
     if kinds[0] != kinds[1]:
-        raise ValueError(
-            f"emission: shape and dtype {kinds[1]} are not the image's {kinds[0]}"
-        )
+        raise ValueError(f"emission: shape and dtype {kinds[1]} are not the image's {kinds[0]}")
     return values
 
 
