@@ -163,13 +163,6 @@ def stability(
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
 
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the path leaves the image.
-
     Examples
     --------
     A pyramid whose first reduction drops every second pixel loses a small light half of the time:
@@ -247,20 +240,6 @@ def assert_stable(
         Allowed distance of the centroids in pixels.
     texel, steps, temporal, settle, probe
         As for `stability`. The image must be large enough that no light reaches the border.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, there is no light, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(3.0), blur_strength=1.0)
-    >>> testing.assert_stable(lambda image: reference.blur(image, settings), texel=1)
     """
     __tracebackhide__ = True
     limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}

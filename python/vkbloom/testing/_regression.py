@@ -151,11 +151,6 @@ class FrameRegression:
             frames has no hash, or no reference has the same one.
         OSError
             A file cannot be read or written.
-
-        See Also
-        --------
-        compare : With frames of the same test as the reference.
-        Tolerances : The limits.
         """
         __tracebackhide__ = True
         if exact:
@@ -211,19 +206,6 @@ class FrameRegression:
             The frames differ.
         TypeError, ValueError
             An argument is wrong.
-
-        See Also
-        --------
-        check : With reference files.
-        read_frame : Reads frames of an engine.
-
-        Examples
-        --------
-        >>> def test_two_passes(bloom_renderer, frame_regression):
-        ...     image = np.full((16, 16, 4), 0.5, np.float32)
-        ...     one = bloom_renderer.apply(image, vkbloom.Separable(direct=True))["bloom"]
-        ...     two = bloom_renderer.apply(image, vkbloom.Separable())["bloom"]
-        ...     frame_regression.compare(two, one, atol=1e-3)
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)
