@@ -109,7 +109,7 @@ def test_a_bloom_is_its_engines(renderer: Renderer, engine_frames: Path, key: st
     assert relative(every(of_device, stride), expected).max() < 1e-3
 
 
-#: URP 17's further filters, by the key of the frame in shared/data/blooms. Images are in ../engines.
+#: URP 17's further filters, by the frame's key in shared/data/blooms. Images are in ../engines.
 URP_17: dict[str, Settings] = {
     "urp17/6_odd_kawase_f4": UrpBloom(filter="kawase"),
     "urp17/11_wide_dual_f4": UrpBloom(filter="dual", scatter=0.2, iterations=8),
