@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -170,8 +171,6 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        import html  # noqa: PLC0415  costs start-up time
-
         rows = "".join(
             "<tr>" + "".join(f"<td>{html.escape(_text(part))}</td>" for part in one) + "</tr>"
             for one in self.passes
