@@ -113,10 +113,6 @@ def read(
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
 
-    See Also
-    --------
-    write : Writes image files. Renderer.apply : Accepts the array.
-
     Notes
     -----
     Profiles and colour spaces are converted with OpenColorIO's built-in configuration, which is
@@ -251,10 +247,6 @@ def write(
         The file cannot be written. The error names it, and no partial file is left.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-    See Also
-    --------
-    read : Reads image files. Frames.save : Every framebuffer, with settings and timings.
 
     Notes
     -----

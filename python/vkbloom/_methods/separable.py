@@ -79,11 +79,6 @@ class Separable(Settings):
     **settings
         The fields of `Settings`.
 
-    See Also
-    --------
-    gaussian_weights : Makes `weights`.
-    Pyramid, DualKawase : Methods for wide blurs.
-
     Notes
     -----
     Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
@@ -134,10 +129,6 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         `sigma` or `radius` is out of range.
     TypeError
         `sigma` is not a number, or `radius` not an integer.
-
-    See Also
-    --------
-    Separable : Takes the weights.
 
     Examples
     --------

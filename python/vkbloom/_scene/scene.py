@@ -60,17 +60,6 @@ class Camera:
     near, far : float
         Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
 
-    Raises
-    ------
-    TypeError
-        A field is no number, or no three numbers.
-    ValueError
-        A field is not finite or out of range.
-
-    See Also
-    --------
-    Scene : Has a camera.
-
     Examples
     --------
     >>> camera = vkbloom.Camera(position=(0, 0, -5), rotation=(0, 90, 0), fov=60)
@@ -125,19 +114,6 @@ class Scene:
     serial : int
         A number that no other scene of this process has.
 
-    Raises
-    ------
-    TypeError
-        A field has another type.
-    ValueError
-        `glow_intensity` is negative or not finite.
-
-    See Also
-    --------
-    Scene.ufo : The built-in scene.
-    Scene.from_gltf : Loads files.
-    Renderer.render : Renders a scene.
-
     Examples
     --------
     >>> scene = vkbloom.Scene.ufo()
@@ -186,15 +162,6 @@ class Scene:
     @classmethod
     def ufo(cls) -> Scene:
         """Return the built-in scene: a saucer, its glow mesh and a field of stars.
-
-        Returns
-        -------
-        Scene
-            A new scene on every call; its arrays are read again. No extra is needed.
-
-        See Also
-        --------
-        Scene.from_gltf : Loads files.
 
         Examples
         --------
@@ -252,10 +219,6 @@ class Scene:
         ModuleNotFoundError
             pygltflib, or OpenImageIO for an image, is not installed.
 
-        See Also
-        --------
-        Scene.ufo : The built-in scene.
-
         Examples
         --------
         >>> vkbloom.Scene.from_gltf("missing.glb")
@@ -281,29 +244,6 @@ class Scene:
         """Return this scene with another camera. They share all other data.
 
         `dataclasses.replace` does the same for any field.
-
-        Parameters
-        ----------
-        camera : Camera
-
-        Returns
-        -------
-        Scene
-
-        Raises
-        ------
-        TypeError
-            `camera` is not a Camera.
-
-        See Also
-        --------
-        Camera : The argument.
-
-        Examples
-        --------
-        >>> scene = vkbloom.Scene.ufo().with_camera(vkbloom.Camera(fov=30))
-        >>> scene.camera.fov
-        30.0
         """
         return dataclasses.replace(self, camera=camera)
 
