@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import PATH, checked_as
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
@@ -177,7 +177,7 @@ class Scene:
             return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
-    @checked
+    @checked_as(glow=PATH)
     def from_gltf(
         cls,
         base: str | os.PathLike[str],
@@ -229,9 +229,6 @@ class Scene:
         # Imported here, since other scenes do not need it.
         from vkbloom._scene import gltf  # noqa: PLC0415
 
-        for name, path in (("base", base), ("glow", "" if glow is None else glow)):
-            if not isinstance(path, str | os.PathLike):
-                raise TypeError(f"{name}: a path is needed, not {path!r}")
         return cls(
             body=gltf.load_mesh(base),
             glow=None if glow is None else gltf.load_mesh(glow),

@@ -11,7 +11,6 @@ import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self, get_args
 
-from vkbloom._argument_types import HINTS
 from vkbloom._settings.fields import (
     FieldInfo,
     Record,
@@ -280,6 +279,3 @@ def _hint(settings: object) -> str:
     if isinstance(settings, Mapping):
         return "; give vkbloom.Settings.from_dict(...) of it"
     return ""
-
-
-HINTS["a Settings"] = _hint
