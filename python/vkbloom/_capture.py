@@ -77,10 +77,6 @@ def capture(
     Messages of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
     results are copied through staging memory.
 
-    See Also
-    --------
-    Renderer.plan : Names the passes.
-
     Examples
     --------
     Run by ``renderdoccmd capture -w python program.py``:

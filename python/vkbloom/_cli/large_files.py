@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FUNCTION, checked_as
 from vkbloom._checks import check_emission, check_mask
 from vkbloom._cli import no_bloom
 from vkbloom._cli.bands import Band, BloomByBands, ImageByBands
@@ -51,7 +51,7 @@ def is_large(path: str, subimage: int = 0, layer: str | None = None) -> bool:
         return False
 
 
-@checked
+@checked_as(progress=FUNCTION)
 def apply_file(
     source: str | os.PathLike[str],
     target: str | os.PathLike[str],

@@ -12,13 +12,13 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FLAG, checked, checked_as
 from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
 from vkbloom._io.displayed import Saved, check_saved
 from vkbloom._io.expansion import check_expansion
-from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, is_exr
+from vkbloom._io.images import PIXEL_TYPES, Picture, SavedColour, check_name, is_exr
 
 __all__ = ["has_straight", "premultiplied", "read", "write"]
 
@@ -54,7 +54,7 @@ def read(
     expand: float | None = ...,
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
-@checked
+@checked_as(metadata=FLAG)
 def read(
     path: str | os.PathLike[str],
     *,
@@ -112,10 +112,6 @@ def read(
         and `layer` is missing (the message lists them). The error names the file.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-    See Also
-    --------
-    write : Writes image files. Renderer.apply : Accepts the array.
 
     Notes
     -----
@@ -252,10 +248,6 @@ def write(
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
 
-    See Also
-    --------
-    read : Reads image files. Frames.save : Every framebuffer, with settings and timings.
-
     Notes
     -----
     `read` returns colours with the primaries of Rec. 709. A Display P3 photograph that is read and
@@ -278,8 +270,8 @@ def write(
     if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
         values = divided(values) if premultiplied else multiplied(values)
     layout = values.shape[2], _numbers(oiio, values, bits, target)
-    curve = "linear" if is_float else None
-    picture = Picture.of_values(values, layout[1], curve, _typed(oiio, metadata or {}))
+    stored: SavedColour | None = "linear" if is_float else None
+    picture = Picture.of_values(values, layout[1], stored, _typed(oiio, metadata or {}))
     image_writing.save(picture, target, saved, quality=quality, layout=layout)
     return target
 

@@ -75,11 +75,6 @@ class Convolution(Settings):
     TypeError
         A field has the wrong type.
 
-    See Also
-    --------
-    vkbloom.psf : The point-spread functions.
-    Pyramid : A wide blur that takes less time.
-
     Notes
     -----
     bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. The framebuffer

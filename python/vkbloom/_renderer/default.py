@@ -74,15 +74,6 @@ def default_renderer() -> Renderer:
         ``Renderer()``, opened at the first use and closed at exit. A forked child opens its own. If
         it was closed, or its device was lost, the next call opens another one.
 
-    Raises
-    ------
-    AdapterNotFoundError, Error, ValueError
-        As for `Renderer`.
-
-    See Also
-    --------
-    apply, render : Use it.
-
     Examples
     --------
     >>> vkbloom.default_renderer() is vkbloom.default_renderer()
@@ -125,18 +116,6 @@ def apply(
     -------
     Frames
         As of `Renderer.apply`.
-
-    Raises
-    ------
-    ValueError, TypeError, Error
-        As for `Renderer.apply`; or the settings have no such field.
-    OSError
-        The file cannot be read.
-
-    See Also
-    --------
-    render : The same for a scene.
-    read : Reads a file.
 
     Examples
     --------
@@ -212,15 +191,6 @@ def render(
     -------
     Frames
         As of `Renderer.render`.
-
-    Raises
-    ------
-    ValueError, TypeError, Error
-        As for `Renderer.render`; or the settings have no such field.
-
-    See Also
-    --------
-    apply : The same for an image.
 
     Examples
     --------

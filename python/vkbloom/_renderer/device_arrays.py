@@ -66,10 +66,6 @@ class DeviceArray:
         (H, W, C), or (H, W) for depth.
     dtype : numpy.dtype
 
-    See Also
-    --------
-    Renderer.apply : Its argument `device`.
-
     Examples
     --------
     >>> image = np.full((16, 24, 3), 0.5, np.float32)
@@ -119,29 +115,7 @@ class DeviceArray:
         raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
 
     def numpy(self) -> NDArray[Any]:
-        """Return a copy in the host's memory.
-
-        Returns
-        -------
-        ndarray
-
-        Raises
-        ------
-        Error
-            CUDA failed.
-
-        See Also
-        --------
-        numpy.from_dlpack : A view, on a CPU adapter.
-
-        Examples
-        --------
-        >>> image = np.full((16, 24, 3), 0.5, np.float32)
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     final = renderer.apply(image, device="device")["final"]
-        >>> final.numpy().shape
-        (16, 24, 3)
-        """
+        """Return a copy in the host's memory."""
         if isinstance(self._memory, np.ndarray):
             return self._memory.copy()
         array = np.empty(self.shape, self.dtype)

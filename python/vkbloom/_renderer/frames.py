@@ -58,10 +58,6 @@ class Frames(Mapping[str, NDArray[Any]]):
     ValueError
         A name is not an identifier, or an array's shape or dtype is not one of the above.
 
-    See Also
-    --------
-    Renderer.apply, Renderer.render : Return Frames.
-
     Examples
     --------
     >>> image = np.full((16, 24, 3), 0.5, np.float32)
@@ -177,15 +173,6 @@ class Frames(Mapping[str, NDArray[Any]]):
             attributes contain `info`, and the settings and timings as JSON, because netCDF and
             Zarr store only text and numbers. The variables share memory with the framebuffers.
 
-        Raises
-        ------
-        ModuleNotFoundError
-            xarray is missing: ``pip install vkbloom[grid]``.
-
-        See Also
-        --------
-        grid : A Dataset of many settings.
-
         Examples
         --------
         >>> image = np.full((16, 16, 3), 0.5, np.float32)
@@ -265,10 +252,6 @@ class Frames(Mapping[str, NDArray[Any]]):
         ModuleNotFoundError
             OpenImageIO is missing: ``pip install vkbloom[images]``.
 
-        See Also
-        --------
-        Frames.to_xarray : One Dataset, which netCDF and Zarr can store.
-
         Examples
         --------
         >>> import tempfile
@@ -309,10 +292,6 @@ class Frames(Mapping[str, NDArray[Any]]):
             same framebuffer, from two calls of `save`. The error names the file.
         ModuleNotFoundError
             OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-        See Also
-        --------
-        save : Writes the files.
 
         Notes
         -----

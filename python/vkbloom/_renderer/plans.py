@@ -35,10 +35,6 @@ class Pass(NamedTuple):
         The variant that this class of devices runs instead of the method's own pass. "fragment":
         the pass itself, drawn by a fragment shader.
 
-    See Also
-    --------
-    Plan : Has the passes.
-
     Examples
     --------
     >>> with vkbloom.Renderer("software") as renderer:
@@ -79,10 +75,6 @@ class Plan:
     passes : tuple of Pass
         In the order in which they run on a new renderer. A renderer skips passes whose results are
         up to date.
-
-    See Also
-    --------
-    Renderer.plan
 
     Examples
     --------
@@ -136,10 +128,6 @@ class Plan:
         str
             Framebuffers are boxes with their size and dtype, other images have round corners, and
             passes are hexagons with their shader. GitHub, JupyterLab and many editors draw it.
-
-        See Also
-        --------
-        Renderer.plan : Returns a plan.
 
         Examples
         --------

@@ -187,16 +187,16 @@ class Renderer:
         `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
         out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
 
-    See Also
-    --------
-    adapters : Lists the adapters.
-    Frames : What the calls return.
-
     Notes
     -----
     A renderer is a context manager, and any thread can use it. Calls release the GIL while the
     device works, and wait for each other. Framebuffers own their memory and stay valid when the
     renderer is closed.
+
+    Calls raise TypeError for an argument of a wrong type, and ValueError for one that is out of
+    range or does not fit the others, or if the renderer is closed. If the device fails, they raise
+    `OutOfMemoryError`, `DeviceLostError`, `ValidationError` or another `Error`. The renderer can
+    be used again unless the device is lost.
 
     Ctrl-C, or any exception from a signal handler, ends a waiting call. The renderer can be used
     again; closing it waits until the device has finished. A device that takes longer than 300 s for
@@ -266,24 +266,7 @@ class Renderer:
         return self._core.closed
 
     def close(self) -> None:
-        """Release the device and everything on it. May be called twice.
-
-        Raises
-        ------
-        ValidationError
-            With validation: an object was not destroyed.
-
-        See Also
-        --------
-        closed : Whether it was called.
-
-        Examples
-        --------
-        >>> renderer = vkbloom.Renderer("software")
-        >>> renderer.close()
-        >>> renderer.closed
-        True
-        """
+        """Release the device and everything on it. May be called twice."""
         self._planned = self._kept = None
         self._batches.forget()
         try:
@@ -370,21 +353,6 @@ class Renderer:
             With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
             bloom buffers, and the glow mesh is left out.
 
-        Raises
-        ------
-        ValueError
-            An argument is out of range, an array of `out` does not fit, or the renderer is closed.
-        TypeError
-            An argument has the wrong type.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        sweep : Many settings.
-        apply : The same for an image.
-        plan : The framebuffers of a call.
-
         Notes
         -----
         A pass runs only if its inputs, its settings or its size have changed since its last run.
@@ -447,23 +415,6 @@ class Renderer:
             of the bloom buffers, and ``final``, which has the image's shape and dtype. With
             ``bloom=False`` there is only ``final``. ``info`` has the numbers of "nan" and "inf" in
             the image and the emission.
-
-        Raises
-        ------
-        ValueError
-            The image has another shape, masked values or more pixels than the adapter allows, the
-            mask or the emission do not fit it, an argument is out of range, an array of `out` does
-            not fit, or the renderer is closed.
-        TypeError
-            The image has another dtype, or an argument another type.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        sweep, map : Many settings, or many images.
-        upload : Keeps an image on the device.
-        render : The same for a scene.
 
         Notes
         -----
@@ -529,11 +480,6 @@ class Renderer:
             range. Raised by the iteration: an image is not valid for `apply`, or has no settings.
         TypeError
             `images` is not iterable, or an argument has another type.
-
-        See Also
-        --------
-        sweep : One image with many settings.
-        upload : Keeps an image on the device.
 
         Notes
         -----
@@ -606,20 +552,6 @@ class Renderer:
         Image
             This renderer accepts it in place of an array. Calls do not compare its bytes.
 
-        Raises
-        ------
-        ValueError
-            The image has another shape, or more pixels than the adapter allows, the mask or the
-            emission do not fit it; or the renderer is closed.
-        TypeError
-            The image has another dtype.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        map : Many images, each copied while the device works on others.
-
         Examples
         --------
         >>> with vkbloom.Renderer("software") as renderer:
@@ -680,16 +612,6 @@ class Renderer:
         Frames
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
-
-        Raises
-        ------
-        ValueError, TypeError
-            As for `render` and `apply`; or `settings` is not an iterable of settings.
-
-        See Also
-        --------
-        map : Many images.
-        vkbloom.grid : All combinations of settings.
 
         Notes
         -----
@@ -752,20 +674,6 @@ class Renderer:
         Plan
             The framebuffers that the call would return, with shapes and dtypes, and its passes in
             the variants that this renderer's device would run.
-
-        Raises
-        ------
-        ValueError
-            An argument is out of range, or does not belong to the source; or the renderer is
-            closed.
-        TypeError
-            An argument has the wrong type.
-        Error
-            The device does not support the settings.
-
-        See Also
-        --------
-        render, apply : Run the plan.
 
         Notes
         -----

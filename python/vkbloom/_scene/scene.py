@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import PATH, checked_as
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
@@ -59,17 +59,6 @@ class Camera:
         Vertical field of view in degrees, over 0 and under 180.
     near, far : float
         Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
-
-    Raises
-    ------
-    TypeError
-        A field is no number, or no three numbers.
-    ValueError
-        A field is not finite or out of range.
-
-    See Also
-    --------
-    Scene : Has a camera.
 
     Examples
     --------
@@ -125,19 +114,6 @@ class Scene:
     serial : int
         A number that no other scene of this process has.
 
-    Raises
-    ------
-    TypeError
-        A field has another type.
-    ValueError
-        `glow_intensity` is negative or not finite.
-
-    See Also
-    --------
-    Scene.ufo : The built-in scene.
-    Scene.from_gltf : Loads files.
-    Renderer.render : Renders a scene.
-
     Examples
     --------
     >>> scene = vkbloom.Scene.ufo()
@@ -187,15 +163,6 @@ class Scene:
     def ufo(cls) -> Scene:
         """Return the built-in scene: a saucer, its glow mesh and a field of stars.
 
-        Returns
-        -------
-        Scene
-            A new scene on every call; its arrays are read again. No extra is needed.
-
-        See Also
-        --------
-        Scene.from_gltf : Loads files.
-
         Examples
         --------
         >>> vkbloom.Scene.ufo().glow is not None
@@ -210,7 +177,7 @@ class Scene:
             return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
-    @checked
+    @checked_as(glow=PATH)
     def from_gltf(
         cls,
         base: str | os.PathLike[str],
@@ -252,10 +219,6 @@ class Scene:
         ModuleNotFoundError
             pygltflib, or OpenImageIO for an image, is not installed.
 
-        See Also
-        --------
-        Scene.ufo : The built-in scene.
-
         Examples
         --------
         >>> vkbloom.Scene.from_gltf("missing.glb")
@@ -266,9 +229,6 @@ class Scene:
         # Imported here, since other scenes do not need it.
         from vkbloom._scene import gltf  # noqa: PLC0415
 
-        for name, path in (("base", base), ("glow", "" if glow is None else glow)):
-            if not isinstance(path, str | os.PathLike):
-                raise TypeError(f"{name}: a path is needed, not {path!r}")
         return cls(
             body=gltf.load_mesh(base),
             glow=None if glow is None else gltf.load_mesh(glow),
@@ -281,29 +241,6 @@ class Scene:
         """Return this scene with another camera. They share all other data.
 
         `dataclasses.replace` does the same for any field.
-
-        Parameters
-        ----------
-        camera : Camera
-
-        Returns
-        -------
-        Scene
-
-        Raises
-        ------
-        TypeError
-            `camera` is not a Camera.
-
-        See Also
-        --------
-        Camera : The argument.
-
-        Examples
-        --------
-        >>> scene = vkbloom.Scene.ufo().with_camera(vkbloom.Camera(fov=30))
-        >>> scene.camera.fov
-        30.0
         """
         return dataclasses.replace(self, camera=camera)
 

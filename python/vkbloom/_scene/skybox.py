@@ -49,13 +49,6 @@ class Cubemap:
         +y, -y, +z, -z, top row first, RGBA. n is halved and rounded down from level to level, but
         at least 1. The chain may end before 1. Arrays are copied unless they are read-only and own
         their memory.
-
-    Raises
-    ------
-    TypeError
-        A level is not an array of one of these dtypes.
-    ValueError
-        The shapes are not a mip chain.
     """
 
     levels: tuple[NDArray[Any], ...]

@@ -316,11 +316,6 @@ class Record:
             Values that JSON can represent. The name of the class has the key "method" for settings,
             "stage" for stages of glare and "psf" for point-spread functions.
 
-        See Also
-        --------
-        from_dict : Makes the object from the result.
-        to_json : Returns the result as text.
-
         Examples
         --------
         >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
@@ -347,18 +342,6 @@ class Record:
         -------
         Settings, Glare or PSF
             Of the named class.
-
-        Raises
-        ------
-        ValueError
-            There is no such class or field, the named class is not that of the call, a field
-            without a default has no value, or a value is out of range.
-        TypeError
-            `fields` is not a mapping, or a value has the wrong type.
-
-        See Also
-        --------
-        to_dict : Returns the fields by name.
 
         Examples
         --------
@@ -394,17 +377,7 @@ class Record:
         return made
 
     def to_json(self) -> str:
-        """Return `to_dict` as JSON text.
-
-        See Also
-        --------
-        from_json : Makes the object from the result.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=2).to_json()
-        '{"psf": "gaussian", "sigma": 2.0}'
-        """
+        """Return `to_dict` as JSON text."""
         import json  # noqa: PLC0415  costs start-up time
 
         return json.dumps(self.to_dict())
@@ -417,19 +390,6 @@ class Record:
         ----------
         text : str
             An object with the keys of `from_dict`.
-
-        Returns
-        -------
-        Settings, Glare or PSF
-
-        Raises
-        ------
-        ValueError, TypeError
-            The text is not a JSON object, or as for `from_dict`.
-
-        See Also
-        --------
-        to_json : Returns the text.
 
         Examples
         --------

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import ANY, checked_as
 
 from ._image import as_float, format_of, storage
 from ._sampling import Array
@@ -51,7 +51,7 @@ def check_settings(settings: object) -> None:
         raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
 
 
-@checked
+@checked_as(bloom=ANY)
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,
