@@ -24,15 +24,16 @@ from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness,
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.sources import (
+    SCENE_SIZE,
+    any_source,
     batch_sources,
     checked_inputs,
-    image_kind,
     image_source,
     is_image,
     scene_source,
     take_batch,
 )
-from vkbloom._settings.settings import Settings, Shading, check_settings, check_shading
+from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._suggestions import unknown
 from vkbloom._version import installed_version
 
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
 
-SCENE_SIZE = (1280, 720)
 # Stands for images that are not known yet. Larger ones have more levels, of the same names but for
 # the number.
 _ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
@@ -629,19 +629,7 @@ class Renderer:
         [0.5, 1.0]
         """
         self._pending.wait()
-        if is_image(source):
-            for name, given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-                ("time", time != 0),
-            ):
-                if given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            found = image_source(source, core=self._core, name="source")
-        else:
-            found = scene_source(
-                cast("Scene", source), SCENE_SIZE if size is None else size, shading, time, "source"
-            )
+        found = any_source(source, size, shading, time, self._core)
         return self._run_many(found, settings, check_framebuffers(framebuffers), device)
 
     @checked
@@ -696,21 +684,15 @@ class Renderer:
 
         settings = check_settings(settings, of_image=is_image(source))
         names = check_framebuffers(framebuffers)
+        given = likeness(source) if on_cuda(source) else source
+        planned = any_source(given, size, shading, 0.0)
         kind: str = shading
         dtype = channels = None
         if is_image(source):
-            for name, is_given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-            ):
-                if is_given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            kind, (shape, dtype) = "image", image_kind(source, "source")
-            height, width, channels = shape
-            planned = image_source(likeness(source) if on_cuda(source) else source)
+            (height, width, channels), name = planned.kind
+            kind, dtype = "image", np.dtype(name)
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
-            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0, "source")
         plan = self._core.plan(planned, settings, names)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
         return Plan(
