@@ -213,7 +213,7 @@ def test_wrong_arguments(
     with pytest.raises(ValueError, match="size: "):
         renderer.plan(scene, size=(0, 9))
     for source in (None, [plain], "image"):
-        with pytest.raises(TypeError, match="source: .* is not a Scene"):
+        with pytest.raises(TypeError, match=r"source: .* is not a Scene"):
             renderer.plan(source)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="dtype int64"):
         renderer.plan(plain.astype(np.int64))

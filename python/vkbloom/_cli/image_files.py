@@ -116,7 +116,7 @@ def read_picture(
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     note_parts(source, stored, layer)
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
-    if (text := image_reading.specials_note(*counts)) is not None:
+    if (text := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")

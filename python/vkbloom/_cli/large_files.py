@@ -380,9 +380,9 @@ class _Notes:
 
     def texts(self) -> Iterator[str]:
         """Yield each note once, with the name of the file."""
-        specials = image_reading.specials_note(self._nan, self._infinite)
-        if specials is not None:
-            yield f"{self.file} {specials}"
+        note = image_reading.non_finite_note(self._nan, self._infinite)
+        if note is not None:
+            yield f"{self.file} {note}"
         for text in (*self._texts, *hidden_notes(self._hidden, self._visible)):
             yield f"{self.file}: {text}"
 

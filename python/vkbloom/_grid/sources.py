@@ -62,7 +62,7 @@ def visit(
             drawn.append(point.index)
             yield Request(source.on(renderer, point.place), point.settings)
 
-    for frames in renderer._run_work(work(), check_framebuffers(framebuffers)):
+    for frames in renderer._run_requests(work(), check_framebuffers(framebuffers)):
         yield drawn.popleft(), frames
 
 

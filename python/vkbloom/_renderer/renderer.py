@@ -140,15 +140,15 @@ def _paired(
     state: dict[Any, Any] = {}
     for source in sources:
         if isinstance(settings, Settings):
-            one = settings
+            chosen = settings
         elif count < len(settings):
-            one = settings[count]
+            chosen = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Request(source, one._in_sequence(count, state))
+        request = requests.Request(source, chosen._in_sequence(count, state))
         del source
-        yield work
-        del work
+        yield request
+        del request
         count += 1
     if not isinstance(settings, Settings) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
@@ -527,8 +527,8 @@ class Renderer:
         place = self._placed(device)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
             return self._run_batch(images, chosen, names, place)
-        work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-        return self._run_work(work, names, place, alone=True)
+        sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        return self._run_requests(sequence, names, place, alone=True)
 
     @checked
     def upload(
@@ -551,17 +551,6 @@ class Renderer:
         -------
         Image
             This renderer accepts it in place of an array. Calls do not compare its bytes.
-
-        Examples
-        --------
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
-        ...     dark, bright = (
-        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
-        ...         for exposure in (-1.0, 1.0)
-        ...     )
-        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
-        True
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
@@ -667,14 +656,6 @@ class Renderer:
         -----
         This makes no device call and does not wait for other threads' calls. A plan does not depend
         on the pixels of an image or on a scene's time.
-
-        Examples
-        --------
-        >>> import vkbloom
-        >>> with vkbloom.Renderer() as renderer:
-        ...     plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Pyramid(levels=2), (640, 360))
-        >>> {name: shape for name, (shape, _) in plan.framebuffers.items() if name[:4] == "down"}
-        {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
         """
         from vkbloom._renderer.plans import (  # noqa: PLC0415  costs start-up time
             Pass,
@@ -743,8 +724,8 @@ class Renderer:
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
-            work = _paired(batch_sources(batch, first), settings)
-            return self._run_work(work, names, place, alone=True)
+            sequence = _paired(batch_sources(batch, first), settings)
+            return self._run_requests(sequence, names, place, alone=True)
 
         for frames in self._batches.run(batch, settings, names, self._frames, rest):
             self._save_pipelines()
@@ -795,7 +776,7 @@ class Renderer:
             settings = tuple(settings)
             if names:
                 self._check_names(source, settings, names)
-        return self._run_work(
+        return self._run_requests(
             (
                 requests.Request(source, check_settings(one, f"settings[{number}]"))
                 for number, one in enumerate(settings)
@@ -822,7 +803,7 @@ class Renderer:
             if found and _NUMBER.sub("#", name) not in kinds:
                 raise ValueError(unknown("framebuffers: unknown framebuffer", name, found))
 
-    def _run_work(
+    def _run_requests(
         self,
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,

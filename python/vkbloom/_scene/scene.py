@@ -198,17 +198,6 @@ class Scene:
         -------
         Scene
 
-        Raises
-        ------
-        TypeError
-            An argument has another type.
-        OSError
-            A file is missing or cannot be read.
-        ValueError
-            A file is damaged or has no triangles, or an argument is out of range.
-        ModuleNotFoundError
-            pygltflib, or OpenImageIO for an image, is not installed.
-
         Examples
         --------
         >>> vkbloom.Scene.from_gltf("missing.glb")
