@@ -127,7 +127,7 @@ _KINDS: dict[str, Kind] = {
     "values": Kind("a sequence", _items(ANY.test)),
     **dict.fromkeys(("at", "size"), PAIR),
     **dict.fromkeys(("bounds", "chunks", "metadata", "out", "reduce"), MAPPING),
-    **dict.fromkeys(("bloom", "on_mended"), FUNCTION),
+    **dict.fromkeys(("bloom", "on_mended", "reference"), FUNCTION),
     "dtype": DTYPE,
     "loss": LOSS,
     "renderer": _instance_of("Renderer"),

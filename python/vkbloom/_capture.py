@@ -64,13 +64,6 @@ def capture(
         The file is written when the context ends. If it ends with an exception, no file is
         written.
 
-    Raises
-    ------
-    Error
-        RenderDoc is not loaded, or it captured nothing. The message says how to load it.
-    ValueError
-        The renderer is closed.
-
     Notes
     -----
     The names of `Renderer.plan` are the labels of passes and the names of images and buffers.

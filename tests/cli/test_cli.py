@@ -293,10 +293,10 @@ def test_options_change_a_preset() -> None:
             "--framebuffers final,glare",
             "framebuffers: unknown framebuffer 'glare'; available: glow",
         ),
-        ("--camera-fov 180", "fov is 180.0; over 0 and under 180"),
-        ("--glow-intensity -1", "glow_intensity is -1.0; 0 or more"),
+        ("--camera-fov 180", "fov: 180.0 is out of range"),
+        ("--glow-intensity -1", "glow_intensity: -1.0 is out of range"),
         ("--shading flat", "'--shading': 'flat' is not one of 'forward', 'deferred'"),
-        ("--camera-position 1,2", "position has 2 entries; three are needed"),
+        ("--camera-position 1,2", "position: (1.0, 2.0) is not three numbers"),
         ("--skybox a.png --skybox b.png", "--skybox: given 2 times"),
     ],
 )

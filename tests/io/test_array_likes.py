@@ -95,7 +95,7 @@ def test_other_objects(image: Any) -> None:
 
 
 def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
-    with pytest.raises(TypeError, match=r"^scene: a Scene is needed, not ndarray$"):
+    with pytest.raises(TypeError, match=r"^scene: ndarray is not a Scene$"):
         renderer.render(IMAGE)  # type: ignore[arg-type]
 
 

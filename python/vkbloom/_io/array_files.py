@@ -103,16 +103,6 @@ def read(
         "alpha" ("straight", "premultiplied", or None without alpha), "parts" (the names of the
         parts) and "notes" (assumptions).
 
-    Raises
-    ------
-    OSError
-        The file does not exist or cannot be opened. The error names it.
-    ValueError
-        The file is damaged or not an image; it has no such part or layer; or it has several layers
-        and `layer` is missing (the message lists them). The error names the file.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
-
     Notes
     -----
     Profiles and colour spaces are converted with OpenColorIO's built-in configuration, which is
@@ -235,18 +225,6 @@ def write(
     -------
     Path
         The file.
-
-    Raises
-    ------
-    TypeError
-        The array's dtype is not uint8, uint16 or a float.
-    ValueError
-        The array's shape or an argument is not one of the above; or the format cannot store the
-        array: JPEG, GIF and Radiance HDR have no alpha, OpenEXR has no integers.
-    OSError
-        The file cannot be written. The error names it, and no partial file is left.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
 
     Notes
     -----

@@ -123,13 +123,6 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
         w0 + 2 (w1 + ... + w_radius) = 1.
 
-    Raises
-    ------
-    ValueError
-        `sigma` or `radius` is out of range.
-    TypeError
-        `sigma` is not a number, or `radius` not an integer.
-
     Examples
     --------
     >>> weights = vkbloom.gaussian_weights(1.0, radius=2)

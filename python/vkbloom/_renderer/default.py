@@ -16,7 +16,8 @@ from vkbloom._argument_types import checked
 from vkbloom._renderer.device_arrays import Device
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
-from vkbloom._renderer.renderer import SCENE_SIZE, Renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.sources import SCENE_SIZE
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, Shading, check_settings
 

@@ -24,15 +24,16 @@ from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness,
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.sources import (
+    SCENE_SIZE,
+    any_source,
     batch_sources,
     checked_inputs,
-    image_kind,
     image_source,
     is_image,
     scene_source,
     take_batch,
 )
-from vkbloom._settings.settings import Settings, Shading, check_settings, check_shading
+from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._suggestions import unknown
 from vkbloom._version import installed_version
 
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
 
-SCENE_SIZE = (1280, 720)
 # Stands for images that are not known yet. Larger ones have more levels, of the same names but for
 # the number.
 _ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
@@ -140,15 +140,15 @@ def _paired(
     state: dict[Any, Any] = {}
     for source in sources:
         if isinstance(settings, Settings):
-            one = settings
+            chosen = settings
         elif count < len(settings):
-            one = settings[count]
+            chosen = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Request(source, one._in_sequence(count, state))
+        request = requests.Request(source, chosen._in_sequence(count, state))
         del source
-        yield work
-        del work
+        yield request
+        del request
         count += 1
     if not isinstance(settings, Settings) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
@@ -527,8 +527,8 @@ class Renderer:
         place = self._placed(device)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
             return self._run_batch(images, chosen, names, place)
-        work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-        return self._run_work(work, names, place, alone=True)
+        sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        return self._run_requests(sequence, names, place, alone=True)
 
     @checked
     def upload(
@@ -551,17 +551,6 @@ class Renderer:
         -------
         Image
             This renderer accepts it in place of an array. Calls do not compare its bytes.
-
-        Examples
-        --------
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
-        ...     dark, bright = (
-        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
-        ...         for exposure in (-1.0, 1.0)
-        ...     )
-        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
-        True
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
@@ -629,19 +618,7 @@ class Renderer:
         [0.5, 1.0]
         """
         self._pending.wait()
-        if is_image(source):
-            for name, given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-                ("time", time != 0),
-            ):
-                if given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            found = image_source(source, core=self._core, name="source")
-        else:
-            found = scene_source(
-                cast("Scene", source), SCENE_SIZE if size is None else size, shading, time, "source"
-            )
+        found = any_source(source, size, shading, time, self._core)
         return self._run_many(found, settings, check_framebuffers(framebuffers), device)
 
     @checked
@@ -679,14 +656,6 @@ class Renderer:
         -----
         This makes no device call and does not wait for other threads' calls. A plan does not depend
         on the pixels of an image or on a scene's time.
-
-        Examples
-        --------
-        >>> import vkbloom
-        >>> with vkbloom.Renderer() as renderer:
-        ...     plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Pyramid(levels=2), (640, 360))
-        >>> {name: shape for name, (shape, _) in plan.framebuffers.items() if name[:4] == "down"}
-        {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
         """
         from vkbloom._renderer.plans import (  # noqa: PLC0415  costs start-up time
             Pass,
@@ -696,21 +665,15 @@ class Renderer:
 
         settings = check_settings(settings, of_image=is_image(source))
         names = check_framebuffers(framebuffers)
+        given = likeness(source) if on_cuda(source) else source
+        planned = any_source(given, size, shading, 0.0)
         kind: str = shading
         dtype = channels = None
         if is_image(source):
-            for name, is_given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-            ):
-                if is_given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            kind, (shape, dtype) = "image", image_kind(source, "source")
-            height, width, channels = shape
-            planned = image_source(likeness(source) if on_cuda(source) else source)
+            (height, width, channels), name = planned.kind
+            kind, dtype = "image", np.dtype(name)
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
-            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0, "source")
         plan = self._core.plan(planned, settings, names)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
         return Plan(
@@ -761,8 +724,8 @@ class Renderer:
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
-            work = _paired(batch_sources(batch, first), settings)
-            return self._run_work(work, names, place, alone=True)
+            sequence = _paired(batch_sources(batch, first), settings)
+            return self._run_requests(sequence, names, place, alone=True)
 
         for frames in self._batches.run(batch, settings, names, self._frames, rest):
             self._save_pipelines()
@@ -805,7 +768,7 @@ class Renderer:
     ) -> Iterator[Frames]:
         place = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
-        if not isinstance(settings, abc.Iterable) or isinstance(settings, str):
+        if not isinstance(settings, abc.Iterable) or isinstance(settings, str | bytes):
             raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
         if self.closed:
             raise ValueError("the renderer is closed")
@@ -813,7 +776,7 @@ class Renderer:
             settings = tuple(settings)
             if names:
                 self._check_names(source, settings, names)
-        return self._run_work(
+        return self._run_requests(
             (
                 requests.Request(source, check_settings(one, f"settings[{number}]"))
                 for number, one in enumerate(settings)
@@ -840,7 +803,7 @@ class Renderer:
             if found and _NUMBER.sub("#", name) not in kinds:
                 raise ValueError(unknown("framebuffers: unknown framebuffer", name, found))
 
-    def _run_work(
+    def _run_requests(
         self,
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,

@@ -70,17 +70,6 @@ class Surface:
     size : (int, int)
         Width and height in pixels; (0, 0) while a window is minimized.
 
-    Raises
-    ------
-    ValueError
-        The surface has no MAILBOX, the size is out of range, or the renderer is closed.
-    TypeError
-        An argument has the wrong type.
-    Error
-        The adapter's driver cannot present on this surface.
-    ModuleNotFoundError
-        glfw is missing.
-
     Notes
     -----
     A context manager. Close it before its window is destroyed; one that is not closed lives as
@@ -91,22 +80,6 @@ class Surface:
 
     Two frames are in flight: `present` waits for the device only if it has not finished the frame
     before the last one. Ctrl-C ends this wait.
-
-    Examples
-    --------
-    The scene in a window of glfw, until that is closed:
-
-    >>> def show(scene):
-    ...     import glfw
-    ...
-    ...     glfw.init()
-    ...     glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
-    ...     window = glfw.create_window(1280, 720, "bloom", None, None)
-    ...     with vkbloom.Renderer() as renderer, Surface(renderer, window) as surface:
-    ...         while not glfw.window_should_close(window):
-    ...             surface.present(scene, time=glfw.get_time() / 8)
-    ...             glfw.poll_events()
-    ...     glfw.terminate()
     """
 
     def __init__(

@@ -315,15 +315,6 @@ class Record:
         dict
             Values that JSON can represent. The name of the class has the key "method" for settings,
             "stage" for stages of glare and "psf" for point-spread functions.
-
-        Examples
-        --------
-        >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
-        3
-        >>> vkbloom.Streaks(directions=4).to_dict()["stage"]
-        'streaks'
-        >>> vkbloom.psf.gaussian(sigma=2).to_dict()
-        {'psf': 'gaussian', 'sigma': 2.0}
         """
         values = {name: plain_value(getattr(self, name)) for name in fields_of(type(self))}
         return {self._class_key: self._class_name(), **values}
@@ -384,19 +375,7 @@ class Record:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Make an object from the result of `to_json`.
-
-        Parameters
-        ----------
-        text : str
-            An object with the keys of `from_dict`.
-
-        Examples
-        --------
-        >>> from vkbloom import Settings
-        >>> Settings.from_json('{"method": "pyramid", "levels": 3}').levels
-        3
-        """
+        """Make an object from the result of `to_json`."""
         import json  # noqa: PLC0415  costs start-up time
 
         try:

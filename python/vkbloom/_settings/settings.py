@@ -177,11 +177,6 @@ class Settings(Record):
         **changes
             New values by field. Those of a stage of `glare` have names such as
             "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``.
-
-        Examples
-        --------
-        >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
-        4.0
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
@@ -190,13 +185,7 @@ class Settings(Record):
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:
-        """Return the value of a field, or of a stage's field, such as "glare.0.intensity".
-
-        Examples
-        --------
-        >>> vkbloom.Pyramid(glare=vkbloom.Streaks(fade=0.9)).value_of("glare.0.fade")
-        0.9
-        """
+        """Return the value of a field, or of a stage's field, such as "glare.0.intensity"."""
         if "." not in name:
             return getattr(self, name)
         place, field = stage_field_of(self.glare, name)
