@@ -327,11 +327,4 @@ def check_framebuffers(framebuffers: str | Sequence[str]) -> tuple[str, ...] | N
     """Return the names of the requested framebuffers; None for all."""
     if isinstance(framebuffers, str):
         return None if framebuffers == "all" else (framebuffers,)
-    try:
-        names = tuple(framebuffers)
-    except TypeError:
-        raise TypeError(f"framebuffers: {framebuffers!r} is not a sequence of names") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"framebuffers: {name!r} is not a name")
-    return names
+    return tuple(framebuffers)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
+import itertools
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -78,10 +79,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
     for file in _files_of(target):
-        for index in range(_parts_of(file)):
-            pixels, said = _stored(file, index)
-            if not is_one and not _is_of(target, file, said):
-                continue
+        for pixels, said in _parts_of(file, None if is_one else target):
             try:
                 facts = {
                     "settings": Settings.from_json(said["settings"]),
@@ -106,9 +104,23 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     return {name: array for name, (_, array, _) in ordered}, facts
 
 
-def _parts_of(file: Path) -> int:
-    """Return the number of framebuffers in a file."""
-    return len(image_reading.load(file).parts)
+def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], dict[str, str]]]:
+    """Yield the pixels of each part without the padding of its window, and its attributes.
+
+    `target`: Parts that `save` of this path did not write are left out; None: there are none.
+    """
+    with image_reading.opened(file, "Frames.load") as reader:
+        for index in itertools.count():
+            if not reader.seek_subimage(index, 0):
+                return
+            spec = reader.spec()
+            said = _facts(spec)
+            if target is not None and not _is_of(target, file, said):
+                continue
+            image_reading.check_plausible(spec, file)
+            pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
+            pixels = complete(pixels, reader, file)
+            yield pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 
 def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
@@ -119,18 +131,6 @@ def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
     return file.stem == (name if target.is_dir() else f"{target.stem}_{name}") or (
         file.stem == target.stem
     )
-
-
-def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
-    """Return the pixels of a part without the padding of its window, and its attributes."""
-    with image_reading.opened(file, "Frames.load") as reader:
-        reader.seek_subimage(index, 0)
-        spec = reader.spec()
-        image_reading.check_plausible(spec, file)
-        said = _facts(spec)
-        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
-        pixels = complete(pixels, reader, file)
-    return pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 
 def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:

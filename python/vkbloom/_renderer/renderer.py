@@ -93,8 +93,6 @@ def _arrays_for(
     """
     if out is None:
         return requests.new_arrays(core, plan, place)
-    if not isinstance(out, abc.Mapping):
-        raise TypeError(f"out: {type(out).__name__} is not a mapping of names to arrays")
     names = [name for name, _, _ in plan.outputs]
     for name in out:
         if name not in names:

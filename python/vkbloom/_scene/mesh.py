@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.skybox import read_only
+from vkbloom._scene.arrays import read_only
 from vkbloom._scene.textures import WHITE, Surface
 
 __all__ = ["Mesh"]

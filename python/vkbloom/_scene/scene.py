@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
+import sys
 import weakref
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from vkbloom._argument_types import PATH, checked_as
-from vkbloom._checks import FLT_MAX, check_above, check_floats, check_number
+from vkbloom._checks import check_above, check_floats, check_number
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
@@ -135,7 +136,7 @@ class Scene:
             if not isinstance(value, kind) and not (optional and value is None):
                 needed = f"{kind.__name__} or None" if optional else kind.__name__
                 raise TypeError(f"{name}: {type(value).__name__} is not a {needed}")
-        intensity = check_number("glow_intensity", self.glow_intensity, 0, FLT_MAX)
+        intensity = check_number("glow_intensity", self.glow_intensity, 0, sys.float_info.max)
         object.__setattr__(self, "glow_intensity", intensity)
         key = (id(self.body), id(self.glow), id(self.skybox))
         object.__setattr__(self, "_contents", _contents.setdefault(key, _Contents()))
