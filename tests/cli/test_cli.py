@@ -186,19 +186,9 @@ def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) 
     assert names >= {f"--{info.option.replace('_', '-')}" for info in fields_of(kind).values()}
 
 
-def test_every_method_is_there() -> None:
-    assert set(METHODS) >= {"separable", "pyramid", "dual_kawase"}
-    for name, kind in METHODS.items():
-        assert settings_from("--method", name) == kind()
-
-
 def test_every_preset_is_there() -> None:
     for name, settings in vkbloom.presets.items():
         assert settings_from("--preset", name) == settings
-
-
-def test_the_default_is_the_renderers() -> None:
-    assert settings_from() == vkbloom.Separable()
 
 
 @pytest.mark.parametrize(
@@ -507,17 +497,6 @@ def test_an_animation_is_one_turn_in_numbered_files(tmp_path: Path) -> None:
     assert re.search(r"^ +glow +[\d.]+ +3$", result.stdout, re.M)
 
 
-def test_an_animation_in_a_folder(tmp_path: Path) -> None:
-    wanted = ("--frames", "2", "--framebuffers", "glow,final")
-    assert vkb("render", "-o", f"{tmp_path}/new/", *SMALL, *wanted).exit_code == 0
-    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
-        "0000_final.png",
-        "0000_glow.png",
-        "0001_final.png",
-        "0001_glow.png",
-    ]
-
-
 def test_an_animation_in_a_gif(tmp_path: Path) -> None:
     oiio = pytest.importorskip("OpenImageIO")
     path = tmp_path / "a.gif"
@@ -558,11 +537,6 @@ def test_render_without_bloom_says_so(tmp_path: Path, words: tuple[str, ...]) ->
     assert result.exit_code == 0
     assert "no value is above the threshold 2" in result.stderr
     assert vkb("render", "-o", tmp_path / "a.png", *SMALL, *words).stderr == ""
-
-
-def test_render_passes_validation(tmp_path: Path) -> None:
-    result = vkb("render", "-o", tmp_path / "out.exr", *SMALL, "--validation")
-    assert (result.exit_code, result.stderr) == (0, "")
 
 
 def test_validation_is_handed_on(tmp_path: Path) -> None:

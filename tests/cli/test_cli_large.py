@@ -253,14 +253,6 @@ def test_mask_or_emission_of_another_shape_is_refused(
     assert not by_rows
 
 
-def test_missing_bloom_is_noted(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
-    result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
-    assert result.exit_code == 0
-    assert "no value is above the threshold 1" in result.stderr
-    assert by_rows
-
-
 @pytest.mark.parametrize("where", ["add", "final"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, vkbloom.DeviceLostError("lost")])
 def test_failure_leaves_no_file(
@@ -279,16 +271,6 @@ def test_failure_leaves_no_file(
     result = run(path, tmp_path / "b.png")
     assert result.exit_code == (130 if error is KeyboardInterrupt else 1)
     assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_a_damaged_file(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    result = run(path, tmp_path / "b.png")
-    assert result.exit_code == 1
-    assert "a.png: damaged" in result.stderr
-    assert not (tmp_path / "b.png").exists()
 
 
 def test_apply_file_is_the_render_of_the_array(tmp_path: Path, by_rows: list[int]) -> None:

@@ -303,7 +303,3 @@ def test_an_image_begins_as_in_apply(
     ((image, settings),) = begun
     assert settings == vkbloom.presets[preset]
     assert image.max() == pytest.approx(largest, rel=1e-5)
-
-
-def test_explore_is_public() -> None:
-    assert "explore" in vkbloom.__all__

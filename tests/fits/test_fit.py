@@ -191,39 +191,6 @@ class TestFound:
         assert set(sizes) == {200, 800}
         assert len(sizes) == found.calls + 1
 
-    def test_same_result_again(self, renderer: Renderer) -> None:
-        target = target_of(Pyramid(threshold=1.2, levels=4))
-        first, second = (
-            vkbloom.fit(
-                IMAGE,
-                target,
-                Pyramid(),
-                ["threshold"],
-                renderer=renderer,
-                max_calls=20,
-                framebuffer="bloom",
-            )
-            for _ in range(2)
-        )
-        assert first.settings == second.settings
-        np.testing.assert_array_equal(first.history, second.history)
-
-    def test_uint8(self, renderer: Renderer) -> None:
-        image = np.rint(np.clip(IMAGE, 0, 1) * 255).astype(np.uint8)
-        truth = Pyramid(levels=3, threshold=0.6, knee=0.5, intensity=2.0)
-        target = np.rint(np.clip(target_of(truth, "final", image), 0, 255)).astype(np.uint8)
-        found = vkbloom.fit(
-            image,
-            renderer.apply(image, truth)["final"],
-            Pyramid(levels=3, knee=0.5),
-            ["threshold", "intensity"],
-            framebuffer="final",
-            renderer=renderer,
-        )
-        assert target.shape == found.target.shape
-        assert found.settings.threshold == pytest.approx(0.6, rel=0.05)
-        assert found.loss < 0.01
-
 
 @pytest.fixture(scope="module")
 def found(renderer: Renderer) -> FitResult:

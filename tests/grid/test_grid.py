@@ -16,7 +16,6 @@ import pytest
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.framebuffers import noise
-from tests.processes import output
 from vkbloom import (
     Convolution,
     DualKawase,
@@ -32,8 +31,6 @@ from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.layout import Grid, PassCounter, ask, lay_out
 from vkbloom._grid.order import blocks
 from vkbloom._grid.progress import Progress
-
-xr = pytest.importorskip("xarray")
 
 # For images and scenes that no renderer has rendered.
 UNSEEN = itertools.count(1000)
@@ -100,18 +97,6 @@ class TestValues:
             expected = renderer.render(scene, settings, (48, 27), time=time)
             for name in ("final", "depth"):
                 np.testing.assert_array_equal(dataset[name].values[place], expected[name])
-
-    def test_deferred_shading(self, renderer: Renderer, scene: Scene) -> None:
-        dataset = vkbloom.grid(
-            scene,
-            Separable(),
-            {"exposure": [-1, 0]},
-            size=(32, 18),
-            shading="deferred",
-            renderer=renderer,
-        )
-        expected = renderer.render(scene, Separable(exposure=-1), (32, 18), shading="deferred")
-        np.testing.assert_array_equal(dataset["final"].values[0], expected["final"])
 
     @pytest.mark.parametrize("labels", [None, ["a", "b", "c"]])
     def test_lists_of_images(self, renderer: Renderer, labels: list[Any] | None) -> None:
@@ -281,19 +266,6 @@ class TestWholeSettings:
                 np.testing.assert_array_equal(found, frames[name])
         assert np.isinf(grid["psnr"].isel(settings=0)).all()
 
-    def test_in_a_store(self, tmp_path: Path) -> None:
-        pytest.importorskip("zarr")
-        image = np.random.default_rng(3).random((8, 12, 3)).astype(np.float32)
-        arguments: Any = (image, None, {"settings": [Separable(), Pyramid(levels=2)]})
-        first = vkbloom.grid(*arguments, store=tmp_path, progress=False)["final"].values
-        again = vkbloom.grid(*arguments, store=tmp_path, resume=True, progress=False)
-        np.testing.assert_array_equal(again["final"].values, first)
-        assert again.attrs["passes_run"] == 0
-        assert vkbloom.check_grid(tmp_path).complete
-        other = {"settings": [Separable(), Pyramid(levels=3)]}
-        with pytest.raises(ValueError, match="axes"):
-            vkbloom.grid(image, None, other, store=tmp_path, resume=True, progress=False)
-
     def test_floats_become_the_largest_of_their_dtypes(self, renderer: Renderer) -> None:
         half = np.random.default_rng(4).random((8, 12, 3)).astype(np.float16)
         formats: Any = ["rgba16float", "rgba32float"]
@@ -382,17 +354,6 @@ class TestDataset:
         assert dataset.attrs["adapter"] == renderer.info.name
         assert dataset.attrs["version"] == vkbloom.__version__
         assert json.loads(dataset.attrs["axes"]) == ["blur_scale"]
-
-    def test_xarray_selects(self, renderer: Renderer, image: Any) -> None:
-        dataset = vkbloom.grid(
-            image,
-            Separable(),
-            {"blur_scale": [0.5, 1.1, 2.0], "tonemap": ["none", "aces"]},
-            renderer=renderer,
-        )
-        chosen = dataset["final"].sel(blur_scale=1.0, method="nearest").sel(tonemap="aces")
-        expected = renderer.apply(image, Separable(blur_scale=1.1, tonemap="aces"))["final"]
-        np.testing.assert_array_equal(chosen.values, expected)
 
 
 class TestRefusals:
@@ -606,32 +567,8 @@ class TestExtras:
             vkbloom.grid(image, Separable(), {"exposure": [0]}, store=tmp_path / "a.zarr")
         assert not (tmp_path / "a.zarr").exists()
 
-    def test_importing_the_package_needs_none(self) -> None:
-        code = (
-            "import sys; sys.modules.update(dict.fromkeys(['xarray', 'zarr', 'dask', 'distributed',"
-            " 'matplotlib', 'tqdm'])); import vkbloom"
-        )
-        output("-c", code)
-
-    def test_grids_are_imported_late(self) -> None:
-        code = (
-            "import sys, vkbloom\n"
-            "assert not any(name.startswith('vkbloom._grid') for name in sys.modules)\n"
-            "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
-            "from vkbloom import reductions"
-        )
-        output("-c", code)
-        with pytest.raises(AttributeError, match="grids"):
-            vkbloom.grids  # type: ignore[attr-defined]  # noqa: B018
-
 
 class TestProgress:
-    def test_silent_without_a_terminal(
-        self, renderer: Renderer, image: Any, capfd: pytest.CaptureFixture[str]
-    ) -> None:
-        vkbloom.grid(image, Separable(), {"exposure": [0, 1]}, progress=True, renderer=renderer)
-        assert capfd.readouterr() == ("", "")
-
     def test_a_terminal_sees_passes(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:

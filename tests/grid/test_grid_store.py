@@ -103,11 +103,6 @@ class TestWhole:
         expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
         np.testing.assert_array_equal(chosen.compute().values, expected)
 
-    def test_complete_store_is_reported_complete(self, undisturbed: Path) -> None:
-        report = check_grid(undisturbed)
-        assert report.complete
-        assert str(report) == f"{POINTS} of {POINTS} points are done"
-
     @pytest.mark.parametrize("url", ["file://{}/a.zarr", "memory://{}/a.zarr"])
     def test_store_of_an_url_has_the_same_content(
         self, tmp_path: Path, undisturbed: Path, url: str
@@ -125,12 +120,6 @@ class TestWhole:
         assert again.attrs["passes_run"] == 0
         assert "vkbloom_grid" not in again.attrs
         assert mended == []
-
-    def test_netcdf_holds_a_store(self, undisturbed: Path, tmp_path: Path) -> None:
-        opened = xr.open_zarr(undisturbed)
-        opened.to_netcdf(tmp_path / "a.nc", engine="scipy")
-        again = xr.load_dataset(tmp_path / "a.nc", engine="scipy")
-        assert np.array_equal(again["final"], opened["final"])
 
     def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
         black = np.zeros((4, 4, 3), np.uint8)
@@ -401,14 +390,6 @@ class TestRefused:
                 with pytest.raises(ValueError, match="its content is not a grid"):
                     call(tmp_path / name)
             assert contents(tmp_path / name) == before
-
-    def test_nothing(self, tmp_path: Path) -> None:
-        with pytest.raises(FileNotFoundError):
-            check_grid(tmp_path / "a.zarr")
-
-    def test_store_of_a_wrong_type_is_refused(self) -> None:
-        with pytest.raises(TypeError, match="store"):
-            make(3)
 
     def test_a_reference_frame_is_part_of_the_grid(self, tmp_path: Path) -> None:
         one = {"reduce": {"p": reductions.PSNR(against=source())}, "framebuffers": ()}

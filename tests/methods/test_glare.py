@@ -371,39 +371,3 @@ def test_settings() -> None:
     assert again == settings
     assert hash(again) == hash(settings)
     assert repr(Streaks(directions=cast("Any", np.int64(4)))).startswith("Streaks(intensity=1.0")
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Streaks(directions=17), "directions: 17 is out of range, 1 to 16"),
-        (lambda: Streaks(directions=cast("Any", 1.5)), "directions: 1.5 is not an integer"),
-        (lambda: Streaks(fade=np.nan), "fade: nan is out of range, 0 to 1"),
-        (lambda: Pyramid(glare=(SHORT,) * 6), "glare: 6 stages are out of range, 0 to 5"),
-        (
-            lambda: Pyramid(glare=cast("Any", {"stage": "rain"})),
-            "stage: 'rain' is not one of streaks",
-        ),
-        (
-            lambda: Pyramid(glare=cast("Any", [{"stage": "streaks", "size": 1}])),
-            "glare: streaks has no 'size'; it has intensity",
-        ),
-    ],
-)
-def test_wrong_values(make: Callable[[], object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (Glare, "Glare is abstract"),
-        (lambda: Ghosts(tints=cast("Any", (1.0,))), "tints: .* is not a sequence"),
-        (lambda: Pyramid(glare=cast("Any", 5)), "5 is not a sequence of stages"),
-        (lambda: Pyramid(glare=cast("Any", [1])), "1 is not a stage"),
-    ],
-)
-def test_wrong_types(make: Callable[[], object], message: str) -> None:
-    with pytest.raises(TypeError, match=message):
-        make()
