@@ -130,24 +130,3 @@ def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     assert vkbloom.read(out)[:, 11, 3].min() > 0
     refused = run("apply", source, out, "--alpha", "blur", "--encoding", "srgb")
     assert refused.exit_code == 2
-
-
-def test_wrong_mask_emission_or_alpha_is_refused(tmp_path: Path) -> None:
-    source = stored(tmp_path / "a.exr", picture(24, 16, 3))
-    out = tmp_path / "out.exr"
-    small = stored(tmp_path / "small.png", np.zeros((8, 8, 3), np.uint8))
-    coloured = stored(tmp_path / "coloured.png", picture(24, 16, 3, "uint8"))
-    refused = run("apply", source, out, "--mask", small)
-    assert refused.exit_code == 2
-    assert "mask: shape (8, 8) is not the image's, (16, 24)" in refused.stderr
-    refused = run("apply", source, out, "--mask", coloured)
-    assert refused.exit_code == 1
-    assert refused.stderr.count("\n") == 1
-    assert "coloured.png: a mask must be grey, but this image has colours" in refused.stderr
-    refused = run("apply", source, out, "--alpha", "blur")
-    assert refused.exit_code == 2
-    assert "alpha: 'blur' needs an image of 4 channels" in refused.stderr
-    assert not out.exists()
-    refused = run("explore", "--no-open", "--mask", coloured)
-    assert refused.exit_code == 2
-    assert "--mask and --emission need an IMAGE" in refused.stderr

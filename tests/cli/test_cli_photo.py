@@ -248,29 +248,6 @@ class TestSettingsOfFiles:
         assert drawn.exit_code == 0, drawn.stderr
         assert json.loads(facts_of("r.exr")["settings"])["intensity"] == 0.25
 
-    @pytest.mark.usefixtures("image")
-    @pytest.mark.parametrize(
-        ("file", "content", "status", "told"),
-        [
-            ("a.png", None, 1, "a.png: holds no settings"),
-            ("no.json", None, 1, "no.json: No such file or directory"),
-            ("s.json", "{}", 1, "s.json: method: None is not one of"),
-            ("s.json", "", 1, "s.json: "),
-            ("s.json", '{"method": "kino", "x": 1}', 1, "s.json: fields: kino has no 'x'"),
-            ("s.json", '{"method": "my_own"}', 1, "s.json: method: 'my_own' is not one of"),
-            ("s.json", '{"method": "kino"} --preset kino', 2, "exclude each other"),
-            ("s.json", '{"method": "kino"} --method urp', 2, "is of the method kino, not urp"),
-        ],
-    )
-    def test_errors(self, file: str, content: str | None, status: int, told: str) -> None:
-        text, sign, more = (content or "").partition(" --")
-        if content is not None:
-            Path(file).write_text(text)
-        words = f"--{more}".split() if sign else []
-        failed = apply("a.png", "b.png", "--settings", file, *words)
-        assert (failed.exit_code, failed.stderr.count("\n")) == (status, 1)
-        assert told in failed.stderr
-
 
 def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:
     image = np.random.default_rng(0).random((12, 16, 3), np.float32)
@@ -280,12 +257,3 @@ def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:
     made = out / "000_final.png"
     assert apply(file, tmp_path / "b.png", "--settings", made).exit_code == 0
     np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.png"), vkbloom.read(made))
-
-
-def test_images_of_a_grid_have_one_start(tmp_path: Path) -> None:
-    image = np.random.default_rng(0).random((12, 16, 3), np.float32)
-    files = [str(vkbloom.write(tmp_path / name, image)) for name in ("a.exr", "b.png")]
-    words = ["grid", *files, "-o", str(tmp_path / "g"), "--axis", "intensity=0.5"]
-    failed = CliRunner().invoke(program, words)
-    assert failed.exit_code == 2
-    assert "give --preset NAME for all" in failed.stderr

@@ -80,21 +80,6 @@ class TestSequences:
         assert run("f.0010.png", "-o", "alone.png").exit_code == 0
         assert (frames / "g.0010.png").read_bytes() == (frames / "alone.png").read_bytes()
 
-    @pytest.mark.parametrize(
-        ("words", "status", "message"),
-        [
-            (["f.*.png", "g.png"], 2, "g.png: one file cannot hold 4 images"),
-            (["x.%d.png", "g.%d.png"], 1, "x.%d.png: no file was found"),
-            (["f.0008.png", "./f.0008.png", "out"], 2, "two images have the same name"),
-        ],
-    )
-    def test_errors(self, frames: Path, words: list[str], status: int, message: str) -> None:
-        before = names(frames)
-        result = run(*words)
-        assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
-        assert message in result.stderr
-        assert names(frames) == before
-
     @pytest.mark.parametrize("which", [(8,), (9, 10), (11,), (8, 9, 10, 11)])
     def test_the_other_images_are_done(self, frames: Path, which: tuple[int, ...]) -> None:
         for number in which:
@@ -436,10 +421,3 @@ def test_glare_without_light_is_noted(tmp_path: Path, glare: str, said: str | No
     else:
         assert f"note: {said}" in result.stderr
         assert result.stderr.count("\n") == 1
-
-
-def test_options_that_the_method_lacks(tmp_path: Path) -> None:
-    path = store_png(tmp_path / "a.png", IMAGE)
-    result = run(path, tmp_path / "b.png", "--blur-strength", 2)
-    assert result.exit_code == 2
-    assert "the method bevy has no --blur-strength; give --method separable" in result.stderr

@@ -158,22 +158,6 @@ def test_a_large_picture_is_reduced() -> None:
     assert listing._reduced(image).shape == (1, listing._LARGEST_SIDE, 3)
 
 
-@pytest.mark.parametrize(
-    ("words", "status", "told"),
-    [
-        (("--sheet", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
-        (("-o", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
-        (("--sheet", "a.png", "-o", "b.jpg"), 2, "--out: b.jpg does not end in .png"),
-        (("--sheet", "none.png", "-o", "b.png"), 1, "none.png: No such file"),
-        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: there is no folder none"),
-    ],
-)
-def test_wrong_use(words: tuple[str, ...], status: int, told: str) -> None:
-    result = run("glares", *words)
-    assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
-    assert told in result.stderr
-
-
 def test_each_glare_is_seen_on_lamps(tmp_path: Path) -> None:
     """Lights are expanded until a glare shows what it is; the line of its tile says how far."""
     image = np.full((90, 160, 3), 12, np.uint8)

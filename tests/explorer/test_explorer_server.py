@@ -254,12 +254,6 @@ class TestCommand:
     def run(self, *arguments: str) -> Any:
         return CliRunner().invoke(program, ["explore", "--no-open", *arguments])
 
-    def test_wrong_use(self) -> None:
-        result = self.run("photo.exr", "--scene", "ufo")
-        assert result.exit_code == 2
-        assert "leave it out with an IMAGE" in result.stderr
-        assert self.run("--size", "0x3").exit_code == 2
-
     def test_failures(self, monkeypatch: pytest.MonkeyPatch) -> None:
         result = self.run("missing.exr")
         assert (result.exit_code, "missing.exr" in result.stderr) == (1, True)

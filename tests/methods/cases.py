@@ -179,7 +179,7 @@ OTHERS: dict[str, Settings] = {
     "kino-narrow": KinoBloom(radius=1.0, threshold=None),
     "kino-flicker": KinoBloom(radius=4.2, anti_flicker=False, knee=0.0, threshold=1.5),
     "filament": FilamentBloom(resolution=32),
-    "filament-one-level": FilamentBloom(threshold=None, levels=1),
+    "filament-one-level": FilamentBloom(threshold=None, levels=1, resolution=64),
     "filament-halved": FilamentBloom(resolution=40, levels=12, highlight=10.0),
     "filament-odd": FilamentBloom(resolution=112, levels=5, threshold=0.25),
     "urp-narrow": UrpBloom(scatter=0.0, threshold=None, iterations=2),
@@ -212,14 +212,9 @@ OTHERS: dict[str, Settings] = {
     "pygfx-karis": PygfxBloom(karis_average=True, bloom_scale=0.7),
     "pygfx-narrow": PygfxBloom(filter_radius=0.0, levels=4, format="rgba32float"),
     "pygfx-wide": PygfxBloom(filter_radius=0.2, levels=4, format="rgba32float"),
-    **{
-        f"convolution-{boundary}": Convolution(KERNEL, boundary=boundary)
-        for boundary in ("zero", "edge", "wrap", "wrap_x")
-    },
-    "convolution-large": Convolution(NOISE[..., 0].repeat(20, axis=0), boundary="edge"),
+    "convolution-edge": Convolution(KERNEL, boundary="edge"),
     "convolution-knee": Convolution(
         KERNEL, threshold=0.2, knee=0.5, composite="mix", intensity=0.5
     ),
-    "convolution-half": Convolution(KERNEL, bloom_scale=0.5),
     "convolution-fixed": Convolution(psf.spencer(), bloom_size=(20, 31)),
 }

@@ -27,7 +27,12 @@ from vkbloom import Convolution, Renderer, Separable, Settings, UnrealBloom, Urp
 Image = NDArray[Any]
 
 VARIANTS = ("fragment", "cpu", "gpu")
-PRESETS = presets_of_low_levels(64)
+# Of the convolutions one: they have the same passes.
+PRESETS = {
+    name: one
+    for name, one in presets_of_low_levels(64).items()
+    if name == "camera_lens" or not isinstance(one, Convolution)
+}
 CASES: dict[str, tuple[Settings, tuple[str, ...]]] = {
     **{name: (one, ()) for name, one in (METHODS | WHOLE | OTHERS | PRESETS).items()},
     **GIVEN,
@@ -84,7 +89,10 @@ def opened() -> Iterator[dict[str, Renderer]]:
     [
         (name, *kind, number)
         for number, (name, kind) in enumerate(
-            by_turns([*CASES, *PRESETS], turns=itertools.product(SIZES, DTYPES))
+            by_turns(
+                [*CASES, *(name for name in PRESETS if "lens" not in name)],
+                turns=itertools.product(SIZES, DTYPES),
+            )
         )
     ],
 )
