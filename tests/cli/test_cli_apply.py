@@ -234,6 +234,19 @@ class TestFramebuffers:
         written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
         assert len(written) == len(frames)
 
+    @pytest.mark.parametrize(
+        ("words", "more"),
+        [
+            ("--framebuffers bloom,final", "b_bloom.exr"),
+            ("--framebuffers glow,final --raw --method separable", "b_glow.png"),
+            ("", "b.png"),
+        ],
+    )
+    def test_files_beside_a_png(self, tmp_path: Path, words: str, more: str) -> None:
+        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
+        done(path, tmp_path / "b.png", *words.split())
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", more}
+
 
 class TestErrors:
     def test_an_array_of_numpy_says_how_to_convert_it(self, tmp_path: Path) -> None:

@@ -142,6 +142,7 @@ def test_no_driver() -> None:
     assert by_topic(findings, "Vulkan loader").status == "ok"
     assert by_topic(findings, "driver absent.json").status == "problem"
     assert by_topic(findings, "adapters").status == "problem"
+    assert by_topic(findings, "adapters").advice == "Solve the problems above first."
     assert f"VK_DRIVER_FILES={ABSENT}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
     ended = CliRunner().invoke(program, ["doctor"], env={"VK_DRIVER_FILES": ABSENT})
@@ -529,3 +530,46 @@ def test_lavapipe_versions(driver_info: str, status: str) -> None:
     assert finding.status == status
     assert "22.3.6 and 25.0.7" in finding.found
     assert ("is Swift, not lavapipe" in finding.found) is ("Mesa" not in driver_info)
+
+
+def test_nan_is_found(frames: vkbloom.Frames) -> None:
+    nan = tampered(frames, lambda _, array: np.full_like(array, np.nan, np.float32))
+    assert len(nan) == len(frames)
+
+
+def test_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "glob", lambda *_: [])
+    assert installation.gpu_nodes(False) == []
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "expected"),
+    [
+        ("VKBLOOM_CACHE_DIR", "{tmp}/new", ("ok", "{tmp}/new")),
+        ("VKBLOOM_CACHE_DIR", "", ("note", "off: the variable is empty")),
+        ("VKBLOOM_CACHE_DIR", "/dev/null", ("note", "not writable")),
+        ("VKBLOOM_CACHE_DIR", "/dev/null/far/below", ("note", "not writable")),
+        # Permissions do not stop root, but no folder can be made here.
+        ("XDG_CACHE_HOME", "/proc/self", ("note", "not writable")),
+        ("MESA_SHADER_CACHE_DIR", "{tmp}", ("ok", "{tmp}")),
+        ("MESA_SHADER_CACHE_DIR", "/proc/self/none", ("note", "/proc/self/none")),
+        ("__GL_SHADER_DISK_CACHE_PATH", "{tmp}", ("ok", "{tmp}")),
+    ],
+)
+def test_caches(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    variable: str,
+    value: str,
+    expected: tuple[str, str],
+) -> None:
+    """A folder that is not there is not made either."""
+    if variable == "XDG_CACHE_HOME":
+        monkeypatch.delenv("VKBLOOM_CACHE_DIR", raising=False)
+    monkeypatch.setenv(variable, value.format(tmp=tmp_path))
+    name = "VKBLOOM_CACHE_DIR" if variable == "XDG_CACHE_HOME" else variable
+    finding = by_topic(installation.caches(), f"cache {name}")
+    status, told = expected
+    assert (finding.status, told.format(tmp=tmp_path) in finding.found) == (status, True)
+    assert "VKBLOOM" in finding.advice or "not writable" not in finding.found
+    assert list(tmp_path.iterdir()) == []

@@ -73,6 +73,7 @@ ERRORS = """
 1 : render -o out.png --skybox bad.gltf => bad.gltf
 1 : render -o none/out.png => none/out_glow.png: there is no folder
 1 : render -o out.png --adapter none => no Vulkan adapter for "none"
+1 : apply a.exr b.png --adapter none => no Vulkan adapter for "none"
 1 : apply no.png b.png => no.png: No such file or directory
 2 : apply two b.png => images; name a folder or a pattern
 1 : apply f.%04d.exr b.png => f.%04d.exr: no file was found

@@ -227,6 +227,11 @@ class TestShown:
         assert texts_of(pixel[:2].astype(np.float16)) == ["0.0", "0.1"]
         assert texts_of(np.array([0, 255], np.uint8)) == ["0", "255"]
 
+    def test_depth(self, tmp_path: Path) -> None:
+        depth = np.array([[0.5, 1.0]], np.float32)
+        shown = decode(picture_of(depth, "depth", is_encoded=False, stops=0), tmp_path)
+        assert shown[0, :, 0].tolist() == [255, 0]
+
 
 class TestViewer:
     def test_setup(self, viewer: Viewer) -> None:
@@ -483,6 +488,13 @@ class TestViewer:
         closed.close()
         with pytest.raises(ValueError, match="closed"):
             Viewer(scene, renderer=closed)
+
+    def test_a_later_change_of_the_image_is_not_seen(self, image: Any, renderer: Renderer) -> None:
+        viewer = Viewer(image, Separable(bloom=False), renderer=renderer)
+        before = image.copy()
+        image[...] = 0
+        frame(viewer, Separable(bloom=False))
+        assert np.array_equal(viewer.frames["a"]["final"], before)
 
 
 class TestWidget:

@@ -227,6 +227,11 @@ class TestWhole:
         with pytest.raises((TypeError, ValueError), match=told):
             make(tmp_path / "a.zarr", chunks=chunks)
 
+    def test_complete_store_is_reported_complete(self, undisturbed: Path) -> None:
+        report = check_grid(undisturbed)
+        assert report.complete
+        assert str(report) == f"{POINTS} of {POINTS} points are done"
+
 
 class _Stop(Exception):
     """The end of a process, as far as a test can imitate it."""
@@ -398,6 +403,14 @@ class TestRefused:
         other = {"reduce": {"p": reductions.PSNR(against=source() + 1)}, "framebuffers": ()}
         with pytest.raises(ValueError, match=r"reduce.p"):
             make(tmp_path / "a.zarr", **other)
+
+    def test_nothing(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError):
+            check_grid(tmp_path / "a.zarr")
+
+    def test_store_of_a_wrong_type_is_refused(self) -> None:
+        with pytest.raises(TypeError, match="store"):
+            make(3)
 
 
 def damage_truncated(store: Path) -> None:

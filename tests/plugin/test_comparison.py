@@ -220,6 +220,10 @@ class TestFigures:
         with pytest.raises(ValueError, match="a, b: not comparable: the sizes differ"):
             flip_map(a, b[1:])
 
+    def test_half_against_float(self) -> None:
+        a = noise_image(16, 16, 3, dtype="float16")
+        assert compare(a, a.astype(np.float32)).identical
+
 
 class TestMismatches:
     @pytest.mark.parametrize(
@@ -362,6 +366,11 @@ class TestTolerances:
         ):
             tolerances_of(**{name: value})
 
+    def test_all_that_fail_are_told(self) -> None:
+        found = compare(self.A, noise_image(20, 20, 3))
+        limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
+        assert len(reasons(found, limits)) == 4
+
 
 class TestArguments:
     @pytest.mark.parametrize(
@@ -439,6 +448,12 @@ class TestDifference:
         a = np.zeros((1, 2, 3), np.float32)
         picture, _ = difference(a, changed(a, (0, 1, 2), math.nan))
         assert picture.tolist() == [[[0, 0, 0], [1, 0, 1]]]
+
+    def test_nothing_is_black(self) -> None:
+        a = changed(noise_image(4, 4, 3), (0, 0, 0), math.nan)
+        picture, scale = difference(a, a)
+        assert scale == 1
+        assert not picture.any()
 
 
 # The command
