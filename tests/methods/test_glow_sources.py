@@ -14,8 +14,6 @@ from tests.images import hdr_picture, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
-    HdrpBloom,
-    KinoBloom,
     PygfxBloom,
     Pyramid,
     Renderer,
@@ -80,33 +78,6 @@ def test_mix_takes_from_the_scene_what_the_bloom_came_of(
         assert_allclose(lit["final"], image + 0.25 * emission, rtol=1e-5)
 
 
-def test_an_emission_takes_the_place_of_the_image(renderer: Renderer) -> None:
-    image, emission = picture(33, 17, 4), 3 * picture(33, 17, 4, seed=2)
-    settings = Pyramid(levels=2, threshold=1.0)
-    lit, own = (
-        renderer.apply(image, settings, emission=emission),
-        renderer.apply(emission, settings),
-    )
-    for name in ("glow", "down_0", "bloom"):
-        assert_array_equal(lit[name], own[name], name)
-    expected = image[..., :3] + lit["bloom"][..., :3]
-    assert_allclose(lit["final"][..., :3], expected, rtol=1e-6)
-    assert_array_equal(lit["final"][..., 3], image[..., 3])
-
-
-@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
-def test_alpha_max(renderer: Renderer, composite: Any) -> None:
-    image = flat(0.5, 2.0, 0.25, 0.125)
-    settings = Pyramid(levels=1, alpha="max", composite=composite, intensity=0.2)
-    settings = settings.replace(exposure=3.0, tonemap="reinhard", encoding="srgb")
-    # i b, before exposure and curve.
-    assert_allclose(renderer.apply(image, settings)["final"][..., 3], 0.4, rtol=1e-5)
-    high = settings.replace(intensity=2.0)
-    assert_array_equal(renderer.apply(image, high)["final"][..., 3], 1.0)
-    low = settings.replace(intensity=0.01)
-    assert_array_equal(renderer.apply(image, low)["final"][..., 3], np.float32(0.125))
-
-
 def test_alpha_blur(renderer: Renderer) -> None:
     image = flat(0.5, 0.25, 0.25, 0.5)
     settings = Pyramid(levels=1, alpha="blur", intensity=0.5)
@@ -119,13 +90,6 @@ def test_alpha_blur(renderer: Renderer) -> None:
     dark = renderer.apply(image, settings.replace(threshold=1.0))
     assert not dark["bloom"].any()
     assert_array_equal(dark["final"], image)
-
-
-def test_alpha_blur_of_a_grey_image_blurs_alpha_like_its_colours(renderer: Renderer) -> None:
-    image = np.repeat(picture(31, 21, 1), 4, axis=2)
-    for settings in (Separable(), Pyramid(firefly_filter=True), KinoBloom(), HdrpBloom()):
-        bloom = renderer.apply(image, settings.replace(alpha="blur"))["bloom"]
-        assert_allclose(bloom[..., 3], bloom[..., 0], rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("alpha", ["max", "blur"])
@@ -145,16 +109,6 @@ def test_scenes_ignore_alpha(renderer: Renderer, scene: Scene) -> None:
     blurred = renderer.render(scene, Pyramid(levels=2, alpha="blur"), (48, 32))
     for name in plain:
         assert_array_equal(blurred[name], plain[name], name)
-
-
-def test_masked_buffers_of_rg11b10(renderer: Renderer) -> None:
-    image = picture(33, 17, 4)
-    mask = np.random.default_rng(4).random((17, 33)) < 0.5
-    settings = Pyramid(levels=2, format="rg11b10ufloat")
-    masked = renderer.apply(image, settings, mask=mask)
-    lit = renderer.apply(image, settings, emission=image * mask[..., np.newaxis])
-    for name in lit:
-        assert_array_equal(masked[name], lit[name], name)
 
 
 # --- What is given ---

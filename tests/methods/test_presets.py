@@ -76,20 +76,6 @@ def tolerance(name: str, expected: Array, format: str, settings: Settings, downs
     return (1e-4 if format == "rgba32float" else 2e-3) * largest
 
 
-@pytest.mark.parametrize("name", [*CONVOLUTIONS, "blender_fog_glow"])
-@pytest.mark.parametrize("place", [(0, 0), (0, 20), (28, 47)])
-def test_a_light_at_the_border_is_no_brighter(
-    renderer: Renderer, name: str, place: tuple[int, int]
-) -> None:
-    """Behind a real lens, what lies outside of the sensor is lost."""
-    sums = []
-    for y, x in (place, (14, 24)):
-        image = np.zeros((29, 48, 3), np.float32)
-        image[y, x] = 50
-        sums.append(float(renderer.apply(image, presets[name])["bloom"][..., :3].sum()))
-    assert sums[0] <= 1.02 * sums[1]
-
-
 def test_the_share_of_a_lens() -> None:
     assert_allclose(psf.harvey_shack().energy(), presets["camera_lens"].intensity, rtol=0.01)
 
@@ -227,36 +213,6 @@ def test_kinos_median_removes_a_single_bright_pixel_and_keeps_a_large_light() ->
 # --- Filament ---
 
 
-def test_filaments_reduction_is_a_sample_of_the_binomial() -> None:
-    """Without a threshold, level 0 is what a slow loop over the convolved image finds."""
-    image = np.random.default_rng(5).random((5, 7, 1))
-    padded = np.pad(image[..., 0], 2, mode="edge")
-    expected = np.zeros((16, 32))
-    for y in range(16):
-        for x in range(32):
-            at_y, at_x = (y + 0.5) * 5 / 16 - 0.5, (x + 0.5) * 7 / 32 - 0.5
-            top, left = int(np.floor(at_y)), int(np.floor(at_x))
-            for row, row_share in ((top, top + 1 - at_y), (top + 1, at_y - top)):
-                for column, column_share in ((left, left + 1 - at_x), (left + 1, at_x - left)):
-                    around = padded[row + 1 : row + 4, column + 1 : column + 4]
-                    binomial = np.array([1, 2, 1]) @ around @ np.array([1, 2, 1]) / 16
-                    expected[y, x] += row_share * column_share * binomial
-    # 24 / 5 * 7 = 33.6 wide, floored to a multiple of 16
-    settings = FilamentBloom(threshold=None, resolution=24, levels=1)
-    down = reference.passes(image, settings)["down_0"]
-    assert_allclose(down[..., 0], expected, rtol=1e-12)
-
-
-def test_filament_of_a_flat_image(renderer: Renderer) -> None:
-    flat = np.full((300, 1000, 3), 3.0, np.float32)
-    settings = FilamentBloom(format="rgba32float", resolution=50)
-    bloom = renderer.apply(flat, settings)["bloom"][..., :3]
-    assert_allclose(bloom, 2 / (1 + 2 / 1000), rtol=1e-5)
-    bloom = renderer.apply(flat, settings.replace(threshold=None))["bloom"][..., :3]
-    assert_allclose(bloom, 3, rtol=1e-5)
-    assert reference.gain(FilamentBloom(threshold=0.5)) == pytest.approx(0.5 / 1.0005)
-
-
 @pytest.mark.parametrize(
     "settings",
     [BevyBloom(max_mip_dimension=16), FilamentBloom(resolution=16)],
@@ -284,31 +240,6 @@ def test_urps_levels_and_shares(renderer: Renderer) -> None:
 
 def test_urps_threshold_is_0_9_in_srgb() -> None:
     assert UrpBloom().threshold == pytest.approx(0.787412, abs=1e-6)
-
-
-def test_a_level_of_urp_is_the_tutorials_kernel_at_two_steps() -> None:
-    """Along x the half-kernel two texels apart, along y one pixel of the smaller level apart."""
-    weights = np.array([0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622])
-    weights = np.concatenate([weights[:0:-1], weights])
-    image = np.zeros((64, 64, 1))
-    image[32:34, 32] = 0.5  # one pixel of down_0, half of it
-    image[32:34, 33] = 0.5
-    framebuffers = reference.passes(image, UrpBloom(threshold=None))
-    assert framebuffers["down_0"][16, 16, 0] == 0.5
-    down = framebuffers["down_1"][..., 0]
-    # down_0's pixel 16 lies between the positions of the taps of all pixels: half each.
-    expected = np.zeros((16, 16))
-    for y in range(16):
-        for x in range(16):
-            across = sum(
-                w * max(0, 1 - abs(2 * x + 0.5 + 2 * i - 16))
-                for i, w in enumerate(weights, start=-4)
-            )
-            along = sum(
-                w * max(0, 1 - abs(2 * (y + i) + 0.5 - 16)) for i, w in enumerate(weights, start=-4)
-            )
-            expected[y, x] = 0.5 * across * along
-    assert_allclose(down, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("size", [(800, 450), (800, 449), (799, 450)])
