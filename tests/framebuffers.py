@@ -11,6 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from tests.images import noise
 from vkbloom import Separable, Settings
 from vkbloom._renderer.frames import Frames
 
@@ -33,13 +34,6 @@ def make(
     return Frames(
         arrays, timings=timings, settings=settings or Separable(blur_scale=2.0), info=INFO
     )
-
-
-def noise(*shape: int, dtype: str, seed: int = 1) -> NDArray[Any]:
-    generator = np.random.default_rng(seed)
-    if dtype == "uint8":
-        return generator.integers(0, 256, shape, dtype=np.uint8)
-    return (generator.standard_normal(shape) * 100).astype(dtype)
 
 
 def mixed() -> Frames:

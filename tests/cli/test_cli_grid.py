@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
-from tests.framebuffers import noise
+from tests.images import noise
 from vkbloom import Renderer, Separable
 from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.program import program

@@ -16,7 +16,8 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import some
-from tests.framebuffers import decode, make, noise
+from tests.framebuffers import decode, make
+from tests.images import noise
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
 from vkbloom._explorer.controls import as_code, controls, settings_from
 from vkbloom._explorer.fast_pictures import picture_of, texts_of

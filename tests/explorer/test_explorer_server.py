@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import vkbloom
-from tests.framebuffers import noise
+from tests.images import noise
 from vkbloom import Renderer, Separable
 from vkbloom._cli.program import program
 from vkbloom._explorer.viewer import Viewer

@@ -16,7 +16,7 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.framebuffers import noise
+from tests.images import noise
 from vkbloom import (
     Convolution,
     DualKawase,

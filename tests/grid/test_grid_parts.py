@@ -16,10 +16,10 @@ import pytest
 from click.testing import CliRunner
 
 import vkbloom
-from tests.framebuffers import noise
 from tests.grid.grid_in_parts import render
 from tests.grid.prepared_at_once import prepare, prepare_all
 from tests.grid.stores import contents
+from tests.images import noise
 from vkbloom import check_grid
 from vkbloom._cli.program import program
 from vkbloom._grid.order import blocks

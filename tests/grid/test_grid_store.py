@@ -20,9 +20,9 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.framebuffers import noise
 from tests.grid import grid_to_kill
 from tests.grid.stores import contents
+from tests.images import noise
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf, reductions
 from vkbloom._grid.filling import Filler
 from vkbloom._grid.identity import differences

@@ -24,7 +24,8 @@ import pytest
 
 import vkbloom._renderer.frame_files
 from tests.exhaustive import by_turns
-from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, noise, read
+from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, read
+from tests.images import noise
 from vkbloom import Separable
 from vkbloom._io import safe_writing
 from vkbloom._renderer.frames import Frames

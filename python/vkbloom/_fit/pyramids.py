@@ -80,11 +80,6 @@ def fit_pyramid(
     ModuleNotFoundError
         SciPy is missing: ``pip install vkbloom[fit]``.
 
-    See Also
-    --------
-    fit : Finds other settings.
-    psf.measured : Makes a function from settings.
-
     Notes
     -----
     Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, on non-negative least

@@ -80,11 +80,6 @@ def vjp(
     OutOfMemoryError, DeviceLostError, ValidationError, Error
         The device failed.
 
-    See Also
-    --------
-    vkbloom.reference.vjp : The same in NumPy, with the subgradients at kinks.
-    fit : Finds settings by derivatives with ``gradient=True``.
-
     Examples
     --------
     >>> image = np.full((4, 4, 3), 0.5, np.float32)

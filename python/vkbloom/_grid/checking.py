@@ -42,18 +42,6 @@ class GridReport:
         Each damaged or missing key, with the points that it contains.
     missing_parts : tuple of str
         If the grid is rendered in parts: those that are not complete, such as "3/16".
-
-    See Also
-    --------
-    check_grid : Returns it.
-
-    Examples
-    --------
-    >>> report = vkbloom.GridReport(points=4, done=3, problems=())
-    >>> report.complete
-    False
-    >>> print(report)
-    3 of 4 points are done
     """
 
     points: int
@@ -93,10 +81,6 @@ def check_grid(store: Any) -> GridReport:
         The store is not a grid, or has another format version.
     ModuleNotFoundError
         zarr is missing.
-
-    See Also
-    --------
-    grid : Renders a grid, and repairs one: call it with the arguments of the first call.
 
     Examples
     --------

@@ -63,11 +63,6 @@ def response_curves(
     ModuleNotFoundError
         matplotlib is missing.
 
-    See Also
-    --------
-    contact_sheet : Pictures instead of figures.
-    vkbloom._grid.reductions : Figures that a grid can compute.
-
     Examples
     --------
     >>> from vkbloom._grid.reductions import Mean

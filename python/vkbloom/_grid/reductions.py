@@ -40,23 +40,6 @@ class Reduction:
     ----------
     framebuffer : str
         The framebuffer to reduce.
-
-    See Also
-    --------
-    vkbloom.grid : Takes reductions as `reduce`.
-
-    Examples
-    --------
-    A reduction of your own:
-
-    >>> from vkbloom._grid.reductions import Reduction
-    >>> class Median(Reduction):
-    ...     '''Median of all values.'''
-    ...
-    ...     def __call__(self, frames):
-    ...         return float(np.median(frames[self.framebuffer]))
-    >>> Median(framebuffer="bloom").description
-    'Median of all values, of bloom'
     """
 
     framebuffer: str = "final"
@@ -95,10 +78,6 @@ class Mean(Reduction):
     framebuffer : str
         The framebuffer to reduce. 8-bit values are scaled to 0..1. Alpha and values that are not
         finite are left out.
-
-    See Also
-    --------
-    Max, EncircledEnergy
 
     Examples
     --------
@@ -142,21 +121,6 @@ class Max(Reduction):
     framebuffer : str
         The framebuffer to reduce. 8-bit values are scaled to 0..1. Alpha and values that are not
         finite are left out.
-
-    See Also
-    --------
-    Mean, EncircledEnergy
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import Max
-    >>> bloom = np.zeros((4, 4, 4), np.float16)
-    >>> bloom[1, 2, 0] = 3
-    >>> frames = vkbloom.Frames(
-    ...     {"bloom": bloom}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> Max(framebuffer="bloom")(frames)
-    3.0
     """
 
     def __call__(self, frames: Frames) -> float:
@@ -179,10 +143,6 @@ class EncircledEnergy(Reduction):
         light.
     framebuffer : str
         The framebuffer to reduce.
-
-    See Also
-    --------
-    Mean, Max
 
     Notes
     -----
@@ -263,10 +223,6 @@ class Comparing(Reduction):
         Luminance of a linear value of 1 in cd/m2, as for `vkbloom._views.comparison.compare`.
     pixels_per_degree : float, optional
         Pixels for each degree of the observer's view; FLIP's default is 67.02.
-
-    See Also
-    --------
-    SSIM, PSNR, FLIP, ColorVideoVDP
     """
 
     against: NDArray[Any] | Mapping[str, Any]
@@ -310,20 +266,6 @@ class SSIM(Comparing):
     ----------
     against, framebuffer, data_range
         As for `Comparing`.
-
-    See Also
-    --------
-    PSNR, FLIP
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import SSIM
-    >>> final = np.random.default_rng(0).random((16, 16, 4), np.float32)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": final}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> SSIM(against=final)(frames)
-    1.0
     """
 
     metric: ClassVar[Metric] = "ssim"
@@ -337,10 +279,6 @@ class PSNR(Comparing):
     ----------
     against, framebuffer, data_range
         As for `Comparing`.
-
-    See Also
-    --------
-    SSIM, FLIP
 
     Examples
     --------
@@ -382,20 +320,6 @@ class FLIP(Comparing):
     ----------
     against, framebuffer, data_range
         As for `Comparing`.
-
-    See Also
-    --------
-    SSIM, PSNR
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import FLIP
-    >>> final = np.full((16, 16, 4), 100, np.uint8)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": final}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> FLIP(against=final)(frames)
-    0.0
     """
 
     metric: ClassVar[Metric] = "flip"
@@ -420,21 +344,6 @@ class ColorVideoVDP(Comparing):
     ------
     ValueError
         `nits_per_unit` or `pixels_per_degree` is missing.
-
-    See Also
-    --------
-    FLIP
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import ColorVideoVDP
-    >>> final = np.full((64, 64, 3), 0.5, np.float32)
-    >>> ColorVideoVDP(against=final, pixels_per_degree=60)
-    Traceback (most recent call last):
-        ...
-    ValueError: nits_per_unit: None is not a number; ColorVideoVDP needs one
-    >>> ColorVideoVDP.units
-    'JOD'
     """
 
     metric: ClassVar[Metric] = "cvvdp"

@@ -69,10 +69,6 @@ def contact_sheet(
     TypeError, ValueError
         The Dataset is not a grid or has no framebuffers, or an argument is wrong.
 
-    See Also
-    --------
-    response_curves : Figures instead of pictures.
-
     Examples
     --------
     >>> image = np.zeros((16, 16, 4), np.uint8)

@@ -104,10 +104,6 @@ def composite(
     ValueError
         An image has another shape, or the sizes differ.
 
-    See Also
-    --------
-    apply : All steps.
-
     Examples
     --------
     >>> from vkbloom import reference

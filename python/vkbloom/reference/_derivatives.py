@@ -76,10 +76,6 @@ def vjp(
         `pullback`: there is no such framebuffer, or a cotangent has another shape, is not of real
         numbers, or is not finite.
 
-    See Also
-    --------
-    apply : The framebuffers alone.
-
     Notes
     -----
     The formulas of the reference run on arrays that record each operation with its derivative; the

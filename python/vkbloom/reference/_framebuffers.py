@@ -93,12 +93,6 @@ def apply(
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
 
-    See Also
-    --------
-    passes : Only the blur.
-    composite : Only the last step.
-    vkbloom.Renderer.apply : The same on a device.
-
     Examples
     --------
     >>> from vkbloom import reference
@@ -230,11 +224,6 @@ def passes(
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
 
-    See Also
-    --------
-    apply : With threshold and composite.
-    blur : The last of these framebuffers.
-
     Examples
     --------
     >>> from vkbloom import reference
@@ -252,10 +241,9 @@ def passes(
     colours = values[..., :3] if has_alpha else values
     colours = store.first(colours) if settings.published else store(colours)
     size = size or (width, height)
-    weights = as_mask(mask, size) if mask is not None and settings.published else None
-    framebuffers: dict[str, Array] = method.passes(
-        BlurInput(colours, size, store, weights), settings
-    )
+    weights = None if mask is None else as_mask(mask, size)
+    given = BlurInput(colours, size, store, weights if settings.published else None)
+    framebuffers: dict[str, Array] = method.passes(given, settings)
     if not has_alpha:
         return framebuffers
     return _with_alphas(framebuffers)
@@ -285,10 +273,6 @@ def blur(
     TypeError, ValueError
         As for `passes`.
 
-    See Also
-    --------
-    passes : All framebuffers of the blur.
-
     Examples
     --------
     >>> from vkbloom import reference
@@ -315,10 +299,6 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     -------
     float, or ndarray of float64, shape (3,)
         For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
-
-    See Also
-    --------
-    vkbloom.testing.assert_gain : Asserts the gain of any bloom.
 
     Examples
     --------

@@ -57,10 +57,6 @@ def shade(
     ValueError
         An array has another shape, or the shapes differ.
 
-    See Also
-    --------
-    vkbloom.Renderer.render : Renders the framebuffers with ``shading="deferred"``.
-
     Examples
     --------
     Without a surface, the result is the albedo plus the brightness:

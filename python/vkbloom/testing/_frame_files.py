@@ -38,10 +38,6 @@ def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
 
-    See Also
-    --------
-    FrameRegression.check : Compares frames with references.
-
     Examples
     --------
     >>> import tempfile

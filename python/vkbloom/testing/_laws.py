@@ -52,11 +52,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     TypeError, ValueError
         `bloom` is not such a callable.
 
-    See Also
-    --------
-    assert_additive : The law of the picture with bloom.
-    assert_gain : The law of flat images.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -118,10 +113,6 @@ def assert_additive(
     TypeError, ValueError
         `bloom` is not such a callable, or `intensity` is out of range.
 
-    See Also
-    --------
-    assert_superposition : Linearity of the bloom alone.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -178,16 +169,6 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    vkbloom.reference.gain : Gain of vkbloom's custom methods.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(2.0), blur_strength=1.0)
-    >>> testing.assert_gain(lambda image: reference.blur(image, settings), 1.0)
     """
     __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
@@ -231,17 +212,6 @@ def assert_symmetric(
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an axis is unknown.
-
-    See Also
-    --------
-    assert_centroid_kept : The law of shifts, as a distance.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable())
-    >>> testing.assert_symmetric(bloom, axes=("x", "y", "xy"))
     """
     __tracebackhide__ = True
     image = probe.noise(0, probe.value)
@@ -283,16 +253,6 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or `border` is out of range.
-
-    See Also
-    --------
-    assert_gain : The law of flat images.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_no_ringing(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
@@ -363,16 +323,6 @@ def assert_bounded_fireflies(
         The law does not hold, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    vkbloom.Pyramid : Has the parameter `firefly_filter`.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> probe = testing.Probe(size=(32, 32))
-    >>> testing.assert_bounded_fireflies(lambda image: np.minimum(image, 1.0), probe=probe)
     """
     __tracebackhide__ = True
     if probe.dtype.kind == "u":

@@ -69,19 +69,6 @@ class Stability:
     at_border : float
         The largest share of the light in the outermost pixels. If it is not small, the image cuts
         off light, and the other figures apply only to the light inside the image.
-
-    See Also
-    --------
-    stability : Returns it.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> found = testing.stability(lambda image: image, texel=2, steps=4)
-    >>> found.positions.shape
-    (3, 8, 2)
-    >>> float(found.energy.max())
-    1.0
     """
 
     positions: NDArray[np.float64]
@@ -183,11 +170,6 @@ def stability(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the path leaves the image.
 
-    See Also
-    --------
-    assert_stable : Asserts limits of the figures.
-    assert_superposition, assert_centroid_kept : Laws that a threshold or a shift breaks.
-
     Examples
     --------
     A pyramid whose first reduction drops every second pixel loses a small light half of the time:
@@ -271,11 +253,6 @@ def assert_stable(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
-
-    See Also
-    --------
-    stability : Returns the figures.
-    assert_bounded_fireflies : The law of a single bright pixel.
 
     Examples
     --------

@@ -64,10 +64,6 @@ def point_spread(
     TypeError, ValueError
         `bloom` is not such a callable, or `at` is outside the image.
 
-    See Also
-    --------
-    response : Figures of the point spread, along a parameter.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -106,16 +102,6 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         The law does not hold, the result is black, or it is not finite.
     TypeError, ValueError
         `bloom` is not such a callable.
-
-    See Also
-    --------
-    point_spread : Returns the point spread.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_separable(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     spread, error = measured_spread(bloom, probe, None)
@@ -172,16 +158,6 @@ def assert_centroid_kept(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
-
-    See Also
-    --------
-    assert_symmetric : The law of mirrored images.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_centroid_kept(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
@@ -239,10 +215,6 @@ def assert_spread(
     TypeError, ValueError
         `bloom` is not such a callable, an argument is out of range, or the light reaches the
         border.
-
-    See Also
-    --------
-    response : Measures sigma along a parameter.
 
     Examples
     --------
@@ -304,19 +276,6 @@ class Response:
     at_border : ndarray of float64, shape (N,)
         Share of the light in the outermost pixels. If it is not small, the image cuts off light
         and the other figures are too small.
-
-    See Also
-    --------
-    response : Returns it.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image, blur_scale):
-    ...     return reference.blur(image, vkbloom.Separable(blur_scale=blur_scale))
-    >>> found = testing.response(bloom, "blur_scale", [1.0, 2.0])
-    >>> bool(found.sigma[1, 0] > 1.9 * found.sigma[0, 0])
-    True
     """
 
     parameter: str
@@ -378,11 +337,6 @@ def response(
         A result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or `values` is empty.
-
-    See Also
-    --------
-    point_spread : The image that is measured.
-    assert_spread : Asserts one sigma.
 
     Examples
     --------

@@ -26,21 +26,7 @@ __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
 
 class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``.
-
-    See Also
-    --------
-    Tolerances : Has the limit `warn`.
-
-    Examples
-    --------
-    Make such a warning an error of the test:
-
-    >>> import warnings
-    >>> from vkbloom import testing
-    >>> with warnings.catch_warnings():
-    ...     warnings.simplefilter("error", testing.FrameDifferenceWarning)
-    """
+    """An image passed, but differs by more than ``warn``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,11 +71,6 @@ class FrameRegression:
     mode : Mode
     records : list of dict
         Each check appends its result.
-
-    See Also
-    --------
-    pytest_vkbloom.frame_regression : The fixture that gives it.
-    Tolerances : The limits of a comparison.
 
     Examples
     --------
@@ -173,12 +154,6 @@ class FrameRegression:
         --------
         compare : With frames of the same test as the reference.
         Tolerances : The limits.
-
-        Examples
-        --------
-        >>> def test_blur(bloom_renderer, frame_regression):
-        ...     image = np.full((16, 16, 4), 0.5, np.float32)
-        ...     frame_regression.check(bloom_renderer.apply(image), "grey", ssim=0.999)
         """
         __tracebackhide__ = True
         if exact:

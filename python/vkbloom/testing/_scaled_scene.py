@@ -46,18 +46,6 @@ class ResolutionResponse:
         height; NaN without light.
     peak : ndarray of float64, shape (N,)
         The largest value of the bloom relative to the value of the light.
-
-    See Also
-    --------
-    resolution_response : Returns it.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> found = testing.resolution_response(lambda image: image, scales=(1, 2))
-    >>> found.peak
-    array([1., 1.])
-    >>> print(found)  # doctest: +SKIP
     """
 
     sizes: tuple[tuple[int, int], ...]
@@ -108,11 +96,6 @@ def resolution_response(
         A result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    assert_resolution_independent : Asserts that the figures are the same.
-    response : The point spread along a parameter.
 
     Examples
     --------
@@ -174,11 +157,6 @@ def assert_resolution_independent(
         The law does not hold, there is no light, or a result is not finite.
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    resolution_response : Returns the figures.
-    assert_stable : The law of moving lights.
 
     Examples
     --------

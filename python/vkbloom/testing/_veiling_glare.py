@@ -49,10 +49,6 @@ def veiling_glare_index(
     TypeError, ValueError
         `bloom` is not such a callable, or an argument is out of range.
 
-    See Also
-    --------
-    point_spread : The light of a single pixel.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
