@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.exhaustive import some
+from tests.io.parts import written
 from tests.processes import python
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
@@ -20,7 +21,6 @@ from vkbloom._io.image_writing import save
 from vkbloom._io.images import Picture
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._methods.mip_chain import Pyramid
-from vkbloom._methods.separable import Separable
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -52,11 +52,7 @@ def png(path: Path, pixels: NDArray[Any]) -> Path:
     spec.attribute("oiio:UnassociatedAlpha", 1)
     if channels == 2:
         spec.channelnames = ("Y", "A")
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(pixels)
-    assert writer.close()
-    return path
+    return written(path, spec, pixels)
 
 
 def run(*arguments: str | Path, adapter: str = "auto") -> Result:
@@ -157,20 +153,6 @@ class TestFormats:
         assert np.array_equal(
             pixels(tmp_path / "b.png"), applied(image, NATURAL.replace(threshold=0.3))
         )
-
-    def test_parts(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
-        with vkbloom.Renderer() as renderer:
-            frames = renderer.apply(image, Separable(threshold=0.5))
-        frames.save(tmp_path / "a.exr")
-        names = list(frames)
-        last = names.index("final")
-        chosen = ("--subimage", str(last))
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
-        assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
-        result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
-        assert "a.exr: read the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
-        assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
 
 
 class TestColours:

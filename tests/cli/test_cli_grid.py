@@ -26,7 +26,7 @@ xr = pytest.importorskip("xarray")
 
 
 def run(*arguments: Any) -> Result:
-    words = ["grid", *(str(argument) for argument in arguments)]
+    words = ["grid", *(word for argument in arguments for word in str(argument).split())]
     return CliRunner().invoke(program, words)
 
 
@@ -71,10 +71,8 @@ class TestAxes:
 class TestStores:
     def test_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "a.zarr"
-        message = done(
-            "--axis", "time=0,0.25", "--axis", "blur_scale=1:2:2", "--size", "32x18",
-            "--tonemap", "aces", "-o", out, "--framebuffers", "final,depth",
-        )  # fmt: skip
+        words = "--axis time=0,0.25 --axis blur_scale=1:2:2 --size 32x18 --tonemap aces"
+        message = done(words, "--framebuffers final,depth -o", out)
         assert "4 points; passes run" in message
         found = xr.open_zarr(out)
         expected = renderer.render(
@@ -85,18 +83,8 @@ class TestStores:
 
     def test_images_by_their_names(self, tmp_path: Path, image_file: Path) -> None:
         save(Picture.of_values(noise(9, 12, 3, dtype="float32"), "float"), tmp_path / "b.exr")
-        done(
-            image_file,
-            tmp_path / "b.exr",
-            "--axis",
-            "radius=1,2",
-            "--method",
-            "pyramid",
-            "--framebuffers",
-            "all",
-            "-o",
-            tmp_path / "a.zarr",
-        )
+        words = "--axis radius=1,2 --method pyramid --framebuffers all -o"
+        done(image_file, tmp_path / "b.exr", words, tmp_path / "a.zarr")
         found = xr.open_zarr(tmp_path / "a.zarr")
         assert {"done", "final", "bloom"} <= set(found)
         assert list(found["image"].values) == [str(image_file), str(tmp_path / "b.exr")]
@@ -136,17 +124,8 @@ def test_a_grid_without_bloom_says_so(tmp_path: Path, image_file: Path) -> None:
 class TestImageFiles:
     def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
-        done(
-            image_file,
-            "--axis",
-            "intensity=0,1",
-            "--axis",
-            "exposure=-1,0",
-            "-o",
-            out,
-            "--framebuffers",
-            "final,bloom",
-        )
+        words = "--axis intensity=0,1 --axis exposure=-1,0 --framebuffers final,bloom -o"
+        done(image_file, words, out)
         assert sorted(path.name for path in out.iterdir()) == sorted(
             [
                 f"00{i}_00{j}_{name}"
@@ -156,21 +135,10 @@ class TestImageFiles:
             ]
             + ["grid.json"]
         )
-        CliRunner().invoke(
-            program,
-            [
-                "apply",
-                str(image_file),
-                str(tmp_path / "one.png"),
-                "--exposure",
-                "-1",
-                "--intensity",
-                "1",
-            ],
-        )
-        np.testing.assert_array_equal(
-            load(out / "001_000_final.png").pixels, load(tmp_path / "one.png").pixels
-        )
+        one = str(tmp_path / "one.png")
+        words = "--exposure -1 --intensity 1"
+        CliRunner().invoke(program, ["apply", str(image_file), one, *words.split()])
+        np.testing.assert_array_equal(load(out / "001_000_final.png").pixels, load(one).pixels)
 
     @pytest.mark.parametrize(
         ("axis", "points"),
@@ -201,18 +169,8 @@ class TestImageFiles:
 
     def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "files"
-        done(
-            "--axis",
-            "blur_scale=1,2",
-            "--size",
-            "20x10",
-            "-o",
-            out,
-            "--image-format",
-            "exr",
-            "--framebuffers",
-            "final",
-        )
+        words = "--axis blur_scale=1,2 --size 20x10 --image-format exr --framebuffers final -o"
+        done(words, out)
         expected = renderer.render(scene, Separable(blur_scale=2), (20, 10))["final"]
         found = load(out / "001_final.exr").pixels
         np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)

@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.exhaustive import by_turns
+from tests.io.parts import written
 from vkbloom._cli import bands, image_files
 from vkbloom._cli.bands import BloomByBands
 from vkbloom._cli.program import program
@@ -34,11 +35,7 @@ def stored(path: Path, pixels: Any, tile: int = 0) -> Path:
         spec.channelnames = ("Y", "A")[:channels]
     if tile:
         spec.tile_width = spec.tile_height = tile
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(pixels)
-    assert writer.close()
-    return path
+    return written(path, spec, pixels)
 
 
 def light(height: int, width: int, channels: int, dtype: str) -> Any:
@@ -172,10 +169,7 @@ def test_turned_pictures(
     path = tmp_path / "a.tif"
     spec = oiio.ImageSpec(41, 50, 3, "uint8")
     spec.attribute("Orientation", orientation)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(light(50, 41, 3, "uint8"))
-    assert writer.close()
+    written(path, spec, light(50, 41, 3, "uint8"))
     result = same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path)
     assert result.shape == ((41, 50, 3) if orientation == 6 else (50, 41, 3))
 

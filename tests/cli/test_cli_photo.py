@@ -140,12 +140,6 @@ def test_what_the_first_user_tried_says_so(tmp_path: Path) -> None:
     assert result.stderr.endswith("add it with --composite add or --preset photo\n")
 
 
-def test_a_bloom_of_nothing_says_so(tmp_path: Path) -> None:
-    dark = np.full((32, 32, 3), 100, np.uint8)
-    result = apply(png(tmp_path / "a.png", dark), tmp_path / "b.png", "--preset", "kino")
-    assert "vkbloom: note: the bloom is zero everywhere" in result.stderr
-
-
 def test_expand(tmp_path: Path) -> None:
     path = png(tmp_path / "a.png", room())
     files = {value: tmp_path / f"{value}.exr" for value in ("1", "2", "8")}

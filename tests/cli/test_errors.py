@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import vkbloom
 from tests.grid.stores import contents
 from tests.images import noise_image
+from tests.io.parts import written
 from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -187,10 +188,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vkbloom.write(made / "a.exr", noise_image(16, 24, 3))
     spec = oiio.ImageSpec(2, 2, 3, "float")
     spec.channelnames = ("X", "Y", "Z")
-    writer = oiio.ImageOutput.create("xyz.exr")
-    assert writer.open(str(made / "xyz.exr"), spec)
-    assert writer.write_image(noise_image(2, 2, 3))
-    assert writer.close()
+    written(made / "xyz.exr", spec, noise_image(2, 2, 3))
     files = {"{}": b"{}", "half.json": b"", "bad.gltf": b"{broken"}
     files["x.json"] = b'{"method": "kino", "x": 1}'
     files["kino.json"] = b'{"method": "kino"}'

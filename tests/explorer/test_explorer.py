@@ -203,17 +203,6 @@ class TestShown:
             decode(picture_of(array, "final", is_encoded=True, stops=-3), tmp_path)[0, 0, 0] == 128
         )
 
-    @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
-    def test_images_are_averaged_until_they_fit(self, dtype: str) -> None:
-        image = np.zeros((40, 60, 3), dtype)
-        image[::2] = 100
-        small = reduced(image, (30, 30))
-        assert small.shape == (20, 30, 3)
-        assert small.dtype == image.dtype
-        assert (small == 50).all()
-        assert reduced(image, (60, 40)) is image
-        assert reduced(image, (1, 1)).shape == (1, 1, 3)
-
     def test_numbers_have_the_digits_that_tell_them_apart(self) -> None:
         pixel = np.array([0.0, 0.1, -1e-3, 1e-5, 999999, 1e6, np.nan, -np.inf], np.float32)
         expected = ["0.0", "0.1", "-0.001", "1.0e-05", "999999.0", "1.0e+06", "nan", "-inf"]

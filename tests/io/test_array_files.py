@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.io.parts import store_parts
+from tests.io.parts import store_parts, written
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
@@ -50,11 +50,7 @@ def store_exr(path: Path, **channels: NDArray[Any]) -> Path:
     spec.channelformats = tuple(
         oiio.TypeDesc("half" if part.dtype == np.float16 else "float") for part in channels.values()
     )
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(np.stack([*channels.values()], -1).astype(np.float32))
-    assert writer.close()
-    return path
+    return written(path, spec, np.stack([*channels.values()], -1).astype(np.float32))
 
 
 def halves(layer: str, names: str = "RGBA", size: tuple[int, int] = (3, 5)) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.io.parts import written
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.image_reading import decode, load
@@ -44,13 +45,7 @@ def store(path: Path, pixels: NDArray[Any], numbers: str, **changes: Any) -> Pat
             setattr(spec, name, value)
         else:
             spec.attribute(name.replace("__", ":"), value)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(pixels), writer.geterror()
-    assert writer.close(), writer.geterror()
-    # TIFF leaves a message about a directory that it left out.
-    writer.geterror()
-    return path
+    return written(path, spec, pixels)
 
 
 def reread(path: Path) -> tuple[Any, NDArray[Any]]:
@@ -445,10 +440,7 @@ class TestSave:
         spec = oiio.ImageSpec(2, 2, 3, "half")
         spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), chromaticities)
         spec.attribute("PixelAspectRatio", 2.0)
-        writer = oiio.ImageOutput.create(str(tmp_path / "a.exr"))
-        assert writer.open(str(tmp_path / "a.exr"), spec)
-        assert writer.write_image(noise(2, 2, 3, numbers="half"))
-        assert writer.close()
+        written(tmp_path / "a.exr", spec, noise(2, 2, 3, numbers="half"))
         save(decode(load(tmp_path / "a.exr")), tmp_path / "b.exr")
         kept, _ = reread(tmp_path / "b.exr")
         assert np.allclose(kept["chromaticities"], chromaticities)

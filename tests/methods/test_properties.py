@@ -12,7 +12,6 @@ from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 from tests.exhaustive import by_turns, examples
-from tests.tolerance import tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference, testing
 from vkbloom.testing import Probe
 from vkbloom.testing._probe import Bloom
@@ -33,20 +32,9 @@ LINEAR: dict[str, Settings] = {
     "dual-kawase": DualKawase(),
     "dual-kawase-offset": DualKawase(levels=2, offset=1.7),
 }
-NOT_LINEAR: dict[str, Settings] = {
-    "knee": Separable(threshold=0.4, knee=0.5),
-    "pyramid-knee": Pyramid(threshold=0.3, knee=0.5),
-    "firefly": Pyramid(firefly_filter=True, threshold=0.2, knee=1.0),
-    "firefly-scaled": Pyramid(firefly_filter=True, bloom_scale=0.7),
-}
-ALL = {**LINEAR, **NOT_LINEAR}
-# Of a smaller bloom buffer, the last horizontal blur is evaluated between its texels and the
-# vertical one is not; texel="x" stretches one of them.
-UNEQUAL_AXES = ("outline", "half-size")
 FLOATS = ("float16", "float32")
 #: Allowed error of one value, relative to the largest. Half: four roundings of 2**-11.
 ERRORS = {"float16": 2e-3, "float32": 1e-5, "float64": 1e-12}
-BOTH = pytest.mark.parametrize("dtype", ["float32", "float64"], ids=["device", "reference"])
 
 few = hypothesis.settings(max_examples=examples(2), deadline=None)
 
@@ -97,20 +85,6 @@ def test_linear_blurs_obey_the_laws_of_filters(
     testing.assert_no_ringing(bloom, probe)
 
 
-@BOTH
-@pytest.mark.parametrize("method", ALL)
-@few
-@hypothesis.given(size=st.tuples(sides, sides), seed=seeds)
-def test_mirrored_and_transposed_images_have_mirrored_and_transposed_blooms(
-    renderer: Renderer, method: str, dtype: str, size: tuple[int, int], seed: int
-) -> None:
-    probe = Probe(size=size, dtype=dtype, seed=seed, rtol=ERRORS[dtype])
-    bloom = law_of(renderer, ALL[method])
-    testing.assert_symmetric(bloom, probe)
-    if method not in UNEQUAL_AXES:
-        testing.assert_symmetric(bloom, probe, axes=["xy"])
-
-
 # --- Exact laws ---
 
 
@@ -129,47 +103,3 @@ def test_powers_of_two_scale_the_bloom_exactly(
         bloom_of(renderer, image * np.asarray(factor, dtype), scaled),
         bloom_of(renderer, image, plain) * factor,
     )
-
-
-# --- Bounds ---
-
-
-@pytest.mark.parametrize(("method", "dtype"), by_turns(ALL, turns=["uint8", *FLOATS]))
-@few
-@hypothesis.given(picture=pictures, seed=seeds)
-def test_nothing_is_negative(
-    renderer: Renderer, method: str, dtype: str, picture: Image, seed: int
-) -> None:
-    """Sparse bright points on black."""
-    lit = np.random.default_rng(seed).random((*picture.shape[:2], 1)) < 0.1
-    image = in_dtype(lit * picture, dtype)
-    for name, array in renderer.apply(image, ALL[method]).items():
-        assert (array >= 0).all(), name
-
-
-# --- One picture, whatever came before it ---
-
-
-@few
-@hypothesis.given(
-    steps=st.lists(
-        st.tuples(
-            st.integers(0, 5),
-            st.sampled_from(sorted(ALL)),
-            st.sampled_from(("final", "bloom", "all")),
-        ),
-        min_size=2,
-        max_size=8,
-    )
-)
-def test_order_of_calls_does_not_matter(
-    renderer: Renderer, steps: list[tuple[int, str, Any]]
-) -> None:
-    for index, method, framebuffers in steps:
-        # Four sizes, two pictures of the first one, two dtypes.
-        image = in_dtype(noise(9 + index % 4, 12 - index % 4, index), FLOATS[index % 2])
-        frames = renderer.apply(image, ALL[method], framebuffers=framebuffers)
-        expected = reference.apply(image, ALL[method])
-        for name, array in frames.items():
-            limit = tolerance(array.dtype, expected[name])
-            assert (np.abs(array - expected[name]) <= limit).all(), name

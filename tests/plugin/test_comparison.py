@@ -398,16 +398,6 @@ class TestArguments:
         with pytest.raises(ValueError, match="threshold"):
             compare(a, a, threshold=math.nan)
 
-    @pytest.mark.parametrize(
-        ("package", "extra"), [("skimage.metrics", "quality"), ("OpenImageIO", "images")]
-    )
-    def test_extras_missing(
-        self, monkeypatch: pytest.MonkeyPatch, package: str, extra: str
-    ) -> None:
-        monkeypatch.setitem(sys.modules, package, None)
-        with pytest.raises(ModuleNotFoundError, match=rf"pip install vkbloom\[{extra}\]"):
-            compare(noise_image(8, 8, 3), noise_image(8, 8, 3))
-
     @pytest.mark.parametrize("relative", [-0.1, math.nan, math.inf])
     def test_relative_out_of_range(self, relative: float) -> None:
         with pytest.raises(ValueError, match=r"relative: .* is out of range"):
