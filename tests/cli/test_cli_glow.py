@@ -17,7 +17,6 @@ from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
 xr = pytest.importorskip("xarray")
 
 PYRAMID = ("--method", "pyramid", "--levels", "2", "--composite", "mix")
@@ -95,7 +94,6 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
 
 
 def test_grids(tmp_path: Path) -> None:
-    pytest.importorskip("zarr")
     image, emission = picture(24, 16, 3), picture(24, 16, 3, "float16", seed=1)
     source, glow = stored(tmp_path / "a.exr", image), stored(tmp_path / "glow.exr", emission)
     levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)

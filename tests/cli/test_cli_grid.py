@@ -21,7 +21,6 @@ from vkbloom._io.images import Picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
 xr = pytest.importorskip("xarray")
 
 

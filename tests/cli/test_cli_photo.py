@@ -21,7 +21,6 @@ from vkbloom._renderer.frame_files import facts_of
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
 data = pytest.importorskip("skimage.data")
 
 Image = NDArray[Any]

@@ -17,7 +17,6 @@ from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
 
 IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 

@@ -27,8 +27,6 @@ from vkbloom.psf._base import functions
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
-
 
 def run(*words: object) -> Result:
     return CliRunner().invoke(program, [str(word) for word in words])

@@ -279,7 +279,6 @@ def test_an_image_begins_as_in_apply(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pytest.importorskip("OpenImageIO")
     monkeypatch.chdir(tmp_path)
     vkbloom.write("photo.png", np.full((8, 8, 3), 255, np.uint8))
     vkbloom.write("photo.exr", np.full((8, 8, 3), 2, np.float32))
