@@ -133,19 +133,6 @@ def same_as_a_whole(
     return result
 
 
-@pytest.mark.parametrize("height", [512, 513])
-@pytest.mark.parametrize("preset", ["bevy_natural", "kino", "jimenez2014", "tutorial"])
-def test_by_bands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int], preset: str, height: int
-) -> None:
-    """Of a height that those of all levels divide, and of one that has no divisor with them."""
-    path = stored(tmp_path / "a.png", light(height, 41, 3, "uint8"))
-    held = []
-    monkeypatch.setattr(bands._Work, "_held_whole", lambda *_: held.append(1))
-    same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path, "--preset", preset)
-    assert not held
-
-
 @pytest.mark.parametrize("size", [(1, 161), (161, 1), (20000, 3)])
 def test_pictures_of_any_shape(tmp_path: Path, size: tuple[int, int]) -> None:
     """Also higher than the images of most devices: these are taken by rows."""

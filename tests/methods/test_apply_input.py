@@ -165,27 +165,6 @@ def with_specials(dtype: str, channels: int, size: tuple[int, int] = (23, 17)) -
 
 
 @pytest.mark.parametrize(
-    ("method", "dtype", "channels"), by_turns(METHODS, ["float16", "float32"], turns=[3, 4])
-)
-def test_nan_and_infinity_are_not_spread(
-    renderer: Renderer, method: str, dtype: str, channels: int
-) -> None:
-    settings = METHODS[method]
-    image = with_specials(dtype, channels)
-    zeros = np.where(np.isfinite(image), image, np.zeros((), dtype))
-    frames = renderer.apply(image, settings)
-    clean = renderer.apply(zeros, settings)
-    for name in list(frames)[:-1]:
-        assert_array_equal(frames[name], clean[name], err_msg=name)
-    finite = np.isfinite(image)
-    assert_array_equal(frames["final"][~finite], image[~finite])
-    assert_array_equal(frames["final"][finite], clean["final"][finite])
-    assert frames.info["nan"] == np.isnan(image).sum()
-    assert frames.info["inf"] == np.isinf(image).sum()
-    assert (clean.info["nan"], clean.info["inf"]) == (0, 0)
-
-
-@pytest.mark.parametrize(
     ("tonemap", "encoding", "other"),
     by_turns(
         ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"],
@@ -255,29 +234,6 @@ def test_no_bloom_is_the_identity_of_floats(renderer: Renderer) -> None:
     number = ~np.isnan(image)
     assert_array_equal(final.view(np.uint32)[number], bits[number])
     assert np.isnan(final[~number]).all()
-
-
-@pytest.mark.parametrize(
-    ("method", "dtype", "other"),
-    by_turns(METHODS, DTYPES, turns=itertools.product(["none", "agx"], COMPOSITES)),
-)
-def test_alpha_is_untouched(
-    renderer: Renderer, method: str, dtype: str, other: tuple[Any, Any]
-) -> None:
-    tonemap, composite = other
-    image = picture(15, 14, 4, dtype, seed=7)
-    if dtype != "uint8":
-        # Beyond 0..1, too.
-        image[..., 3] = 4 * image[..., 3] - 2
-    settings = METHODS[method].replace(
-        composite=composite, tonemap=tonemap, encoding="srgb", exposure=1.0
-    )
-    frames = renderer.apply(image, settings)
-    assert_array_equal(frames["final"][..., 3], image[..., 3])
-    # The colour does not depend on it.
-    opaque = renderer.apply(np.ascontiguousarray(image[..., :3]), settings)
-    assert_array_equal(frames["final"][..., :3], opaque["final"])
-    assert_array_equal(frames["bloom"], opaque["bloom"])
 
 
 # --- Framebuffers and out ---
