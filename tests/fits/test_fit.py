@@ -198,7 +198,7 @@ class TestFound:
 
 
 @pytest.fixture(scope="module")
-def found(renderer: Renderer, fit: Call) -> FitResult:
+def found(renderer: Renderer, fit: Call) -> Any:
     target = target_of(Pyramid(levels=3, radius=1.4))
     image = renderer.upload(IMAGE)
     return fit(image, target, Pyramid(levels=3), ["radius"], framebuffer="bloom")
@@ -249,7 +249,7 @@ class TestVerdict:
     def truth(self) -> Image:
         return target_of(Pyramid(levels=3, threshold=1.2, knee=0.5, intensity=0.4), "final")
 
-    def fitted(self, fit: Call, target: Image, start: Settings | None = None) -> FitResult:
+    def fitted(self, fit: Call, target: Image, start: Settings | None = None) -> Any:
         return fit(
             IMAGE,
             target,
@@ -369,7 +369,7 @@ class TestRefused:
             fit(IMAGE, IMAGE, start, vary, **options)
 
     def test_targets(self, renderer: Renderer, fit: Call) -> None:
-        def fitted(target: Any, **options: Any) -> FitResult:
+        def fitted(target: Any, **options: Any) -> Any:
             return fit(IMAGE, target, Separable(), "loops", **options)
 
         with pytest.raises(ValueError, match="target: 63 x 48 is not the image's size, 64 x 48"):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 def written(path: Path, spec: Any, pixels: NDArray[Any]) -> Path:
     """Write an image as a specification says."""
     writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None
     assert writer.open(str(path), spec), writer.geterror()
     assert writer.write_image(pixels), writer.geterror()
     assert writer.close(), writer.geterror()
