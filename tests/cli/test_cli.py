@@ -112,24 +112,16 @@ def test_a_failure_is_one_line_and_status_1(
     assert one_line(result.stderr).startswith(message)
 
 
-def test_an_interrupt_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(vkbloom, "adapters", interrupt)
-    result = vkb("adapters")
-    assert (result.exit_code, result.stderr) == (130, "vkbloom: interrupted\n")
-
-
-@pytest.mark.parametrize("kind", [AssertionError, OSError])
-def test_failure_caused_by_an_interrupt_counts_as_interrupt(
-    monkeypatch: pytest.MonkeyPatch, kind: type[Exception]
+@pytest.mark.parametrize("caused", [None, AssertionError, OSError])
+def test_an_interrupt_and_what_it_causes_are_status_130(
+    monkeypatch: pytest.MonkeyPatch, caused: type[Exception] | None
 ) -> None:
     def interrupt() -> None:
         try:
             raise KeyboardInterrupt
         finally:
-            raise kind("not started yet")
+            if caused is not None:
+                raise caused("not started yet")
 
     monkeypatch.setattr(vkbloom, "adapters", interrupt)
     result = vkb("adapters")
