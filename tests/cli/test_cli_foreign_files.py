@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 import vkbloom
 from tests.io import foreign
 from tests.io.profiles import store_png
-from vkbloom._cli import large_files
+from vkbloom._cli import bands
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 from vkbloom._io.rows import opened_rows
@@ -50,7 +50,7 @@ def test_colours_under_alpha_0_are_told(
     tmp_path: Path, under: int, is_large: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if is_large:
-        monkeypatch.setattr(large_files, "LARGE", 1)
+        monkeypatch.setattr(bands, "LARGE", 1)
     pixels = np.full((48, 64, 4), under, np.uint8)
     pixels[..., 3] = 0
     pixels[20:28, 28:36] = (200, 40, 40, 255)
@@ -92,7 +92,7 @@ def test_large_files(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatc
     words = (path, tmp_path / "b.png", "--preset", "kino")
     assert apply(*words).exit_code == 0
     at_once = load(tmp_path / "b.png").pixels
-    monkeypatch.setattr(large_files, "LARGE", 1)
+    monkeypatch.setattr(bands, "LARGE", 1)
     result = apply(*words)
     assert result.exit_code == 0, result.output
     assert np.array_equal(load(tmp_path / "b.png").pixels, at_once)

@@ -48,7 +48,7 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def by_rows_or_not(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Read and write pictures in bands of rows, as large ones are, or not."""
     if request.param:
-        monkeypatch.setattr("vkbloom._cli.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom._cli.bands.LARGE", 1)
 
 
 class TestSequences:
