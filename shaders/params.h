@@ -112,33 +112,31 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the smaller
-// one. The steps are the distances of the taps in texels of the image that is read. If a level is
-// exactly twice as large as the smaller one, `taps` has the same weights on integer texels. The
-// threshold is for a first level that reads the image itself.
-#define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
-    SAMPLING_ROWS(B, INPUT) \
+// A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size and of the
+// filtered image; the taps along rows and along columns. If the target is exactly twice as large, `taps`
+// has the same weights on integer texels.
+#define FILTER_ROWS(B, INPUT, VEC4S) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
-    INPUT(B, float, step_x) \
-    INPUT(B, float, step_y) \
-    THRESHOLD_ROWS(B, READS) \
+    VEC4S(B, taps_x, MAX_FILTER_TAPS) \
+    VEC4S(B, taps_y, MAX_FILTER_TAPS) \
     VEC4S(B, taps, 1)
 
-// The last upsampling of a pyramid, fused with the composite.
-#define DOUBLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, coarse) \
-    COMPOSITE_ROWS(B, READS, INPUT) \
-    VEC4S(B, taps, 1)
+// A pass that filters an image. The threshold is for one that reads the image itself.
+#define FILTER_BLOCK(B, READS, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    FILTER_ROWS(B, INPUT, VEC4S) \
+    THRESHOLD_ROWS(B, READS)
 
-// The same by any factor.
-#define UPSAMPLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
+// A filter that makes the bloom, fused with the composite.
+#define FILTER_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     PLACE_ROWS(B, INPUT) \
-    INPUT(B, float, coarse) \
+    FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// The first pass of a published method, which reads the frame. The steps are the distances of its
-// taps in texels of the frame.
+// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by brightness, and
+// the first pass of a published method, which reads the frame. The steps are the distances of its taps in
+// texels of what it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -159,12 +157,6 @@
 #define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
-
-// A pass of dual Kawase. The threshold is for a first level that reads the image itself.
-#define KAWASE_BLOCK(B, READS, INPUT, VEC4S) \
-    READS(B, offset) \
-    SAMPLING_ROWS(B, INPUT) \
-    THRESHOLD_ROWS(B, READS)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
 // weight of each for each channel. The threshold is for the first iteration.
@@ -244,7 +236,7 @@
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels; the
 // factor of the colours of what is added. A filter between levels of exactly half and twice the size is
-// of EXACT_*; `taps` are those of an upsampling, as of PYRAMID_BLOCK.
+// of EXACT_*; `taps` are those of an upsampling, as of FILTER_ROWS.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
@@ -324,12 +316,10 @@
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
     BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
-    BLOCK(pyramid, PYRAMID_BLOCK) \
-    BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
-    BLOCK(upsample_final, UPSAMPLE_FINAL_BLOCK) \
+    BLOCK(filter, FILTER_BLOCK) \
+    BLOCK(filter_final, FILTER_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
-    BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(flare, FLARE_BLOCK) \
     BLOCK(dirt, DIRT_BLOCK) \
@@ -465,12 +455,11 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
-#define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
-#define UPSAMPLE_ROWS                 64
-#define GRID_COLUMNS                  4
+#define WINDOW_COLUMNS(CHANNEL)       (8 / (CHANNEL))
+#define WINDOW_ROWS                   64
 #define SHRINK_ROWS                   32
-#define FILTER_COLUMNS                4
-#define FILTER_ROWS                   16
+#define GATHER_COLUMNS                4
+#define GATHER_ROWS                   16
 #define GODOT_COLUMNS                 8
 #define HDRP_OUTPUTS                  8
 #define STREAK_COLUMNS                8
@@ -529,6 +518,11 @@
     0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
 #define GODOT_KERNEL    0.2024, 0.1790, 0.1240, 0.0672, 0.0285
 
+// Of a filter: the most taps along an axis, kernels, and texels of a window.
+#define MAX_FILTER_TAPS 5
+#define MAX_KERNELS     3
+#define MAX_WINDOW      10
+
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
 #define MAX_LEVELS      16
@@ -537,11 +531,10 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
-// is known to have no NaN and no infinity. With NEXT_PIXEL the outer taps of halve_grid.comp are between
-// the texels of the next pixel. With FROM_IMAGE, a downsampling to half the size reads
+// is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters (lib/filter.glsl). EXACT says
+// that their images are in this ratio, or for strips the widths of these. With FROM_IMAGE, a downsampling to half the size reads
 // the image itself and applies the threshold, and an adjoint pass writes the cotangents of a source's
-// image. BY is what these are of. With ENLARGED the target of shrink.comp has more rows than the
-// source. STORED is the format of the target (STORED_*). FIRST
+// image. BY is what these are of. With ENLARGED the target has more rows than the source. STORED is the format of the target (STORED_*). FIRST
 // marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
 // a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
 // workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a
@@ -559,7 +552,6 @@
     CONSTANT(7, THRESHOLD_MODE, threshold_mode) \
     CONSTANT(8, THRESHOLDED, thresholded) \
     CONSTANT(9, ANTI_FLICKER, anti_flicker) \
-    CONSTANT(10, FIREFLY_FILTER, firefly_filter) \
     CONSTANT(11, DIRECTION, direction) \
     CONSTANT(12, RADIUS, radius) \
     CONSTANT(13, ADD_OWN, add_own) \
@@ -587,11 +579,14 @@
     CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, ROLLED, rolled) \
     CONSTANT(37, FINITE, finite) \
-    CONSTANT(38, NEXT_PIXEL, next_pixel) \
     CONSTANT(39, BY, by) \
     CONSTANT(40, BOUNDARY, boundary) \
     CONSTANT(41, PREFILTERED, prefiltered) \
-    CONSTANT(42, ENLARGED, enlarged)
+    CONSTANT(42, ENLARGED, enlarged) \
+    CONSTANT(43, EXACT, exact) \
+    CONSTANT(44, TAP_COUNT, taps) \
+    CONSTANT(45, KERNELS, kernels) \
+    CONSTANT(46, WINDOW, window)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -645,6 +640,11 @@
     NAME(QUALITY_MEDIUM, 1, medium) \
     NAME(QUALITY_LOW, 2, low)
 
+#define FILTER_NAMES(NAME) \
+    NAME(FILTER_GAUSSIAN, 0, gaussian) \
+    NAME(FILTER_KAWASE, 1, kawase) \
+    NAME(FILTER_DUAL, 2, dual)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
@@ -653,7 +653,8 @@
     CHOICE(texel, TEXEL_NAMES) \
     CHOICE(boundary, BOUNDARY_NAMES) \
     CHOICE(type, TYPE_NAMES) \
-    CHOICE(quality, QUALITY_NAMES)
+    CHOICE(quality, QUALITY_NAMES) \
+    CHOICE(filter, FILTER_NAMES)
 
 // Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
@@ -682,9 +683,7 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
-    NAME(UPSAMPLE_UNIT_TENT, 5, unit_tent) \
-    NAME(UPSAMPLE_PAIR, 6, pair) \
-    NAME(GROUPS_PYRAMID, 0, pyramid) \
+    NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
     NAME(GROUPS_BLENDER, 3, blender) \
@@ -694,11 +693,13 @@
     NAME(GROUPS_URP, 7, urp) \
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
-    NAME(GROUPS_KAWASE, 10, kawase) \
     NAME(GROUPS_KINO, 11, kino) \
+    NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
+    NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
+    NAME(EXACT_SAME, 3, exact_same) \
     NAME(BY_SCENE, 0, by_scene) \
     NAME(BY_BLOOM, 1, by_bloom) \
     NAME(BY_MASK, 2, by_mask) \

@@ -11,6 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from tests.images import noise
 from vkbloom import Separable, Settings
 from vkbloom._renderer.frames import Frames
 
@@ -33,13 +34,6 @@ def make(
     return Frames(
         arrays, timings=timings, settings=settings or Separable(blur_scale=2.0), info=INFO
     )
-
-
-def noise(*shape: int, dtype: str, seed: int = 1) -> NDArray[Any]:
-    generator = np.random.default_rng(seed)
-    if dtype == "uint8":
-        return generator.integers(0, 256, shape, dtype=np.uint8)
-    return (generator.standard_normal(shape) * 100).astype(dtype)
 
 
 def mixed() -> Frames:
@@ -83,6 +77,21 @@ def read(file: Path) -> dict[str, Part]:
         index += 1
     reader.close()
     return parts
+
+
+def write_image(path: Path, pixels: NDArray[Any], kind: str = "", **attributes: Any) -> Path:
+    """Write pixels (h, w, C) as they are; without the first attribute PNG divides by alpha."""
+    spec = oiio.ImageSpec(
+        pixels.shape[1], pixels.shape[0], pixels.shape[2], kind or pixels.dtype.name
+    )
+    for name, value in {"oiio:UnassociatedAlpha": 1, **attributes}.items():
+        spec.attribute(name, value)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None, oiio.geterror()
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
+    writer.close()
+    return path
 
 
 def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Images that tests apply bloom to."""
+"""Images that tests apply bloom to, or store."""
 
 from __future__ import annotations
 
@@ -9,11 +9,25 @@ from numpy.typing import NDArray
 
 
 def picture(
-    width: int, height: int, channels: int = 4, dtype: str = "float32", seed: int = 0
+    width: int,
+    height: int,
+    channels: int = 4,
+    dtype: str = "float32",
+    seed: int = 0,
+    *,
+    power: int = 1,
+    highest: float = 1.0,
 ) -> NDArray[Any]:
-    """Return random values of 0 to 1; uint8 has them as 0 to 255."""
+    """Return random values of 0 to `highest`; integers reach their type's largest value.
+
+    The higher `power` is, the fewer values are high.
+    """
     values = np.random.default_rng(seed).random((height, width, channels), dtype=np.float32)
-    return np.rint(255 * values).astype(dtype) if dtype == "uint8" else values.astype(dtype)
+    values = values**power if power > 1 else values
+    is_integer = np.dtype(dtype).kind == "u"
+    scaled: Any = values * np.float32(np.iinfo(dtype).max if is_integer else highest)
+    result: NDArray[Any] = (np.rint(scaled) if is_integer else scaled).astype(dtype)
+    return result
 
 
 def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 0) -> NDArray[Any]:
@@ -26,6 +40,33 @@ def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 
         return np.rint(255 * values).astype(np.uint8)
     # Beyond what 8 bits hold, and below 0.
     return (8 * values - 0.5).astype(dtype)
+
+
+def lights(
+    width: int,
+    height: int,
+    channels: int = 3,
+    dtype: str = "float32",
+    seed: int = 3,
+    *,
+    highest: float = 40.0,
+) -> NDArray[Any]:
+    """Return dim noise with a few bright points, up to 1 in uint8, up to `highest` in floats."""
+    generator = np.random.default_rng(seed)
+    image = 0.8 * generator.random((height, width, channels)) ** 2
+    points = generator.random((height, width)) < 0.02
+    points[height // 2, width // 3] = True
+    brightest = 1.0 if dtype == "uint8" else highest
+    image[points, :3] = generator.random((int(points.sum()), 3)) * brightest
+    return np.rint(image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
+
+
+def noise(*shape: int, dtype: str, seed: int = 1, spread: float = 100.0) -> NDArray[Any]:
+    """Return any integers of the type, or floats below and above 0."""
+    generator = np.random.default_rng(seed)
+    if np.dtype(dtype).kind == "u":
+        return generator.integers(0, np.iinfo(dtype).max, shape, dtype, endpoint=True)
+    return (generator.standard_normal(shape) * spread).astype(dtype)
 
 
 def noise_image(*shape: int, dtype: str = "float32", seed: int = 5) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import math
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from types import ModuleType
 from typing import Any
 
@@ -38,10 +38,13 @@ __all__ = [
 #: The largest 32-bit float; the device computes in 32-bit floats.
 FLT_MAX = (2 - 2**-23) * 2.0**127
 
+# What has items, but no first one.
+_UNORDERED = (Mapping, Set)
+
 # Fast path for native byte order.
 _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
-_DTYPE_CURES = {
+_DTYPE_HINTS = {
     "uint16": "; convert it: (image / 65535).astype(np.float32)",
     "bool": "; convert it: image.astype(np.float32)",
     np.dtype(np.longdouble).name: "; convert it: image.astype(np.float32)",
@@ -49,7 +52,7 @@ _DTYPE_CURES = {
 # The device type kDLCPU of DLPack.
 _DLPACK_CPU = 1
 #: Modes of PIL whose arrays are not red, green and blue, and the mode to convert them to.
-_MODE_CURES = {
+_MODE_HINTS = {
     **dict.fromkeys(("1", "L", "P", "CMYK", "YCbCr", "HSV", "RGBX"), "RGB"),
     **dict.fromkeys(("LA", "La", "PA", "RGBa"), "RGBA"),
 }
@@ -93,7 +96,7 @@ def check_number(name: str, value: float, low: float, high: float) -> float:
 def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
     """Return the values as floats within the 32-bit range, or raise TypeError or ValueError."""
     try:
-        if isinstance(values, str):
+        if isinstance(values, (*_UNORDERED, str, bytes)):
             raise TypeError
         numbers = tuple(as_float(name, value) for value in values)
     except TypeError:
@@ -124,6 +127,8 @@ def check_above(name: str, value: Any, low: float = 0.0) -> float:
 def check_size(name: str, size: Any) -> tuple[int, int]:
     """Return (width, height) as two ints of at least 1, or raise TypeError or ValueError."""
     try:
+        if isinstance(size, _UNORDERED):
+            raise TypeError
         width, height = size
         integers = (int(width), int(height))
     except (TypeError, ValueError, OverflowError):
@@ -162,10 +167,10 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     becomes float32.
     """
     mode = _pil_mode(image)
-    if mode in _MODE_CURES:
+    if mode in _MODE_HINTS:
         raise ValueError(
             f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
-            f'{name}.convert("{_MODE_CURES[mode]}")'
+            f'{name}.convert("{_MODE_HINTS[mode]}")'
         )
     array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
@@ -176,15 +181,15 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
         if array.dtype.name not in ("uint8", "float16", "float32"):
-            cure = _DTYPE_CURES.get(array.dtype.name, "")
+            hint = _DTYPE_HINTS.get(array.dtype.name, "")
             raise TypeError(
-                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
+                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{hint}"
             )
         array = native_order(array)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise ValueError(
             f"{name}: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-            + _shape_cure(array.shape)
+            + _shape_hint(array.shape)
         )
     return array
 
@@ -217,13 +222,13 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     if type(array) is not np.ndarray and np.ma.is_masked(array):
         raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
     if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
-        cure = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
+        hint = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         raise TypeError(
-            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{cure}"
+            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{hint}"
         )
     if array.shape != size:
-        cure = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
-        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{cure}")
+        hint = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
+        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{hint}")
     values = array.astype(np.float32, copy=False)
     if array.dtype.name == "uint8":
         return values / np.float32(255)
@@ -250,12 +255,12 @@ def _viewed(
         order = [_dimension(dims, one) for one in dimensions]
         if len(dims) != len(order) or None in order:
             others = [dim for dim, one in zip(dims, order, strict=False) if dim not in order]
-            cure = (
+            hint = (
                 f"select one value of the others first, such as {name}.isel({others[0]}=0)"
                 if len(dims) > len(order) and others
                 else f"rename them: {name}.rename(...)"
             )
-            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {cure}")
+            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {hint}")
         return np.asarray(image.transpose(*order))
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
     try:
@@ -305,7 +310,7 @@ def _dimension(dims: tuple[Any, ...], name: str) -> Any:
     return ending[0] if len(ending) == 1 else None
 
 
-def _shape_cure(shape: tuple[int, ...]) -> str:
+def _shape_hint(shape: tuple[int, ...]) -> str:
     """Return a hint how to convert an array of this shape to an image; "" if there is none."""
     if len(shape) == 2:
         return "; convert grey to RGB: np.repeat(image[..., None], 3, axis=2)"
@@ -322,11 +327,4 @@ def check_framebuffers(framebuffers: str | Sequence[str]) -> tuple[str, ...] | N
     """Return the names of the requested framebuffers; None for all."""
     if isinstance(framebuffers, str):
         return None if framebuffers == "all" else (framebuffers,)
-    try:
-        names = tuple(framebuffers)
-    except TypeError:
-        raise TypeError(f"framebuffers: {framebuffers!r} is not a sequence of names") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"framebuffers: {name!r} is not a name")
-    return names
+    return tuple(framebuffers)

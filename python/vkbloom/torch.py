@@ -116,10 +116,6 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     ValueError
         A field has no derivative, or is None.
 
-    See Also
-    --------
-    bloom : The function.
-
     Notes
     -----
     An optimizer may move a parameter out of the range of its field. Each call moves it back to the

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
+from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
 from vkbloom._settings.fields import fields_of
 
@@ -18,10 +19,6 @@ from vkbloom._settings.fields import fields_of
 MIN_AGE = 64
 PIPELINES = 256
 IMAGE_BYTES = 256 << 20
-
-
-def noise(height: int, width: int) -> NDArray[np.float32]:
-    return np.random.default_rng(5).random((height, width, 4), dtype=np.float32)
 
 
 def finals(
@@ -37,7 +34,7 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
     new_renderer: Callable[[], Renderer],
 ) -> None:
     renderer = new_renderer()
-    image = noise(70, 70)
+    image = picture(70, 70)
     cached, created = [], []
     for side in range(2 * HALF):
         # Both halves have all heights and all widths, and so all variants.
@@ -58,7 +55,7 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
 
 def test_unused_images_are_freed(new_renderer: Callable[[], Renderer]) -> None:
     renderer = new_renderer()
-    image = noise(24, 16)
+    image = picture(16, 24)
     # Twenty images of 16 MiB.
     large = Separable(loops=10, bloom_size=(1024, 1024), format="rgba32float")
     expected = renderer.apply(image, large)["final"].copy()
@@ -85,7 +82,7 @@ def test_unused_pipelines_are_freed(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
     chosen += [dataclasses.replace(one, bloom=False) for one in chosen if one.composite == "add"]
     dithered = [dataclasses.replace(one, dither=True) for one in chosen]
-    single, half, byte = (noise(4, 5).astype(dtype) for dtype in ("float32", "float16", "uint8"))
+    single, half, byte = (picture(5, 4).astype(dtype) for dtype in ("float32", "float16", "uint8"))
     requests = [
         *itertools.product((single, half), chosen),
         *itertools.product((byte,), dithered[:40]),
@@ -107,11 +104,11 @@ def test_pipelines_do_not_go_under_submissions_that_wait(
 ) -> None:
     """Frames are taken late, while many others are made, under the validation layer."""
     renderer = new_renderer()
-    image = noise(8, 8)
+    image = picture(8, 8)
     waiting = renderer.sweep(image, [Separable(exposure=step / 8) for step in range(40)])
     next(waiting)
     for step in range(MIN_AGE + 20):
-        renderer.apply(noise(9, 9 + step % 5), Pyramid(exposure=step / 100))
+        renderer.apply(picture(9 + step % 5, 9), Pyramid(exposure=step / 100))
     assert len(list(waiting)) == 39
 
 
@@ -121,7 +118,7 @@ def test_alternating_sizes_reuse_images(new_renderer: Callable[[], Renderer]) ->
     created = []
     for _ in range(2 * MIN_AGE // len(sizes)):
         for height, width in sizes:
-            renderer.apply(noise(height, width), Pyramid())
-            renderer.apply(noise(height, width), Separable())
+            renderer.apply(picture(width, height), Pyramid())
+            renderer.apply(picture(width, height), Separable())
         created.append(renderer._core.pipeline_count)
     assert created[-1] == created[0]

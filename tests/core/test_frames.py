@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.framebuffers import INFO, TIMINGS, make, mixed, noise
+from tests.framebuffers import INFO, TIMINGS, make, mixed
+from tests.images import noise
 from vkbloom import Separable
 from vkbloom._renderer.frames import Frames, dimensions
 
@@ -93,26 +94,6 @@ class TestMapping:
             assert other[name].tobytes() == array.tobytes()
         assert other.timings == frames.timings
         assert (other.settings, other.info) == (frames.settings, frames.info)
-
-    @pytest.mark.parametrize(
-        ("name", "array", "error"),
-        [
-            ("final", [[1.0]], TypeError),
-            (3, np.zeros((1, 1, 3), np.uint8), TypeError),
-            ("../final", np.zeros((1, 1, 3), np.uint8), ValueError),
-            ("final", np.zeros((2, 2, 3)), ValueError),
-            ("final", np.zeros((2, 2, 2), np.uint8), ValueError),
-            ("final", np.zeros((2, 2, 1), np.float32), ValueError),
-            ("final", np.zeros((0, 2, 3), np.uint8), ValueError),
-            ("depth", np.zeros((2, 2), np.uint8), ValueError),
-            ("depth", np.zeros((2, 2), np.float16), ValueError),
-        ],
-    )
-    def test_value_that_is_not_a_framebuffer_is_refused(
-        self, name: Any, array: Any, error: type[Exception]
-    ) -> None:
-        with pytest.raises(error, match="arrays"):
-            make({name: array})
 
 
 class TestXarray:

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.images import picture
 from vkbloom import Renderer, Settings, load_method, psf, reference, testing
 from vkbloom._cli.live import Live
 from vkbloom._cli.program import program
@@ -74,8 +75,7 @@ def kind() -> Any:
 
 
 def photo() -> Array:
-    image = np.random.default_rng(5).random((32, 40, 3), np.float32) ** 8 * 9
-    return np.asarray(image)
+    return picture(40, 32, 3, power=8, highest=9)
 
 
 def test_plans(renderer: Renderer, kind: Any) -> None:

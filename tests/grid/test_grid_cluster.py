@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.framebuffers import noise
 from tests.grid.stores import contents
+from tests.images import noise
 from vkbloom import Frames, Separable, check_grid, reductions
 from vkbloom._grid import cluster
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.framebuffers import make, noise
+from tests.framebuffers import make
+from tests.images import noise
 from vkbloom import reductions
 from vkbloom._views.comparison import compare
 

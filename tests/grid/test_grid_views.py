@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 import pytest
 
 import vkbloom
-from tests.framebuffers import noise
+from tests.images import noise
 from vkbloom import Renderer, Separable, contact_sheet, reductions, response_curves
 from vkbloom._grid.selection import select
 

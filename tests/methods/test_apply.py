@@ -1,8 +1,10 @@
-"""Every method, format and size of `apply` against `vkbloom.reference`, and on flat images."""
+"""Every method and size of `apply` against `vkbloom.reference`, and on flat images.
+
+Formats, presets and last passes are cases of the self-test (tests/device/test_self_test.py).
+"""
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -11,22 +13,21 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns, some
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS, presets_of_low_levels
+from tests.methods.cases import DTYPES, METHODS
 from tests.tolerance import (
-    FORMATS,
     assert_close,
     assert_matches_reference,
     real,
     tolerance,
 )
 from vkbloom import (
-    Convolution,
     Renderer,
     Separable,
     Settings,
     presets,
     reference,
 )
+from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
 
 Image = NDArray[Any]
 
@@ -62,53 +63,6 @@ def test_reference_of_a_large_image(renderer: Renderer) -> None:
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
-@pytest.mark.parametrize(
-    ("method", "dtype", "format"),
-    by_turns(
-        ["tutorial", "loops-layers", "knee", "direct", "pyramid-firefly", "dual-kawase"],
-        DTYPES,
-        turns=FORMATS.values(),
-    ),
-)
-def test_format_of_the_bloom_buffers(
-    renderer: Renderer, method: str, dtype: str, format: Any
-) -> None:
-    image = hdr_picture(45, 30, 4, dtype)
-    settings = METHODS[method].replace(format=format)
-    assert_matches_reference(renderer.apply(image, settings), image, settings)
-
-
-@pytest.mark.parametrize(
-    ("method", "dtype", "channels"),
-    by_turns(["tutorial", "pyramid", "dual-kawase"], DTYPES, turns=[3, 4]),
-)
-def test_names_shapes_and_dtypes(
-    renderer: Renderer, method: str, dtype: str, channels: int
-) -> None:
-    image = hdr_picture(40, 24, channels, dtype)
-    frames = renderer.apply(image, METHODS[method])
-    # The level of 1 x 1, after 2 x 1, is not part of the chain.
-    downs = {"down_0": (12, 20), "down_1": (6, 10), "down_2": (3, 5), "down_3": (1, 2)}
-    chain = {**downs, "up_2": (3, 5), "up_1": (6, 10), "up_0": (12, 20)}
-    blurs = {
-        "tutorial": {"blur_vertical": (24, 40)},
-        "pyramid": chain,
-        "dual-kawase": chain,
-    }[method]
-    shapes = {"glow": (24, 40), **blurs, "bloom": (24, 40)}
-    assert {name: array.shape for name, array in frames.items()} == {
-        **{name: (*shape, 4) for name, shape in shapes.items()},
-        "final": (24, 40, channels),
-    }
-    assert list(frames) == [*shapes, "final"]
-    assert {array.dtype.name for array in frames.values()} == {dtype}
-
-
-def test_direct_has_no_vertical_blur(renderer: Renderer) -> None:
-    frames = renderer.apply(hdr_picture(9, 5, 3, "uint8"), Separable(direct=True))
-    assert list(frames) == ["glow", "bloom", "final"]
-
-
 def test_no_settings_are_bevys(renderer: Renderer) -> None:
     image = hdr_picture(40, 20, 3, "uint8")
     assert renderer.apply(image).settings == presets["bevy_natural"]
@@ -117,28 +71,6 @@ def test_no_settings_are_bevys(renderer: Renderer) -> None:
     frames = renderer.apply(image, Separable())
     assert frames["blur_vertical"].shape == (20, 300, 4)
     assert_matches_reference(frames, image, Separable())
-
-
-LOW = presets_of_low_levels(64)
-
-
-# (Convolutions have tests of their own, as Blender's fog glow has among the engines' frames: a
-# transform's error is relative to the largest value.)
-@pytest.mark.parametrize(
-    ("name", "dtype"),
-    by_turns(
-        [
-            name
-            for name in presets
-            if not isinstance(presets[name], Convolution) and name != "blender_fog_glow"
-        ],
-        turns=DTYPES,
-    ),
-)
-def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
-    image = hdr_picture(61, 43, 3, dtype)
-    settings = presets[name] if EXHAUSTIVE else LOW[name]
-    assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
 @pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=DTYPES))
@@ -153,35 +85,7 @@ def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -
     assert_close("bloom", bloom, expected, tolerance(dtype, expected, stages_of_8_bits=2))
 
 
-@pytest.mark.parametrize(
-    ("threshold", "knee", "other"),
-    by_turns(
-        [0.0, 0.5, 0.9, 1.5],
-        [0.0, 0.25, 1.0],
-        turns=itertools.product(["float16", "float32"], ["fractional", "pyramid", "dual-kawase"]),
-    ),
-)
-def test_gain_passes_the_threshold(
-    renderer: Renderer, threshold: float, knee: float, other: tuple[str, str]
-) -> None:
-    dtype, method = other
-    settings = METHODS[method].replace(threshold=threshold, knee=knee)
-    bloom = renderer.apply(flat(1, dtype), settings, framebuffers="bloom")["bloom"][..., :3]
-    expected = np.full(bloom.shape, reference.gain(settings))
-    assert_close("bloom", bloom, expected, tolerance(dtype, expected))
-
-
-def test_white_is_not_above_a_threshold_of_one(renderer: Renderer) -> None:
-    for dtype, white in {"uint8": 255, "float16": 1, "float32": 1}.items():
-        glow = renderer.apply(flat(white, dtype), Separable(threshold=1.0))["glow"]
-        assert not glow[..., :3].any(), dtype
-
-
 # --- Composite, exposure, tone map, encoding ---
-
-COMPOSITES = ("add", "mix", "screen")
-TONEMAPS = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
-ENCODINGS = ("none", "gamma22", "srgb", "pq", "hlg")
 
 
 def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:
@@ -197,24 +101,6 @@ def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> No
 def bright(dtype: str) -> Image:
     values = 0.1 + 0.8 * np.random.default_rng(3).random((14, 19, 4))
     return np.rint(255 * values).astype(np.uint8) if dtype == "uint8" else values.astype(dtype)
-
-
-@pytest.mark.parametrize(
-    ("composite", "tonemap", "encoding", "dtype"),
-    [
-        (composite, tonemap, encoding, dtype)
-        for tonemap, encoding, (composite, dtype) in by_turns(
-            TONEMAPS, ENCODINGS, turns=itertools.product(COMPOSITES, DTYPES)
-        )
-    ],
-)
-def test_composite_tonemap_and_encoding(
-    renderer: Renderer, composite: Any, tonemap: Any, encoding: Any, dtype: str
-) -> None:
-    settings = Separable(
-        composite=composite, tonemap=tonemap, encoding=encoding, intensity=0.3, exposure=0.5
-    )
-    assert_composite(renderer, bright(dtype), settings)
 
 
 @pytest.mark.parametrize("composite", COMPOSITES)
@@ -233,21 +119,6 @@ def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, compos
 def test_exposure(renderer: Renderer, dtype: str, tonemap: Any, exposure: float) -> None:
     settings = Separable(tonemap=tonemap, exposure=exposure, intensity=0.5)
     assert_composite(renderer, bright(dtype), settings)
-
-
-@pytest.mark.parametrize(
-    ("intensity", "composite", "dtype"),
-    by_turns([0.0, 0.04, 1.0, 1000.0], COMPOSITES, turns=DTYPES),
-)
-def test_intensity(renderer: Renderer, dtype: str, composite: Any, intensity: float) -> None:
-    settings = Separable(composite=composite, intensity=intensity, blur_strength=0.5)
-    assert_composite(renderer, bright(dtype), settings)
-    image = bright(dtype)
-    final = renderer.apply(image, settings, framebuffers="final")["final"]
-    if intensity == 0:
-        # Nothing of the bloom comes in; screen costs a rounding, 1 - (1 - s).
-        limit = 0.0 if composite != "screen" else tolerance(dtype, real(image)) / 2
-        assert_close("final", final, real(image), limit)
 
 
 @pytest.mark.parametrize(

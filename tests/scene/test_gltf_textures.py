@@ -14,17 +14,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
+from tests.framebuffers import write_image
+from tests.images import noise
+from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import (
     BYTE,
     FLOAT,
     SHORT,
     TYPES,
     Document,
+    at,
     load_or_refuse,
     places,
     refusals,
@@ -47,25 +50,10 @@ FRONT = [0, 1, 2, 0, 2, 3]
 
 def encoded(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any) -> bytes:
     """Return an image file of pixels (h, w, C), uint8 or uint16."""
-    path = folder / f"encoded{suffix}"
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], str(pixels.dtype))
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    for name, value in attributes.items():
-        spec.attribute(name, value)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer is not None, oiio.geterror()
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
-    writer.close()
+    path = write_image(folder / f"encoded{suffix}", pixels, **attributes)
     data = path.read_bytes()
     path.unlink()
     return data
-
-
-def noise(width: int, height: int, channels: int = 3, dtype: str = "uint8") -> Array:
-    highest = np.iinfo(dtype).max
-    generator = np.random.default_rng((width, height, channels))
-    return generator.integers(0, highest, (height, width, channels), dtype, endpoint=True)
 
 
 def linear(pixels: Array) -> NDArray[np.float64]:
@@ -96,7 +84,7 @@ def load(tmp_path: Path) -> Callable[[Document], Mesh]:
 
     def load_it(document: Document) -> Mesh:
         if not (tmp_path / "a.png").exists():
-            (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+            (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             return document.load(tmp_path)
@@ -115,7 +103,7 @@ Load = Callable[[Document], Mesh]
 def test_images_are_decoded_from_srgb(
     load: Load, tmp_path: Path, channels: int, dtype: str
 ) -> None:
-    pixels = noise(40, 30, channels, dtype)
+    pixels = noise(30, 40, channels, dtype=dtype)
     # A file's own words on its colours do not count.
     data = encoded(pixels, tmp_path, **{"oiio:ColorSpace": "lin_rec709_scene"})
     (tmp_path / "a.png").write_bytes(data)
@@ -138,7 +126,7 @@ def test_jpeg(load: Load, tmp_path: Path) -> None:
 
 
 def test_images_wherever_they_lie(load: Load, tmp_path: Path) -> None:
-    data = encoded(noise(5, 4), tmp_path)
+    data = encoded(noise(4, 5, 3, dtype="uint8"), tmp_path)
     (tmp_path / "a.png").write_bytes(data)
     (tmp_path / "inner").mkdir()
     # The name and the MIME type say nothing: the first bytes do.
@@ -185,7 +173,7 @@ def test_factor_times_vertex_colour_times_texture(
     renderer: Renderer, load: Load, tmp_path: Path
 ) -> None:
     size = (8, 6)
-    colours, lights = noise(*size), noise(4, 3)
+    colours, lights = noise(*size[::-1], 3, dtype="uint8"), noise(3, 4, 3, dtype="uint8")
     (tmp_path / "a.png").write_bytes(encoded(colours, tmp_path))
     (tmp_path / "b.png").write_bytes(encoded(lights, tmp_path))
     document = textured(sampler=0)
@@ -370,7 +358,7 @@ def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
     material["emissiveTexture"] = {"index": 1}
     document.json["textures"].append({"extensions": {"KHR_texture_basisu": {"source": 0}}})
     document.json["extensionsUsed"] = ["KHR_texture_basisu"]
-    (tmp_path / "a.png").write_bytes(encoded(noise(4, 3), tmp_path))
+    (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
     with pytest.warns(UserWarning, match="left out") as caught:
         mesh = document.load(tmp_path)
     assert len(caught) == 1
@@ -385,69 +373,25 @@ def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
     assert base(mesh) is not WHITE
 
 
-MATERIAL = ("materials", 0, "pbrMetallicRoughness")
-INFO = (*MATERIAL, "baseColorTexture")
-ATTRIBUTES = ("meshes", 0, "primitives", 0, "attributes")
+INFO = "materials.0.pbrMetallicRoughness.baseColorTexture"
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "message"),
-    [
-        ((*INFO, "index"), 1, r"index into textures is 1; 0\.\.0"),
-        ((*INFO, "index"), -1, r"index into textures"),
-        ((*INFO, "texCoord"), -1, r"baseColorTexture\.texCoord"),
-        ((*INFO, "texCoord"), 1, r"has no TEXCOORD_1.*materials\[0\]"),
-        (INFO, 5, "not a glTF 2.0 document"),
-        (
-            (*INFO, "extensions"),
-            {"KHR_texture_transform": 5},
-            "KHR_texture_transform is not an object",
-        ),
-        ((*INFO, "extensions"), {"KHR_texture_transform": {"scale": [1]}}, "scale"),
-        ((*INFO, "extensions"), {"KHR_texture_transform": {"rotation": "a"}}, "rotation"),
-        ((*INFO, "extensions"), {"KHR_texture_transform": {"texCoord": 0.5}}, "texCoord"),
-        (
-            (*INFO, "extensions"),
-            {"KHR_texture_transform": {"scale": [3e38, 1], "offset": [3e38, 0]}},
-            "not finite",
-        ),
-        (("textures", 0, "source"), 1, r"textures\[0\]: index into images is 1"),
-        (("textures", 0, "sampler"), 0, r"textures\[0\]: index into samplers"),
-        (("images", 0), {}, r"images\[0\] needs either a URI or a bufferView"),
-        (("images", 0), {"uri": "a.png", "bufferView": 0}, r"images\[0\] needs either"),
-        (("images", 0), {"bufferView": 0}, r"images\[0\] is neither PNG nor JPEG"),
-        (("images", 0), {"bufferView": 99}, r"index into bufferViews is 99"),
-        (("images", 0, "uri"), "data:image/png;base64,%", "base64"),
-        (("images", 0, "uri"), "data:image/png,", "base64"),
-        (("images", 0, "uri"), "mesh.gltf", r"images\[0\] is neither PNG nor JPEG"),
-        (("images", 0, "uri"), "https://example.org/a.png", r"images\[0\].*scheme"),
-        (("images", 0, "uri"), "../a.png", r"images\[0\].*leads out"),
-        (("images", 0, "uri"), "/a.png", r"images\[0\].*leads out"),
-        (("images", 0, "uri"), "link.png", r"images\[0\].*leads out"),
-        (("images", 0, "uri"), ".", r"images\[0\].*is not a file"),
-        ((*ATTRIBUTES, "TEXCOORD_0"), 99, r"index into accessors is 99"),
-        ((*ATTRIBUTES, "TEXCOORD_0"), 0, "SCALAR.*VEC2"),
-        ((*ATTRIBUTES, "TEXCOORD_0"), 1, "VEC3.*VEC2"),
-        (("samplers",), [{"wrapS": 10496}], r"samplers\[0\]\.wrapS is 10496; 33071, 33648, 10497"),
-        (("samplers",), [{"magFilter": 9987}], r"magFilter is 9987; 9728, 9729"),
-        (("samplers",), [{"minFilter": 1}], r"minFilter is 1"),
-    ],
-)
-def test_damage_is_named(tmp_path: Path, path: Any, value: Any, message: str) -> None:
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "damaged textures of glTF"))
+def test_damage_is_named(tmp_path: Path, call: str, error: str) -> None:
     folder = tmp_path / "model"
     folder.mkdir()
-    document = textured()
-    (folder / "a.png").write_bytes(encoded(noise(4, 3), folder))
-    (tmp_path / "a.png").write_bytes((folder / "a.png").read_bytes())
+    for file in (folder / "a.png", tmp_path / "a.png"):
+        file.write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
     (folder / "link.png").symlink_to(tmp_path / "a.png")
-    if path == ("samplers",):
-        document.json["textures"][0]["sampler"] = 0
-    place: Any = document.json
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    with pytest.raises(ValueError, match=rf"mesh\.gltf.*{message}"):
-        document.load(folder)
+
+    def damaged(path: str, value: Any) -> Mesh:
+        document = textured()
+        if path == "samplers":
+            document.json["textures"][0]["sampler"] = 0
+        at(document.json, path, value)
+        return document.load(folder)
+
+    assert_refused(call, error, {"damaged": damaged, "INFO": INFO})
 
 
 def test_a_missing_image_is_an_os_error_that_names_it(tmp_path: Path) -> None:
@@ -471,7 +415,7 @@ def test_too_few_texture_coordinates(load: Load) -> None:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 def test_an_image_cut_anywhere_is_refused(tmp_path: Path, suffix: str) -> None:
-    data = encoded(noise(16, 16), tmp_path, suffix)
+    data = encoded(noise(16, 16, 3, dtype="uint8"), tmp_path, suffix)
     for length in [*range(0, len(data) // 2, len(data) // 12), len(data) - 40]:
         (tmp_path / "a.png").write_bytes(data[:length])
         with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]") as caught:
@@ -513,7 +457,7 @@ def test_without_openimageio_the_message_says_what_to_install(
 
 def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
     document = textured(sampler=0)
-    data = encoded(noise(4, 3), tmp_path)
+    data = encoded(noise(3, 4, 3, dtype="uint8"), tmp_path)
     document.json["images"] = [{"bufferView": document.view(data), "mimeType": "image/png"}]
     document.json["samplers"] = [
         {"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9986}

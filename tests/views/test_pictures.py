@@ -16,7 +16,8 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.framebuffers import decode, make, mixed, noise
+from tests.framebuffers import decode, make, mixed
+from tests.images import noise
 from vkbloom import Separable
 from vkbloom._renderer.frames import Frames
 from vkbloom._views.pictures import contact_sheet_png, picture

@@ -69,11 +69,6 @@ class FitResult:
         What the likely cause is if the verdict is not good: no bloom in the target; a target that
         is clipped, encoded or turned; or another method.
 
-    See Also
-    --------
-    vkbloom.fit : Returns it.
-    vkbloom.translate, vkbloom.fit_pyramid : Return it, too.
-
     Examples
     --------
     >>> image = np.zeros((16, 16, 3), np.float32)

@@ -19,7 +19,6 @@ from vkbloom._grid.store import (
     METADATA,
     PARTS,
     checked_identity,
-    describe,
     mark_of,
     normal,
     read_json,
@@ -42,18 +41,6 @@ class GridReport:
         Each damaged or missing key, with the points that it contains.
     missing_parts : tuple of str
         If the grid is rendered in parts: those that are not complete, such as "3/16".
-
-    See Also
-    --------
-    check_grid : Returns it.
-
-    Examples
-    --------
-    >>> report = vkbloom.GridReport(points=4, done=3, problems=())
-    >>> report.complete
-    False
-    >>> print(report)
-    3 of 4 points are done
     """
 
     points: int
@@ -94,10 +81,6 @@ def check_grid(store: Any) -> GridReport:
     ModuleNotFoundError
         zarr is missing.
 
-    See Also
-    --------
-    grid : Renders a grid, and repairs one: call it with the arguments of the first call.
-
     Examples
     --------
     >>> import zarr
@@ -136,6 +119,15 @@ def _described_arrays(root: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(found, dict) or not all(re.fullmatch(r"\w[\w.-]*", name) for name in found):
         return {}
     return found
+
+
+def describe(axes: Iterable[Axis], block: Block) -> str:
+    """Return the points of a block as text: the value, or first and last value, of each axis."""
+    parts = []
+    for axis, start, stop in zip(axes, block.start, block.stop, strict=True):
+        labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
+        parts.append(f"{axis.name}={'..'.join(labels)}")
+    return ", ".join(parts) or "the only point"
 
 
 class _Stored:

@@ -40,23 +40,6 @@ class Reduction:
     ----------
     framebuffer : str
         The framebuffer to reduce.
-
-    See Also
-    --------
-    vkbloom.grid : Takes reductions as `reduce`.
-
-    Examples
-    --------
-    A reduction of your own:
-
-    >>> from vkbloom._grid.reductions import Reduction
-    >>> class Median(Reduction):
-    ...     '''Median of all values.'''
-    ...
-    ...     def __call__(self, frames):
-    ...         return float(np.median(frames[self.framebuffer]))
-    >>> Median(framebuffer="bloom").description
-    'Median of all values, of bloom'
     """
 
     framebuffer: str = "final"
@@ -96,10 +79,6 @@ class Mean(Reduction):
         The framebuffer to reduce. 8-bit values are scaled to 0..1. Alpha and values that are not
         finite are left out.
 
-    See Also
-    --------
-    Max, EncircledEnergy
-
     Examples
     --------
     >>> from vkbloom._grid.reductions import Mean
@@ -109,21 +88,6 @@ class Mean(Reduction):
     ... )
     >>> round(Mean()(frames), 3)
     0.2
-
-    In a grid, without storing frames:
-
-    >>> image = np.full((16, 16, 4), 0.5, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     grid = vkbloom.grid(
-    ...         image,
-    ...         vkbloom.Pyramid(levels=2),
-    ...         {"intensity": [0.0, 1.0]},
-    ...         framebuffers=(),
-    ...         reduce={"mean": Mean()},
-    ...         renderer=renderer,
-    ...     )
-    >>> grid["mean"].values.round(3)
-    array([0.5, 1. ])
     """
 
     def __call__(self, frames: Frames) -> float:
@@ -142,21 +106,6 @@ class Max(Reduction):
     framebuffer : str
         The framebuffer to reduce. 8-bit values are scaled to 0..1. Alpha and values that are not
         finite are left out.
-
-    See Also
-    --------
-    Mean, EncircledEnergy
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import Max
-    >>> bloom = np.zeros((4, 4, 4), np.float16)
-    >>> bloom[1, 2, 0] = 3
-    >>> frames = vkbloom.Frames(
-    ...     {"bloom": bloom}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> Max(framebuffer="bloom")(frames)
-    3.0
     """
 
     def __call__(self, frames: Frames) -> float:
@@ -179,10 +128,6 @@ class EncircledEnergy(Reduction):
         light.
     framebuffer : str
         The framebuffer to reduce.
-
-    See Also
-    --------
-    Mean, Max
 
     Notes
     -----
@@ -263,10 +208,6 @@ class Comparing(Reduction):
         Luminance of a linear value of 1 in cd/m2, as for `vkbloom._views.comparison.compare`.
     pixels_per_degree : float, optional
         Pixels for each degree of the observer's view; FLIP's default is 67.02.
-
-    See Also
-    --------
-    SSIM, PSNR, FLIP, ColorVideoVDP
     """
 
     against: NDArray[Any] | Mapping[str, Any]
@@ -310,20 +251,6 @@ class SSIM(Comparing):
     ----------
     against, framebuffer, data_range
         As for `Comparing`.
-
-    See Also
-    --------
-    PSNR, FLIP
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import SSIM
-    >>> final = np.random.default_rng(0).random((16, 16, 4), np.float32)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": final}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> SSIM(against=final)(frames)
-    1.0
     """
 
     metric: ClassVar[Metric] = "ssim"
@@ -338,22 +265,8 @@ class PSNR(Comparing):
     against, framebuffer, data_range
         As for `Comparing`.
 
-    See Also
-    --------
-    SSIM, FLIP
-
     Examples
     --------
-    An error of 0.1 everywhere is 20 dB:
-
-    >>> from vkbloom._grid.reductions import PSNR
-    >>> reference = np.full((16, 16, 4), 0.5, np.float32)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": reference + 0.1}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> round(PSNR(against=reference)(frames), 3)
-    20.0
-
     Every point of a grid against the one with `blur_scale` 1:
 
     >>> image = np.zeros((16, 16, 4), np.uint8)
@@ -382,20 +295,6 @@ class FLIP(Comparing):
     ----------
     against, framebuffer, data_range
         As for `Comparing`.
-
-    See Also
-    --------
-    SSIM, PSNR
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import FLIP
-    >>> final = np.full((16, 16, 4), 100, np.uint8)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": final}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> FLIP(against=final)(frames)
-    0.0
     """
 
     metric: ClassVar[Metric] = "flip"
@@ -420,21 +319,6 @@ class ColorVideoVDP(Comparing):
     ------
     ValueError
         `nits_per_unit` or `pixels_per_degree` is missing.
-
-    See Also
-    --------
-    FLIP
-
-    Examples
-    --------
-    >>> from vkbloom._grid.reductions import ColorVideoVDP
-    >>> final = np.full((64, 64, 3), 0.5, np.float32)
-    >>> ColorVideoVDP(against=final, pixels_per_degree=60)
-    Traceback (most recent call last):
-        ...
-    ValueError: nits_per_unit: None is not a number; ColorVideoVDP needs one
-    >>> ColorVideoVDP.units
-    'JOD'
     """
 
     metric: ClassVar[Metric] = "cvvdp"

@@ -55,10 +55,6 @@ class iris:
     size : int
         Side of the mask in samples, 8 to 4096. The aperture's circle touches all sides.
 
-    See Also
-    --------
-    aperture : Takes the mask.
-
     Notes
     -----
     NumPy converts it to an array of float32, shape (size, size): 1 where light passes, 0 elsewhere.
@@ -93,17 +89,7 @@ class iris:
         return np.array(_mask(self), dtype=dtype, copy=copy)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the parameters by name.
-
-        See Also
-        --------
-        aperture : Uses an iris.
-
-        Examples
-        --------
-        >>> vkbloom.psf.iris(blades=7).to_dict()["blades"]
-        7
-        """
+        """Return the parameters by name."""
         return dataclasses.asdict(self)
 
 

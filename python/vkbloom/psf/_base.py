@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vkbloom._argument_types import checked
 from vkbloom._checks import check_size
 from vkbloom._settings.fields import Record
 
@@ -37,10 +38,6 @@ class PSF(Record, abc.ABC):
     ----------
     unit : {"degree", "pixel"}
 
-    See Also
-    --------
-    vkbloom.Convolution : Bloom by a point-spread function.
-
     Examples
     --------
     >>> spread = vkbloom.psf.gaussian(sigma=2)
@@ -53,6 +50,11 @@ class PSF(Record, abc.ABC):
     _class_key: ClassVar[str] = "psf"
     _subject: ClassVar[str] = "psf"
     unit: ClassVar[Literal["degree", "pixel"]]
+
+    def __init_subclass__(cls) -> None:
+        # A class that is defined in pixels has no other use for `pixels_per_degree`.
+        if "array" in vars(cls):
+            cls.array = checked(cls.array)  # type: ignore[method-assign]
 
     @abc.abstractmethod
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
@@ -70,18 +72,6 @@ class PSF(Record, abc.ABC):
         ndarray of float64, shape (height, width, 3)
             Linear RGB. The point is at [height // 2, width // 2]. The values are integrals over
             the pixels, not samples at their centres.
-
-        See Also
-        --------
-        kernel : Returns the kernel for the convolution of a frame.
-        save : Writes the array to a file.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
-        array([[0.058, 0.093, 0.058],
-               [0.093, 0.147, 0.093],
-               [0.058, 0.093, 0.058]])
         """
 
     @abc.abstractmethod
@@ -93,15 +83,6 @@ class PSF(Record, abc.ABC):
         ndarray of float64, shape (3,)
             Linear RGB. The integral over the hemisphere if `unit` is "degree", the sum over the
             plane if it is "pixel".
-
-        See Also
-        --------
-        encircled_energy : The part inside circles.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).energy()
-        array([1., 1., 1.])
         """
 
     @abc.abstractmethod
@@ -117,15 +98,6 @@ class PSF(Record, abc.ABC):
         -------
         ndarray of float64, shape (N, 3)
             Linear RGB. It rises to `energy` with the radius.
-
-        See Also
-        --------
-        energy : The energy of the complete function.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).encircled_energy([1, 3])[:, 0].round(3)
-        array([0.393, 0.989])
         """
 
     @abc.abstractmethod
@@ -141,15 +113,6 @@ class PSF(Record, abc.ABC):
         -------
         ndarray of float64, shape (N, 3)
             Absolute value of the Fourier transform, divided by `energy`: 1 at 0.
-
-        See Also
-        --------
-        array : The function itself.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).mtf([0, 0.1])[:, 0].round(3)
-        array([1.   , 0.821])
         """
 
     def kernel(
@@ -173,15 +136,6 @@ class PSF(Record, abc.ABC):
         Returns
         -------
         ndarray of float64, shape (height, width, 3)
-
-        See Also
-        --------
-        array : Returns an array of any size.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).kernel((8, 6)).shape
-        (11, 15, 3)
         """
         width, height = frame
         scale = pixels_per_degree or max(frame) / FRAME_DEGREES
@@ -211,18 +165,6 @@ class PSF(Record, abc.ABC):
         ------
         ValueError, OSError, ModuleNotFoundError
             The errors of `vkbloom.write`.
-
-        See Also
-        --------
-        vkbloom.write : Writes any array.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     path = vkbloom.psf.gaussian(sigma=1).save(f"{folder}/kernel.exr", size=(9, 9))
-        ...     vkbloom.read(path).shape
-        (9, 9, 3)
         """
         from vkbloom._io import array_files  # noqa: PLC0415  costs start-up time
 

@@ -46,10 +46,6 @@ class spencer(RadialPSF):
         Wavelengths of red, green and blue in nm, 380 to 780. They determine the halo of the lens,
         which "mesopic" and "scotopic" have.
 
-    See Also
-    --------
-    cie_general, cie_total : Glare that depends on age and pigmentation.
-
     Notes
     -----
     With theta in degrees, f0 = 2.61e6 exp(-(theta / 0.02)^2), f1 = 20.91 / (theta + 0.02)^3,
@@ -140,10 +136,6 @@ class cie_total(RadialPSF):
         In years, 0 to 120.
     pigment : float
         Colour of the iris: 0 very dark, 0.5 brown, 1 blue, 1.2 very light.
-
-    See Also
-    --------
-    cie_general : Only the scattered light.
 
     Notes
     -----

@@ -26,10 +26,6 @@ class gaussian(PSF):
     sigma : float
         Standard deviation in pixels, above 0.
 
-    See Also
-    --------
-    airy : The image of a point by diffraction.
-
     Notes
     -----
     The density is exp(-r^2 / (2 sigma^2)) / (2 pi sigma^2). It is integrated over the pixels. The
@@ -150,10 +146,6 @@ class harvey_shack(RadialPSF):
         Roll-off angle in rad, above 0.
     surfaces : int
         Number of surfaces, 1 to 1000.
-
-    See Also
-    --------
-    airy : Diffraction at the aperture of a lens.
 
     Notes
     -----

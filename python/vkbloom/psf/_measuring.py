@@ -52,10 +52,6 @@ class measured(SampledPSF):
     ValueError
         The settings have a threshold, or `size` is not a pair of integers of at least 1.
 
-    See Also
-    --------
-    vkbloom.testing.point_spread : Measures any bloom.
-
     Examples
     --------
     >>> spread = vkbloom.psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))

@@ -84,12 +84,7 @@ def _centre(density: Callable[[Array], Array]) -> Array:
 
 
 class RadialPSF(PSF):
-    """A density per steradian that depends only on the angle.
-
-    See Also
-    --------
-    PSF : Documents the methods.
-    """
+    """A density per steradian that depends only on the angle."""
 
     unit = "degree"
     #: Largest step of the integration in degrees.
@@ -108,15 +103,6 @@ class RadialPSF(PSF):
         -------
         ndarray of float64, shape (..., 3)
             Linear RGB.
-
-        See Also
-        --------
-        array : The energy of each pixel.
-
-        Examples
-        --------
-        >>> vkbloom.psf.cie_general(age=35).density(10.0).round(3)
-        array([0.072, 0.072, 0.072])
         """
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:

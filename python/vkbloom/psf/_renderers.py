@@ -31,10 +31,6 @@ class fog_glow(SampledPSF):
     size : int
         Side of the square kernel in pixels, 2 to 4096. Blender has powers of 2, 64 to 512.
 
-    See Also
-    --------
-    spencer : The function in Blender since version 4.4.
-
     Notes
     -----
     With the size s, u = 2 x / s - 1, v = 2 y / s - 1 and r = (u^2 + v^2) s / 4, the value of a
@@ -108,10 +104,6 @@ class unreal(SampledPSF):
         min becomes min(mult (L - min) + min, max). There is no prefilter if max < min.
     scatter : float
         The s of the formulas, which multiplies the share of light that leaves its pixel, 0 to 1000.
-
-    See Also
-    --------
-    samples : The kernel is the array itself.
 
     Notes
     -----

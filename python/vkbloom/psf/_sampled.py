@@ -19,28 +19,13 @@ __all__ = ["SampledPSF", "check_values", "samples"]
 
 
 class SampledPSF(PSF):
-    """A point-spread function that is an array of energies per pixel, of a fixed size.
-
-    See Also
-    --------
-    samples : A function that is given as an array.
-    """
+    """A point-spread function that is an array of energies per pixel, of a fixed size."""
 
     unit = "pixel"
 
     @abc.abstractmethod
     def own_array(self) -> Array:
-        """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0.
-
-        See Also
-        --------
-        array : Returns an array of any size.
-
-        Examples
-        --------
-        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).own_array().shape
-        (3, 3, 3)
-        """
+        """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0."""
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
         return centred(self.own_array(), size)
@@ -59,15 +44,6 @@ class SampledPSF(PSF):
         Returns
         -------
         ndarray of float64, shape (N, 3)
-
-        See Also
-        --------
-        energy : The energy of the complete function.
-
-        Examples
-        --------
-        >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).encircled_energy([0, 1])[:, 0]
-        array([4., 8.])
         """
         values = self.own_array()
         y, x = (np.arange(side) - side // 2 for side in values.shape[:2])
@@ -111,10 +87,6 @@ class samples(SampledPSF):
     values : array-like, shape (h, w) or (h, w, 3)
         Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
         copied to float32.
-
-    See Also
-    --------
-    unreal : A kernel image for Unreal Engine's convolution bloom.
 
     Examples
     --------

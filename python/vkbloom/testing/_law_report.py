@@ -47,16 +47,6 @@ class LawRow:
         The assertion's message, or the reason why it could not be tested; empty if the law holds.
     why : str
         Why a bloom that is no fault may break the law.
-
-    See Also
-    --------
-    LawReport : Has one row for each law.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> testing.report(lambda image: image, size=(32, 32)).rows[0].held
-    True
     """
 
     name: str
@@ -89,10 +79,6 @@ class LawReport:
     required : tuple of str
         Names of the laws that the bloom promises.
 
-    See Also
-    --------
-    report : Returns it.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -122,15 +108,6 @@ class LawReport:
             One does not hold, or could not be tested. The message has those of all of them.
         ValueError
             There is no law of this name.
-
-        See Also
-        --------
-        assert_superposition : One of the assertions.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> testing.report(lambda image: image, size=(32, 32)).assert_held("symmetric")
         """
         __tracebackhide__ = True
         known = {row.name: row for row in self.rows}
@@ -233,10 +210,6 @@ def report(
     ------
     TypeError, ValueError
         `bloom` is not such a callable, or a law is unknown.
-
-    See Also
-    --------
-    stability, resolution_response : Measure a moving light, and several resolutions.
 
     Examples
     --------

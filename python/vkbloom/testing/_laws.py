@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
@@ -45,18 +45,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     probe : Probe
         The kind of test image, and the allowed errors.
 
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
-
-    See Also
-    --------
-    assert_additive : The law of the picture with bloom.
-    assert_gain : The law of flat images.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -85,7 +73,7 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     )
 
 
-@checked
+@checked_as(glow=FUNCTION)
 def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
@@ -110,25 +98,6 @@ def assert_additive(
         Factor of the bloom, 0 or more.
     probe : Probe
         With integers, `value` must be low enough that image plus bloom is not clamped.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `intensity` is out of range.
-
-    See Also
-    --------
-    assert_superposition : Linearity of the bloom alone.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(blur_strength=1.0)
-    >>> def bloom(image):
-    ...     return reference.blur(image, settings)
-    >>> testing.assert_additive(lambda image: image + 0.5 * bloom(image), bloom, intensity=0.5)
     """
     __tracebackhide__ = True
     check_number("intensity", intensity, 0.0, math.inf)
@@ -171,23 +140,6 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         With integers, `value` times `gain` must be at most 1.
     border : int
         Pixels at each side that are ignored, for methods that read black outside the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    vkbloom.reference.gain : Gain of vkbloom's custom methods.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(2.0), blur_strength=1.0)
-    >>> testing.assert_gain(lambda image: reference.blur(image, settings), 1.0)
     """
     __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
@@ -205,7 +157,7 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         )
 
 
-@checked
+@checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
     probe: Probe = _DEFAULT,
@@ -224,24 +176,6 @@ def assert_symmetric(
     probe : Probe
     axes : sequence of {"x", "y", "xy"}
         "x" swaps left and right, "y" top and bottom, "xy" rows and columns.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an axis is unknown.
-
-    See Also
-    --------
-    assert_centroid_kept : The law of shifts, as a distance.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable())
-    >>> testing.assert_symmetric(bloom, axes=("x", "y", "xy"))
     """
     __tracebackhide__ = True
     image = probe.noise(0, probe.value)
@@ -276,23 +210,6 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
     probe : Probe
     border : int
         Pixels at each side that are ignored, for methods that read black outside the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `border` is out of range.
-
-    See Also
-    --------
-    assert_gain : The law of flat images.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_no_ringing(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
@@ -356,23 +273,6 @@ def assert_bounded_fireflies(
     period : int
         The law is tested at period x period positions of the pixel, because the result of a chain
         of halved images depends on the position. Use 2 for one halving and 4 for two.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    vkbloom.Pyramid : Has the parameter `firefly_filter`.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> probe = testing.Probe(size=(32, 32))
-    >>> testing.assert_bounded_fireflies(lambda image: np.minimum(image, 1.0), probe=probe)
     """
     __tracebackhide__ = True
     if probe.dtype.kind == "u":

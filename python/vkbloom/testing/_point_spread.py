@@ -57,17 +57,6 @@ def point_spread(
     ndarray of float64, shape (H, W, C)
         h around the pixel `at`; it is not shifted to the middle.
 
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `at` is outside the image.
-
-    See Also
-    --------
-    response : Figures of the point spread, along a parameter.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -99,23 +88,6 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         bloom is a sum of two layers and fails.
     probe : Probe
         `value` must be low enough that nothing is clamped.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
-
-    See Also
-    --------
-    point_spread : Returns the point spread.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_separable(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     spread, error = measured_spread(bloom, probe, None)
@@ -164,24 +136,6 @@ def assert_centroid_kept(
     within : float
         Allowed distance along each axis in pixels, in addition to the effect of the errors of
         single values.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
-
-    See Also
-    --------
-    assert_symmetric : The law of mirrored images.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable()
-    >>> testing.assert_centroid_kept(lambda image: reference.blur(image, settings))
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
@@ -231,25 +185,6 @@ def assert_spread(
     rtol : float
         Allowed relative difference. The default allows for a Gaussian that is cut off at three
         sigma, whose standard deviation is 1.3 % smaller.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
-
-    See Also
-    --------
-    response : Measures sigma along a parameter.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> weights = vkbloom.gaussian_weights(2.0)
-    >>> settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
-    >>> testing.assert_spread(lambda image: reference.blur(image, settings), 2.0)
     """
     __tracebackhide__ = True
     pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
@@ -304,19 +239,6 @@ class Response:
     at_border : ndarray of float64, shape (N,)
         Share of the light in the outermost pixels. If it is not small, the image cuts off light
         and the other figures are too small.
-
-    See Also
-    --------
-    response : Returns it.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image, blur_scale):
-    ...     return reference.blur(image, vkbloom.Separable(blur_scale=blur_scale))
-    >>> found = testing.response(bloom, "blur_scale", [1.0, 2.0])
-    >>> bool(found.sigma[1, 0] > 1.9 * found.sigma[0, 0])
-    True
     """
 
     parameter: str
@@ -371,18 +293,6 @@ def response(
     Returns
     -------
     Response
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `values` is empty.
-
-    See Also
-    --------
-    point_spread : The image that is measured.
-    assert_spread : Asserts one sigma.
 
     Examples
     --------

@@ -57,15 +57,6 @@ class Probe:
     seed : int
         Seed of the noise images.
 
-    Raises
-    ------
-    ValueError, TypeError
-        A field is out of range or of another type.
-
-    See Also
-    --------
-    assert_superposition : One of the laws that take a probe.
-
     Examples
     --------
     >>> from vkbloom import testing
@@ -99,6 +90,7 @@ class Probe:
         for name in ("atol", "rtol"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), 0.0, math.inf)
+        check_index("seed", self.seed, 0, 2**63 - 1)
 
     @property
     def centre(self) -> tuple[int, int]:
@@ -111,54 +103,17 @@ class Probe:
         return 1 if self.channels is None else min(self.channels, 3)
 
     def flat(self, value: float) -> Image:
-        """Return an image of one value.
-
-        See Also
-        --------
-        point, noise : Other test images.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> testing.Probe(size=(3, 2), channels=None).flat(0.5)[..., 0]
-        array([[0.5, 0.5, 0.5],
-               [0.5, 0.5, 0.5]])
-        """
+        """Return an image of one value."""
         return np.full((self.size[1], self.size[0], self.colours), value)
 
     def point(self, place: tuple[int, int], value: float) -> Image:
-        """Return a black image with one lit pixel at (x, y).
-
-        See Also
-        --------
-        flat, noise : Other test images.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> testing.Probe(size=(3, 2), channels=None).point((1, 0), 4.0)[..., 0]
-        array([[0., 4., 0.],
-               [0., 0., 0.]])
-        """
+        """Return a black image with one lit pixel at (x, y)."""
         image = self.flat(0.0)
         image[place[1], place[0]] = value
         return image
 
     def noise(self, index: int, highest: float) -> Image:
-        """Return random values of 0 to `highest`, rounded to the dtype.
-
-        See Also
-        --------
-        flat, point : Other test images.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> probe = testing.Probe(size=(3, 2))
-        >>> one, other = probe.noise(0, 2.0), probe.noise(1, 2.0)
-        >>> bool(one.max() <= 2), bool((one == other).any())
-        (True, False)
-        """
+        """Return random values of 0 to `highest`, rounded to the dtype."""
         generator = np.random.default_rng((self.seed, index))
         image = generator.random((self.size[1], self.size[0], self.colours)) * highest
         return self._real(self._stored(image))
@@ -181,27 +136,6 @@ class Probe:
         result : ndarray of float64, shape (H, W, C)
             The result in real units, without alpha.
         error : float
-
-        Raises
-        ------
-        TypeError
-            The bloom is not callable, or does not return an array of numbers.
-        ValueError
-            The result has another height, width or number of channels.
-        AssertionError
-            The result is not finite.
-
-        See Also
-        --------
-        values : The same for a bloom that was already computed.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> probe = testing.Probe(size=(3, 2), dtype="uint8")
-        >>> result, error = probe.apply(lambda image: image // 2, probe.flat(1.0))
-        >>> round(float(result.max()) * 255), round(error * 255)
-        (127, 2)
         """
         __tracebackhide__ = True
         if not callable(bloom):
@@ -220,17 +154,6 @@ class Probe:
         Returns
         -------
         ndarray, shape (H, W) or (H, W, channels)
-
-        See Also
-        --------
-        apply : Calls a bloom with the result.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> probe = testing.Probe(size=(1, 1), channels=4, dtype="uint8")
-        >>> probe.given(probe.flat(0.2))
-        array([[[ 51,  51,  51, 255]]], dtype=uint8)
         """
         stored = self._stored(image)
         if self.channels == 4:
@@ -255,18 +178,6 @@ class Probe:
         -------
         result, error
             As for `apply`, which has the same errors.
-
-        See Also
-        --------
-        apply : Also calls the bloom.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> probe = testing.Probe(size=(1, 1), channels=4, dtype="uint8")
-        >>> given = probe.given(probe.flat(0.2))
-        >>> probe.values(given, given)[0].round(3)
-        array([[[0.2, 0.2, 0.2]]])
         """
         __tracebackhide__ = True
         if isinstance(result, Mapping):

@@ -60,10 +60,6 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     TypeError, ValueError
         An argument is out of range, or `argv` lacks ``{input}`` or ``{output}``.
 
-    See Also
-    --------
-    report : Tests every law.
-
     Examples
     --------
     >>> from vkbloom import testing

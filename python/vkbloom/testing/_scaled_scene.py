@@ -46,18 +46,6 @@ class ResolutionResponse:
         height; NaN without light.
     peak : ndarray of float64, shape (N,)
         The largest value of the bloom relative to the value of the light.
-
-    See Also
-    --------
-    resolution_response : Returns it.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> found = testing.resolution_response(lambda image: image, scales=(1, 2))
-    >>> found.peak
-    array([1., 1.])
-    >>> print(found)  # doctest: +SKIP
     """
 
     sizes: tuple[tuple[int, int], ...]
@@ -101,18 +89,6 @@ def resolution_response(
     Returns
     -------
     ResolutionResponse
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    assert_resolution_independent : Asserts that the figures are the same.
-    response : The point spread along a parameter.
 
     Examples
     --------
@@ -167,28 +143,6 @@ def assert_resolution_independent(
     radius, peak : float
         Allowed difference of the largest and the smallest value, relative to the mean, for both
         radii and for the peak.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, there is no light, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
-    See Also
-    --------
-    resolution_response : Returns the figures.
-    assert_stable : The law of moving lights.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     sigma = image.shape[0] / 16
-    ...     weights = vkbloom.gaussian_weights(sigma)
-    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
-    ...     return reference.blur(image, settings)
-    >>> testing.assert_resolution_independent(bloom, scales=(0.5, 1))
     """
     __tracebackhide__ = True
     check_number("radius", radius, 0.0, math.inf)

@@ -1,0 +1,29 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// A downsampling that is not linear in groups of its taps, and the first pass of a published method: the
+// taps and what is made of them are by GROUPS (lib/prefilter_taps.glsl).
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+// Where the pass reads the image itself, as the threshold pass does.
+#define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
+#include "lib/sampling.glsl"
+#include "lib/threshold.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/prefilters.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 3
+#include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
+#include "lib/prefilter_taps.glsl"
+
+vec4 shade()
+{
+    Place place = PLACE_IN(source);
+    return stored(mask_value() * prefiltered(means(place), place));
+}
