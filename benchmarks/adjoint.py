@@ -45,7 +45,7 @@ SETTINGS: Final[dict[str, vkbloom.Settings]] = {
     "GodotBloom": vkbloom.GodotBloom(),
     "KinoBloom": vkbloom.KinoBloom(),
     "UrpBloom": vkbloom.presets["unity_urp"],
-    "UnrealBloom": vkbloom.presets["threejs_unreal"],
+    "ThreeBloom": vkbloom.presets["threejs_unreal"],
 }
 #: The most that a pullback may cost, times the framebuffer.
 MOST: Final = 2.5

@@ -82,7 +82,8 @@
     INPUT(B, float, step_y) \
     INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
-    VEC4S(B, weights, BLUR_VEC4S)
+    VEC4S(B, weights, BLUR_VEC4S) \
+    VEC4S(B, offsets, OFFSET_VEC4S)
 
 // The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
 // `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
@@ -151,7 +152,8 @@
     READS(B, strength) \
     READS(B, smoothness) \
     READS(B, maximum) \
-    INPUT(B, float, exposure)
+    INPUT(B, float, exposure) \
+    VEC4S(B, tint, 1)
 
 // A pass that adds up levels of several sizes, and their weights.
 #define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
@@ -350,11 +352,11 @@
     COUNT(resolution, 384, 16, 2048) \
     COUNT(iterations, 6, 2, 8) \
     COUNT(high_quality_filtering, 1, 0, 1) \
-    COUNT(node, 0, 0, 1) \
     COUNT(bicubic, 1, 0, 1) \
     COUNT(karis_average, 0, 0, 1) \
     COUNT(streaks, 4, 1, 16) \
-    COUNT(diagonal, 1, 0, 1)
+    COUNT(diagonal, 1, 0, 1) \
+    COUNT(fast, 0, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
@@ -373,7 +375,8 @@
     REAL(streaks_angle, 0.0, -360.0, 360.0) \
     REAL(fade, 0.9, 0.75, 1.0) \
     REAL(color_modulation, 0.25, 0.0, 1.0) \
-    REAL(jitter, 0.0, 0.0, 1.0)
+    REAL(jitter, 0.0, 0.0, 1.0) \
+    REAL(diffusion, 7.0, 1.0, 10.0)
 
 // The numbers of the stages of glare: floats and integers, as above. Each stage has some of them.
 #define GLARE_SETTING_ROWS(SETTING) \
@@ -410,6 +413,8 @@
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
 #define BLUR_VEC4S  17
+// Taps of a half-kernel whose offsets are given, where TAP_COUNT is set.
+#define OFFSET_VEC4S 3
 #define MAX_LAYERS  8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
@@ -645,7 +650,13 @@
     NAME(FILTER_KAWASE, 1, kawase) \
     NAME(FILTER_DUAL, 2, dual)
 
+#define VARIANT_NAMES(NAME) \
+    NAME(VARIANT_R185, 0, r185) \
+    NAME(VARIANT_R187, 1, r187) \
+    NAME(VARIANT_NODE, 2, node)
+
 #define CHOICES(CHOICE) \
+    CHOICE(variant, VARIANT_NAMES) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
     CHOICE(encoding, ENCODING_NAMES) \
@@ -683,6 +694,7 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
+    NAME(UPSAMPLE_CORNERS, 5, corners) \
     NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
@@ -691,12 +703,13 @@
     NAME(GROUPS_FILAMENT, 5, filament) \
     NAME(GROUPS_HDRP, 6, hdrp) \
     NAME(GROUPS_URP, 7, urp) \
-    NAME(GROUPS_UNREAL, 8, unreal) \
+    NAME(GROUPS_THREE, 8, three) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KINO, 11, kino) \
     NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
     NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
+    NAME(GROUPS_BABYLON, 15, babylon) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \

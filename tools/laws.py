@@ -190,7 +190,7 @@ def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
         vkbloom.FilamentBloom,
         vkbloom.UrpBloom,
         vkbloom.HdrpBloom,
-        vkbloom.UnrealBloom,
+        vkbloom.ThreeBloom,
         vkbloom.KinoBloom,
         vkbloom.GodotBloom,
         vkbloom.BlenderGlare,

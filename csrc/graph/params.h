@@ -142,6 +142,7 @@ enum vkb_boundary { BOUNDARY_NAMES(VKB_NAME_ENUM) };
 enum vkb_type { TYPE_NAMES(VKB_NAME_ENUM) };
 enum vkb_quality { QUALITY_NAMES(VKB_NAME_ENUM) };
 enum vkb_blur_filter { FILTER_NAMES(VKB_NAME_ENUM) };
+enum vkb_three_variant { VARIANT_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 

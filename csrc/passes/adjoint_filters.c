@@ -6,14 +6,15 @@
 #include <math.h>
 #include <string.h>
 
-static void set_line(const struct vkb_blur_params *params, int radius, double step,
+static void set_line(const struct vkb_blur_params *params, int radius, double step, bool placed,
                      struct vkb_axis *axis)
 {
     axis->count = 0;
     for (int tap = -radius; tap <= radius; ++tap) {
         const int weight = tap < 0 ? -tap : tap;
+        const double place = placed ? params->offsets[weight / 4][weight % 4] : weight;
         axis->taps[axis->count++] = (struct vkb_tap){
-            .offset = tap * step,
+            .offset = (tap < 0 ? -place : place) * step,
             .weights = {params->weights[weight / 4][weight % 4]},
         };
     }
@@ -30,9 +31,9 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
     filter.gain = params->gain;
     if (direction != DIRECTION_VERTICAL)
-        set_line(params, radius, params->step_x, &filter.x);
+        set_line(params, radius, params->step_x, pass->constants.taps, &filter.x);
     if (direction != DIRECTION_HORIZONTAL)
-        set_line(params, radius, params->step_y, &filter.y);
+        set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 

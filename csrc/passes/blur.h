@@ -15,6 +15,7 @@ struct vkb_blur {
     double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
     uint32_t count;
     double gain;            // factor of the sum
+    const double *offsets;  // of these taps in steps; NULL: 0, 1, ...
     double step_x, step_y;  // the distance of two taps in a row and in a column, in source texels
     bool filter;            // the sampler filters taps between texels; otherwise the shader does
 };

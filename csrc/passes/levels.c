@@ -149,6 +149,8 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
         row.params.prefilter.threshold = 0.0f;
         row.params.prefilter.knee = 0.0f;
     }
+    for (int channel = 0; channel < 4; ++channel)
+        row.params.prefilter.tint[0][channel] = 1.0f;
     VKB_SET_TARGET(&row, prefilter, &levels->graph->images[to]);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
     return row;
@@ -179,6 +181,8 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
         .gain = 1.0,
         .step_x = step,
         .step_y = step,
+        // In columns, whose sizes are equal, samples of two taps are equal to these taps.
+        .offsets = kernel->offsets,
     };
 
     for (uint32_t tap = 0; tap < kernel->count; ++tap)
@@ -221,8 +225,8 @@ static void find_up_taps(double radius, float taps[4])
         taps[i] = (float)sums[i];
 }
 
-// How UPSAMPLE_TENT and the others sample a smaller level, with the distances of a tent's taps in
-// its texels.
+// How UPSAMPLE_TENT and the others sample a smaller level, with the distances of the taps of a
+// tent, or of its corners alone, in its texels.
 static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double radius_x,
                        double radius_y)
 {
@@ -233,6 +237,10 @@ static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double ra
         row->constants.upsample = UPSAMPLE_LINEAR;
         x = (struct vkb_side_taps){radius_x, 0.25, 0.5};
         y = (struct vkb_side_taps){radius_y, 0.25, 0.5};
+    } else if (kernel == UPSAMPLE_CORNERS) {
+        row->constants.upsample = UPSAMPLE_LINEAR;
+        x = (struct vkb_side_taps){radius_x, 0.5, 0.0};
+        y = (struct vkb_side_taps){radius_y, 0.5, 0.0};
     } else if (kernel == UPSAMPLE_INSET_CUBIC) {
         x = y = (struct vkb_side_taps){1.0, 1.0, 0.0};
     }

@@ -81,7 +81,8 @@ bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double st
 
 // The kernel of a separable blur while downsampling.
 struct vkb_kernel {
-    const float *weights;  // w0..
+    const float *weights;   // w0..
+    const double *offsets;  // of these in pixels of the level; NULL: 0, 1, ...
     uint32_t count;
     double step_x;  // distance of the horizontal pass's taps in texels of its source; // 0: one
                     // pixel of the level

@@ -16,10 +16,13 @@
     METHOD(FILAMENT, filament, true) \
     METHOD(URP, urp, true) \
     METHOD(HDRP, hdrp, true) \
-    METHOD(UNREAL, unreal, true) \
+    METHOD(THREE, three, true) \
     METHOD(GODOT, godot, true) \
     METHOD(BLENDER, blender, true) \
     METHOD(PYGFX, pygfx, true) \
+    METHOD(POST_PROCESSING, post_processing, true) \
+    METHOD(BABYLON, babylon, true) \
+    METHOD(PLAYCANVAS, playcanvas, true) \
     METHOD(OWN, own, false)
 
 enum vkb_method {
@@ -96,7 +99,7 @@ struct vkb_settings {
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
     uint32_t level_weight_count;  // 0: none are given
-    float tint[3];                // of Blender's glare, and the position of its sun
+    float tint[3];                // of the bloom, and the position of Blender's sun
     float sun_position[2];        // as shares of the sides from the lower left
     struct vkb_kernel_data kernel;
     struct vkb_stage stages[MAX_STAGES];  // of glare

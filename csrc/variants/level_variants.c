@@ -174,7 +174,7 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_mode groups = groups_of(pass);
 
     *fits = (groups == GROUPS_FILAMENT || groups == GROUPS_HDRP || groups == GROUPS_URP
-             || groups == GROUPS_UNREAL)
+             || groups == GROUPS_THREE)
          && !pass->constants.masked && is_half(&choice->plain, pass)
          && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
     return !*fits

@@ -22,6 +22,7 @@ from ._grid.curves import response_curves
 from ._grid.grid import grid
 from ._grid.sheet import contact_sheet
 from ._io.array_files import read, write
+from ._methods.babylon import BabylonBloom
 from ._methods.bevy import BevyBloom
 from ._methods.blender import BlenderGlare
 from ._methods.convolution import Convolution
@@ -29,10 +30,11 @@ from ._methods.filament import FilamentBloom
 from ._methods.godot import GodotBloom
 from ._methods.kino import KinoBloom
 from ._methods.mip_chain import DualKawase, Pyramid
+from ._methods.playcanvas import PlayCanvasBloom
 from ._methods.pygfx import PygfxBloom
 from ._methods.separable import Separable, gaussian_weights
-from ._methods.unity import HdrpBloom, UrpBloom
-from ._methods.unreal import UnrealBloom
+from ._methods.three import ThreeBloom
+from ._methods.unity import HdrpBloom, PostProcessingBloom, UrpBloom
 from ._renderer.adapter import AdapterInfo, adapters
 from ._renderer.default import apply, default_renderer, render
 from ._renderer.device_arrays import DeviceArray
@@ -48,6 +50,7 @@ from ._settings.settings import Settings
 __all__ = [
     "AdapterInfo",
     "AdapterNotFoundError",
+    "BabylonBloom",
     "BevyBloom",
     "BlenderGlare",
     "Camera",
@@ -70,6 +73,8 @@ __all__ = [
     "KinoBloom",
     "OutOfMemoryError",
     "Plan",
+    "PlayCanvasBloom",
+    "PostProcessingBloom",
     "PygfxBloom",
     "Pyramid",
     "Renderer",
@@ -78,7 +83,7 @@ __all__ = [
     "Settings",
     "ShaderError",
     "Streaks",
-    "UnrealBloom",
+    "ThreeBloom",
     "UrpBloom",
     "ValidationError",
     "adapters",

@@ -15,7 +15,9 @@ int group_count()
         return 4;
     if (GROUPS == GROUPS_URP)
         return 1;
-    if (GROUPS == GROUPS_UNREAL)
+    if (GROUPS == GROUPS_THREE)
+        return 1;
+    if (GROUPS == GROUPS_BABYLON)
         return 1;
     if (GROUPS == GROUPS_HIGHLIGHTS)
         return 1;
@@ -86,7 +88,9 @@ vec4 prefiltered(vec4 found[5], Place place)
         return highlights(found[0]);
     if (GROUPS == GROUPS_URP)
         return urp_prefiltered(found[0]);
-    if (GROUPS == GROUPS_UNREAL)
-        return unreal_prefiltered(found[0]);
+    if (GROUPS == GROUPS_BABYLON)
+        return babylon_factor(found[0]) * found[0];
+    if (GROUPS == GROUPS_THREE)
+        return three_prefiltered(found[0]);
     return combined(taps_of(place));
 }

@@ -90,20 +90,37 @@ vec4 hdrp_prefiltered(vec4 taps[5])
 }
 
 // URP's: a clamp, the soft threshold (Unity-Technologies/Graphics,
-// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
+// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509). With NODE it is that of Post
+// Processing v2: another width, negative colours stay, and a tint (Unity-Technologies/PostProcessing
+// @ 32c3155207d3, Bloom.shader).
+float urp_width()
+{
+    return params.threshold * params.knee + (NODE != 0 ? 1e-5 : 0.0);
+}
+
+float urp_divisor()
+{
+    return 4.0 * urp_width() + (NODE != 0 ? 0.0 : 1e-4);
+}
+
 vec4 urp_prefiltered(vec4 value)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
-    if (THRESHOLDED != 0) {
-        float width = params.threshold * params.knee;
-        kept = soft_threshold(kept, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
-    }
-    return max(kept, vec4(0.0));
+    if (THRESHOLDED != 0)
+        kept = soft_threshold(kept, params.threshold, urp_width(), urp_divisor(), 1e-4);
+    return NODE != 0 ? params.tint[0] * kept : max(kept, vec4(0.0));
+}
+
+// Babylon's: a step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js,
+// extractHighlights.fragment.fx @ bc81a5f32960).
+float babylon_factor(vec4 value)
+{
+    return THRESHOLDED == 0 || dot(value.rgb, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2) ? 1.0 : 0.0;
 }
 
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
-vec4 unreal_prefiltered(vec4 value)
+vec4 three_prefiltered(vec4 value)
 {
     if (THRESHOLDED == 0)
         return value;

@@ -127,16 +127,13 @@ vec4 back_urp(vec4 value, vec4 brought)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
     // The threshold's factor is not negative.
-    brought *= larger(kept, vec4(0.0));
-    if (THRESHOLDED != 0) {
-        float width = params.threshold * params.knee;
-        brought =
-            back_through_soft(kept, brought, params.threshold, width, 4.0 * width + 1e-4, 1e-4);
-    }
+    brought *= NODE != 0 ? params.tint[0] : larger(kept, vec4(0.0));
+    if (THRESHOLDED != 0)
+        brought = back_through_soft(kept, brought, params.threshold, urp_width(), urp_divisor(), 1e-4);
     return vec4(brought.rgb * larger(vec4(params.clamp_max), value).rgb, brought.a);
 }
 
-vec4 back_unreal(vec4 value, vec4 brought)
+vec4 back_three(vec4 value, vec4 brought)
 {
     if (THRESHOLDED == 0)
         return brought;
@@ -237,8 +234,10 @@ vec4 back(vec4 found[5], vec4 brought, Place place)
         return back_kino(found, brought);
     if (GROUPS == GROUPS_URP)
         return back_urp(found[0], brought);
-    if (GROUPS == GROUPS_UNREAL)
-        return back_unreal(found[0], brought);
+    if (GROUPS == GROUPS_BABYLON)
+        return babylon_factor(found[0]) * brought;
+    if (GROUPS == GROUPS_THREE)
+        return back_three(found[0], brought);
     if (GROUPS == GROUPS_PYGFX)
         return brought * larger(pygfx_mean(taps_of(place)), vec4(0.0));
     if (GROUPS == GROUPS_HIGHLIGHTS)

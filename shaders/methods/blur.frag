@@ -18,12 +18,19 @@ float weight(int tap)
     return params.weights[abs(tap) >> 2][abs(tap) & 3];
 }
 
+// The position of a tap in steps: its number, unless offsets are given.
+float place_of(int tap)
+{
+    return TAP_COUNT == 0 ? float(tap)
+                          : sign(float(tap)) * params.offsets[abs(tap) >> 2][abs(tap) & 3];
+}
+
 // Adds from the first tap to the last, as all variants of a blur, so that they round identically.
 vec4 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
     vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += weight(tap) * sample_at(source, place, centre + float(tap) * tap_step, SAMPLING);
+        sum += weight(tap) * sample_at(source, place, centre + place_of(tap) * tap_step, SAMPLING);
     return sum;
 }
 

@@ -20,7 +20,7 @@ import vkbloom
 from tests import tolerance
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
-from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, UnrealBloom
+from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom
 from vkbloom._scene import skybox
 
 DTYPES = ("uint8", "float16", "float32")
@@ -31,7 +31,7 @@ SETTINGS = {
     "layers": Separable(layers=((1.0, 0.5), (2.0, 0.5))),
     "pyramid": Pyramid(levels=3, threshold=0.4, knee=0.5),
     "kawase": DualKawase(levels=2),
-    "gathered": UnrealBloom(),
+    "gathered": ThreeBloom(),
 }
 
 #: From this size on, images are read back without staging memory, if the device supports it.

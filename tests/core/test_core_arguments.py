@@ -18,7 +18,7 @@ from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._renderer.sources import scene_arguments
 
-METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "unreal")
+METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "three")
 
 
 class Given:

@@ -74,7 +74,7 @@ class TestControls:
                 "pygfx": {"knee", "threshold"},
                 "pyramid": {"level_weights"},
                 "separable": {"weights", "layers"},
-                "unreal": {"knee"},
+                "three": {"knee"},
             }
             assert without == {"method", "bloom_size"} | refused.get(name, set())
             first = [field["name"] for field in method["fields"] if field["first"]]

@@ -20,7 +20,7 @@ from vkbloom import (
     Pyramid,
     Separable,
     Settings,
-    UnrealBloom,
+    ThreeBloom,
     UrpBloom,
     gaussian_weights,
     presets,
@@ -81,7 +81,7 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "filament-both": (FilamentBloom(resolution=48, alpha="max"), BOTH),
     "urp-mask": (UrpBloom(threshold=0.5, clamp_max=3.0, alpha="blur"), MASK),
     "hdrp-mask": (HdrpBloom(composite="mix", alpha="blur"), MASK),
-    "unreal-mask": (UnrealBloom(threshold=0.5, alpha="blur"), MASK),
+    "unreal-mask": (ThreeBloom(threshold=0.5, alpha="blur"), MASK),
     "godot-mask": (
         GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),
         MASK,
@@ -151,9 +151,9 @@ OTHERS: dict[str, Settings] = {
     "hdrp-linear": HdrpBloom(scatter=1.0, high_quality_filtering=False),
     "hdrp-down": HdrpBloom(anamorphism=0.7),
     "hdrp-across": HdrpBloom(anamorphism=-1.0),
-    "unreal-wide": UnrealBloom(radius=1.0, threshold=0.85, smooth_width=0.5),
-    "unreal-no-threshold": UnrealBloom(radius=0.4, threshold=None, intensity=1.5),
-    "node": UnrealBloom(node=True, intensity=1.0, threshold=0.4),
+    "unreal-wide": ThreeBloom(radius=1.0, threshold=0.85, smooth_width=0.5),
+    "unreal-no-threshold": ThreeBloom(radius=0.4, threshold=None, intensity=1.5),
+    "node": ThreeBloom(variant="node", intensity=1.0, threshold=0.4),
     **{
         f"godot-{composite}-{tonemap}": GodotBloom(
             composite=composite,

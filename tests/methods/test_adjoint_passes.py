@@ -22,7 +22,7 @@ from vkbloom import (
     Pyramid,
     Renderer,
     Separable,
-    UnrealBloom,
+    ThreeBloom,
     UrpBloom,
     reference,
 )
@@ -75,7 +75,7 @@ CASES: dict[str, Any] = {
     "bevy threshold": BEVY.replace(threshold=0.4, knee=0.5),
     "kino": KinoBloom(radius=7.0, threshold=0.3, knee=0.5),
     "urp": UrpBloom(threshold=0.3, knee=0.5, clamp_max=1.5),
-    "unreal": UnrealBloom(threshold=0.3, smooth_width=0.4),
+    "unreal": ThreeBloom(threshold=0.3, smooth_width=0.4),
     "kawase": DualKawase(levels=3, offset=1.3),
     "pygfx": PygfxBloom(levels=3, filter_radius=0.2),
     "pygfx karis": PygfxBloom(levels=2, karis_average=True),

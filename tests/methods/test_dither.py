@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
-from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, UnrealBloom, reference
+from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, ThreeBloom, reference
 from vkbloom._scene.textures import Texture
 
 Array = NDArray[Any]
@@ -143,7 +143,7 @@ def test_a_dark_gradient_has_no_bands(renderer: Renderer) -> None:
         Separable(dither=True),
         Separable(dither=True, dither_seed=3, tonemap="aces", encoding="srgb", composite="screen"),
         Pyramid(dither=True, levels=3, intensity=0.5),
-        UnrealBloom(dither=True),
+        ThreeBloom(dither=True),
         Separable(dither=True, bloom=False, tonemap="agx"),
     ],
 )

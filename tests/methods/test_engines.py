@@ -22,7 +22,7 @@ from vkbloom import (
     KinoBloom,
     Renderer,
     Settings,
-    UnrealBloom,
+    ThreeBloom,
     UrpBloom,
     reference,
 )
@@ -45,7 +45,7 @@ ENGINES: dict[str, Settings] = {
     "kino/0_odd_f4": KinoBloom(),
     "urp/0_odd_f4": UrpBloom(),
     "bevy/0_odd_f4": BevyBloom(),
-    "three/0_odd_f4": UnrealBloom(),
+    "three/0_odd_f4": ThreeBloom(),
 }
 COARSE = "bevy/0_odd_r11"
 

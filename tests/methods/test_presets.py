@@ -30,7 +30,7 @@ from vkbloom import (
     Separable,
     Settings,
     Streaks,
-    UnrealBloom,
+    ThreeBloom,
     UrpBloom,
     presets,
     psf,
@@ -64,9 +64,9 @@ def tolerance(name: str, expected: Array, format: str, settings: Settings, downs
     if format == "rgba8unorm":
         # 2 for a chain of 8-bit stages. three.js' kernels sum to less than 1: rounding undoes that
         # in flat areas, each of ten times in the same direction.
-        levels = 3.0 if isinstance(settings, UnrealBloom) else 2.0
+        levels = 3.0 if isinstance(settings, ThreeBloom) else 2.0
         # A bloom that is a sum multiplies the error of the means it is made from.
-        sums: dict[type[Settings], int] = {KinoBloom: downs, PygfxBloom: downs, UnrealBloom: 3}
+        sums: dict[type[Settings], int] = {KinoBloom: downs, PygfxBloom: downs, ThreeBloom: 3}
         if name in ("bloom", "final"):
             levels *= sums.get(type(settings), 1)
         if name == "final":
@@ -169,7 +169,7 @@ NARROWER: list[tuple[Any, str, float, float]] = [
     (FilamentBloom, "intensity", 0.0, 1.0),
     (FilamentBloom, "levels", 1, 12),
     (HdrpBloom, "intensity", 0.0, 1.0),
-    (UnrealBloom, "radius", 0.0, 1.0),
+    (ThreeBloom, "radius", 0.0, 1.0),
 ]
 
 
@@ -277,7 +277,7 @@ def test_the_cubic_filter_is_the_b_spline() -> None:
 
 
 def test_unreals_sizes_are_rounded() -> None:
-    framebuffers = reference.passes(np.zeros((90, 77, 1)), UnrealBloom())
+    framebuffers = reference.passes(np.zeros((90, 77, 1)), ThreeBloom())
     sizes = [a.shape[:2] for name, a in framebuffers.items() if name.startswith("down")]
     assert sizes == [(45, 39), (23, 20), (12, 10), (6, 5), (3, 3)]
     assert framebuffers["up_0"].shape == framebuffers["bright"].shape == (45, 39, 1)

@@ -25,9 +25,12 @@ METHODS.supply(
         "filament": "filament:FilamentBloom",
         "urp": "unity:UrpBloom",
         "hdrp": "unity:HdrpBloom",
-        "unreal": "unreal:UnrealBloom",
+        "three": "three:ThreeBloom",
         "godot": "godot:GodotBloom",
         "blender": "blender:BlenderGlare",
         "pygfx": "pygfx:PygfxBloom",
+        "post_processing": "unity:PostProcessingBloom",
+        "babylon": "babylon:BabylonBloom",
+        "playcanvas": "playcanvas:PlayCanvasBloom",
     },
 )

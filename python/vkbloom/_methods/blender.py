@@ -13,7 +13,13 @@ from vkbloom._checks import check_floats, check_number
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._methods.blender_kernels import core_kernel_of, kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
-from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.fields import (
+    choice_field,
+    flag_field,
+    number_field,
+    read_numbers,
+    value_field,
+)
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
@@ -22,20 +28,11 @@ Version = Literal["5.0", "4.3"]
 
 
 def _read_tint(tint: Any) -> tuple[float, ...]:
-    return _read_numbers("tint", tint, 3, 65504.0)
+    return read_numbers("tint", tint, 3, 65504.0)
 
 
 def _read_position(position: Any) -> tuple[float, ...]:
-    return _read_numbers("sun_position", position, 2, 16.0)
-
-
-def _read_numbers(name: str, values: Sequence[float], count: int, most: float) -> tuple[float, ...]:
-    numbers = check_floats(name, values)
-    if len(numbers) != count:
-        raise ValueError(f"{name}: {numbers!r} is not {count} numbers")
-    for number in numbers:
-        check_number(name, number, 0 if count == 3 else -most, most)
-    return numbers
+    return read_numbers("sun_position", position, 2, 16.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -1,14 +1,25 @@
-"""Bloom of Unity's two render pipelines."""
+"""Bloom of Unity's two render pipelines, and of the package before them."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.core_view import core_view, linear
+from vkbloom._settings.fields import (
+    choice_field,
+    flag_field,
+    number_field,
+    read_numbers,
+    value_field,
+)
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
 BlurFilter = Literal["gaussian", "kawase", "dual"]
+
+
+def _read_color(color: Any) -> tuple[float, ...]:
+    return read_numbers("color", color, 3, 65504.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -134,3 +145,75 @@ class HdrpBloom(Settings):
     scatter: float = number_field("scatter")
     high_quality_filtering: bool = flag_field("high_quality_filtering")
     anamorphism: float = number_field("anamorphism")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PostProcessingBloom(Settings):
+    """Bloom of Unity's Post Processing Stack v2.
+
+    Parameters
+    ----------
+    threshold : float or None
+        In sRGB, as Unity shows it; above 1 its light is a power of 2.2.
+    knee : float
+        The engine's soft knee, 0 to 1.
+    clamp : float
+        Limit of the values that enter the bloom, in sRGB as the threshold, 0 to 65504.
+    diffusion : float
+        Width of the bloom, 1 to 10.
+    anamorphic_ratio : float
+        Below 0 the first level is wider, above 0 higher; -1 to 1.
+    fast : bool
+        Whether to read four taps in place of 13 and of nine.
+    color : tuple of 3 floats
+        Factors of the channels in linear light.
+    composite : {"add"}
+    intensity : float
+        2^(i / 10) - 1 of the intensity i that Unity shows, whose default is 0 (off).
+    **settings
+        The other fields of `Settings`.
+
+    Notes
+    -----
+    ``down_0`` has the size floor(side / 2) of the frame; a negative ratio a divides the width by
+    2 + a, a positive one the height by 2 - a. With l = log2(longer side) + diffusion - 10 there are
+    clamp(floor(l), 1, 16) levels, each half of the one before, floored, and the tent's radius is
+    1/2 + l - floor(l) texels. Each level reads the 13 taps of `Pyramid` at half of their distances,
+    with `fast` the mean of four at (+-1, +-1). down_0 is clamped; then the knee curve of `Settings`
+    is applied, with k = threshold * knee + 1e-5, 4k and 1e-4, and the colour. up_k = down_k +
+    tent(up_k+1) and ``bloom`` is tent(up_0); with `fast` the tent is the mean of four samples at
+    half of the radius. The auto exposure is 1; dirt is not supported.
+
+    Source: Unity-Technologies/PostProcessing @ 32c3155207d3:
+    PostProcessing/Shaders/Builtins/Bloom.shader, PostProcessing/Shaders/Sampling.hlsl,
+    PostProcessing/Runtime/Effects/Bloom.cs.
+
+    Examples
+    --------
+    >>> vkbloom.PostProcessingBloom(diffusion=5).knee
+    0.5
+    """
+
+    method: ClassVar[str] = "post_processing"
+    published: ClassVar[bool] = True
+
+    threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
+    composite: Composite = choice_field("composite", ("add",))
+    knee: float = number_field("knee", default=0.5)
+    format: BloomFormat | None = "rgba16float"
+    clamp: float = number_field("clamp_max", slider=(0, 100))
+    diffusion: float = number_field("diffusion")
+    anamorphic_ratio: float = number_field("anamorphism")
+    fast: bool = flag_field("fast")
+    color: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_color)
+
+    @property
+    def core_view(self) -> Any:
+        """The settings with the core's names."""
+        return core_view(
+            self,
+            threshold=None if self.threshold is None else linear(self.threshold),
+            clamp_max=min(65504.0, linear(self.clamp)),
+            anamorphism=self.anamorphic_ratio,
+            tint=self.color,
+        )

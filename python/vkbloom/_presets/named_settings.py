@@ -95,9 +95,44 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "Unity HDRP, Bloom.cs @ 2084a9d19159",
     ),
     "threejs_unreal": Preset(
-        lambda: METHODS["unreal"](),
+        lambda: METHODS["three"](),
         "five Gaussians of the complete picture, strength 1, threshold 0",
         "mrdoob/three.js, UnrealBloomPass since #31528 and #32517",
+    ),
+    "threejs_r187": Preset(
+        lambda: METHODS["three"](variant="r187"),
+        "the same with samples of two taps",
+        "mrdoob/three.js r187, UnrealBloomPass since #34479",
+    ),
+    "threejs_node": Preset(
+        lambda: METHODS["three"](variant="node", intensity=1.0),
+        "the same for WebGPU, without the factor 3",
+        "mrdoob/three.js, BloomNode.js @ 07e4c12b3840",
+    ),
+    "unity_urp_kawase": Preset(
+        lambda: METHODS["urp"](filter="kawase"),
+        "a narrow glow at half of the size",
+        "Unity URP 17, Bloom.shader, filter Kawase",
+    ),
+    "unity_urp_dual": Preset(
+        lambda: METHODS["urp"](filter="dual"),
+        "the smallest level, enlarged",
+        "Unity URP 17, Bloom.shader, filter Dual",
+    ),
+    "unity_ppv2": Preset(
+        lambda: METHODS["post_processing"](),
+        "a sum of levels of what is above 1",
+        "Unity-Technologies/PostProcessing @ 32c3155207d3",
+    ),
+    "babylon": Preset(
+        lambda: METHODS["babylon"](),
+        "one Gaussian of what is above a hard threshold",
+        "BabylonJS/Babylon.js, bloomEffect.ts @ 05c105649f04",
+    ),
+    "playcanvas": Preset(
+        lambda: METHODS["playcanvas"](),
+        "the sum of all levels of the complete picture",
+        "playcanvas/engine 2.23, frame-pass-bloom.js @ 1f7213d06f78",
     ),
     "godot_4_5": Preset(
         lambda: METHODS["godot"](

@@ -190,6 +190,16 @@ def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
     return dataclasses.field(default=default, metadata=declared)
 
 
+def read_numbers(name: str, values: Sequence[float], count: int, most: float) -> tuple[float, ...]:
+    """Return so many numbers: three factors of colours, or two positions of either sign."""
+    numbers = check_floats(name, values)
+    if len(numbers) != count:
+        raise ValueError(f"{name}: {numbers!r} is not {count} numbers")
+    for number in numbers:
+        check_number(name, number, 0 if count == 3 else -most, most)
+    return numbers
+
+
 def fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
     """Return the descriptions of a dataclass's fields, by name."""
     found: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")

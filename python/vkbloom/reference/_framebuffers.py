@@ -149,11 +149,12 @@ def framebuffers(
     blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
     stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
     found = _with_alphas({"glow": glow, **stages, **blurred})
+    strength = settings.intensity * getattr(settings, "weight", 1.0)
     if settings.glare:
         images = [found[name] for name in stages]
-        light = glare.light(found["bloom"], settings.intensity, images, settings.glare)
+        light = glare.light(found["bloom"], strength, images, settings.glare)
     else:
-        light = found["bloom"] * settings.intensity
+        light = found["bloom"] * strength
     found["final"] = composite_checked(scene, light, settings, dtype, share)
     return found
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vkbloom._settings.core_view import linear
+
 from ._image import BlurInput
 from ._levels import halved
 from ._pyramid import downsample
@@ -28,7 +30,7 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     """Return the framebuffers.
 
     down_0 has half the size of the frame, less reduced along one axis by `anamorphic_ratio`; it is
-    clamped and thresholded. Each further level has half the size of the one above. All read 13
+    clamped, thresholded and coloured. Each further level has half the size of the one above. All read 13
     taps, with `fast` the mean of four. up_k = down_k + tent(up_k+1) and bloom = tent(up_0), whose
     radius is a texel times a factor of 0.5 to 1.5 that follows from `diffusion` and the size; with
     `fast` the tent is the mean of four samples.
@@ -37,23 +39,22 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     first, count, radius = _plan((width, height), settings)
 
     def reduced(image: Array, size: tuple[int, int]) -> Array:
-        return _box(image, size, 1.0) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
+        return (
+            _box(image, size, 1.0) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
+        )
 
     def enlarged(image: Array, size: tuple[int, int]) -> Array:
         return _box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
 
     level = first
-    downs = [source.store(masked(_prefilter(reduced(source.image, level), settings), source.mask))]
+    bright = _prefilter(reduced(source.image, level), settings) * with_alpha(
+        settings.color, channels
+    )
+    downs = [source.store(masked(bright, source.mask))]
     for _ in range(1, count):
         level = halved(level)
         downs.append(source.store(reduced(downs[-1], level)))
-    return combine(
-        downs,
-        source,
-        upsample=enlarged,
-        last=enlarged,
-        gain=with_alpha(settings.color, channels),
-    )
+    return combine(downs, source, upsample=enlarged, last=enlarged)
 
 
 def gain(settings: PostProcessingBloom, size: tuple[int, int]) -> float | Array:
@@ -76,21 +77,14 @@ def _plan(
 
 
 def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
-    limit = min(65504.0, _linear(settings.clamp))
+    limit = min(65504.0, linear(settings.clamp))
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
     if settings.threshold is None:
         return kept
-    threshold = _linear(settings.threshold)
+    threshold = linear(settings.threshold)
     half_width = threshold * settings.knee + 1e-5
     return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
-
-
-def _linear(value: float) -> float:
-    """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
-    if value > 1:
-        return float(value**2.2)
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
 
 
 def _box(image: Array, size: tuple[int, int], distance: float) -> Array:

@@ -1,32 +1,37 @@
-"""Bloom of three.js, which has the name of Unreal Engine's."""
+"""Bloom of three.js."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
-from vkbloom._settings.fields import choice_field, flag_field, number_field
+from vkbloom._settings.core_view import core_view
+from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+Variant = Literal["r185", "r187", "node"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class UnrealBloom(Settings):
-    """three.js' UnrealBloomPass.
+class ThreeBloom(Settings):
+    """three.js' UnrealBloomPass, and BloomNode, its successor for WebGPU.
 
     Parameters
     ----------
+    variant : {"r185", "r187", "node"}
+        UnrealBloomPass of these releases, or BloomNode since r186.
     radius : float
         0 to 1. The factors of the levels are 1, 0.8, 0.6, 0.4, 0.2 at 0, and 0.2, 0.4, 0.6, 0.8, 1
         at 1.
     smooth_width : float
         Luminance over which the threshold fades in, 0.0001 to 65504.
-    node : bool
-        Whether to compute the bloom of BloomNode, the successor for WebGPU, which floors sizes.
+    resolution_scale : float
+        Of BloomNode: the size of ``bright`` as a share of the frame's, 0.01 to 1.
     threshold : float or None
         Luminance at which the fade begins.
     composite : {"add"}
     intensity : float
-        Three times the strength of three.js. With `node` it is the strength itself, so that
+        Three times the strength of three.js. With "node" it is the strength itself, so that
         ``intensity=1`` is its default.
     **settings
         The other fields of `Settings`; there is no knee.
@@ -42,29 +47,37 @@ class UnrealBloom(Settings):
     levels, enlarged bilinearly and multiplied by their factors; ``bloom`` is one bilinear sample
     of it. In "rgba8unorm", up_0 is a third of that.
 
-    With `node`, all halves are floored, but at least 1, and the luminance has the weights of
-    Rec. 709 with four digits. Newer versions of BloomNode merge neighbouring taps into one bilinear
-    fetch. This differs if a level is read at another size, and is not supported.
+    "r187" and "node" read the taps 2 n - 1 and 2 n as one bilinear sample between them. This is
+    another blur where a level is read at twice its size. Their luminance has the weights of
+    Rec. 709 with four digits. The sizes of "node" are floored, but at least 1. Tints of the levels
+    are not supported.
 
     Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
-    #31528 (kernels) and #32517 (factor 3), examples/jsm/shaders/LuminosityHighPassShader.js
-    @ 0255e15dd1d4; defaults of examples/jsm/tsl/display/BloomNode.js, since the pass has none
-    for radius and threshold.
+    #31528 (kernels), #32517 (factor 3) and #34479 (samples of two taps),
+    examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4,
+    examples/jsm/tsl/display/BloomNode.js @ 07e4c12b3840, whose defaults these are, since the pass
+    has none for radius and threshold.
 
     Examples
     --------
-    >>> vkbloom.UnrealBloom(radius=0.5, threshold=0.8).intensity
+    >>> vkbloom.ThreeBloom(radius=0.5, threshold=0.8).intensity
     3.0
     """
 
-    method: ClassVar[str] = "unreal"
+    method: ClassVar[str] = "three"
     published: ClassVar[bool] = True
 
     threshold: float | None = 0.0
-    knee: float = no_knee("unreal")
+    knee: float = no_knee("three")
     composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=3.0)
     format: BloomFormat | None = "rgba16float"
+    variant: Variant = choice_field("variant")
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
-    node: bool = flag_field("node")
+    resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
+
+    @property
+    def core_view(self) -> Any:
+        """The settings with the core's names."""
+        return core_view(self, scale_x=self.resolution_scale)

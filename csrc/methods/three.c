@@ -1,0 +1,106 @@
+// three.js' UnrealBloomPass and BloomNode. Source: mrdoob/three.js, examples/jsm/postprocessing/
+// UnrealBloomPass.js with the kernels of #31528 and the factor of #32517, in r187 the merged taps
+// of #34479; examples/jsm/tsl/display/BloomNode.js @ 07e4c12b3840.
+#include "methods/methods.h"
+#include "passes/levels.h"
+
+#include <math.h>
+
+enum { THREE_LEVELS = 5, THREE_LONGEST = 22 };
+
+// The taps of each level's half-kernel, with the centre. The standard deviation is a third of this.
+static const uint32_t tap_counts[THREE_LEVELS] = {6, 10, 14, 18, THREE_LONGEST};
+
+// The factors of the levels for a radius of 0. A radius of 1 mirrors them at 0.6.
+static const double bloom_factors[THREE_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
+
+static bool is_node(const struct vkb_settings *settings)
+{
+    return settings->choices[VKB_CHOICE_variant] == VARIANT_NODE;
+}
+
+// The pass rounds the half size, the node floors it.
+static struct vkb_size half_of(const struct vkb_settings *settings, struct vkb_size size)
+{
+    return is_node(settings) ? vkb_halved(size)
+                             : (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
+}
+
+// Of "bright" and of the first level.
+static struct vkb_size first_of(const struct vkb_settings *settings, struct vkb_size frame)
+{
+    const double scale = settings->values.scale_x;
+
+    if (!is_node(settings))
+        return half_of(settings, frame);
+    return (struct vkb_size){(uint32_t)fmax(1.0, floor(frame.width * scale)),
+                             (uint32_t)fmax(1.0, floor(frame.height * scale))};
+}
+
+// Two neighbouring taps become one sample between them. Returns the number of taps.
+static uint32_t merge(float *weights, double *offsets, uint32_t count)
+{
+    uint32_t merged = 1;
+
+    for (uint32_t i = 1; i < count; i += 2, ++merged) {
+        const double a = weights[i], b = i + 1 < count ? weights[i + 1] : 0.0;
+        offsets[merged] = (i * a + (i + 1) * b) / (a + b);
+        weights[merged] = (float)(a + b);
+    }
+    return merged;
+}
+
+static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                      struct vkb_error *error)
+{
+    float weights[THREE_LONGEST + 1] = {0};
+    double offsets[THREE_LONGEST + 1] = {0};
+    const double deviation = tap_counts[level] / 3.0;
+    struct vkb_kernel kernel = {.weights = weights, .count = tap_counts[level]};
+
+    for (uint32_t i = 0; i < kernel.count; ++i)
+        weights[i] = (float)(0.39894 * exp(-0.5 * i * i / (deviation * deviation)) / deviation);
+    if (levels->settings->choices[VKB_CHOICE_variant] != VARIANT_R185) {
+        kernel.count = merge(weights, offsets, kernel.count);
+        kernel.offsets = offsets;
+    }
+    return vkb_levels_blur(levels, level, from, &kernel, error);
+}
+
+bool vkb_add_three(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    double shares[THREE_LEVELS];
+    struct vkb_size size = source->buffers;
+    double total = 0.0;
+    uint32_t from, sum;
+
+    for (; levels.count < THREE_LEVELS; ++levels.count) {
+        const double factor = bloom_factors[levels.count];
+        levels.sizes[levels.count] = size =
+            levels.count ? half_of(settings, size) : first_of(settings, size);
+        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
+        total += shares[levels.count];
+    }
+    // A format whose largest value is 1 holds the mean of the levels, and the bloom is multiplied
+    // by `total`.
+    if (!vkb_stores_means(source->format))
+        total = 1.0;
+    for (uint32_t level = 0; level < THREE_LEVELS; ++level)
+        shares[level] /= total;
+    if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
+        return false;
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, from);
+    // The luminance has the weights of three.js' colour management.
+    row.constants.node = settings->choices[VKB_CHOICE_variant] != VARIANT_R185;
+    vkb_mask_prefilter(&levels, &row);
+    if (!vkb_graph_add_pass(graph, &row, error))
+        return false;
+    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
+        if (!add_level(&levels, level, from, error))
+            return false;
+    return vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
+        && vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, sum, error)
+        && vkb_levels_enlarge(&levels, sum, total, bloom, error);
+}

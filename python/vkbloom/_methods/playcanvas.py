@@ -1,0 +1,65 @@
+"""Bloom of PlayCanvas."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+from vkbloom._settings.core_view import core_view
+from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PlayCanvasBloom(Settings):
+    """Bloom of PlayCanvas' CameraFrame.
+
+    Parameters
+    ----------
+    blur_level : int
+        Largest number of levels, 1 to 16.
+    threshold : float or None
+        Middle of a soft threshold; None or 0: none.
+    composite : {"add"}
+    intensity : float
+        The engine's default is 0, which is off, and its range ends at 0.1; here it is 0.01.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``half`` is one bilinear tap at half of the frame's size, floored; negative values become 0.
+    There are clamp(floor(log2(shorter side of half)), 1, blur_level) levels. ``down_0`` has half
+    the size of ``half``, each next level half of the one before, by the 13 taps of `Pyramid`. The
+    knee curve of `Settings` is applied to ``down_0``, with k = threshold / 2, 4k + 1e-4 and 1e-4.
+    up_k = down_k + tent(up_k+1), whose taps are a texel apart; ``bloom`` is one bilinear sample of
+    up_0, the sum of the levels.
+
+    Source: playcanvas/engine 2.23, frame-pass-bloom.js and downsample.js @ 1f7213d06f78,
+    2.22.0-beta.20 @ 0aaef5e432c4.
+
+    Examples
+    --------
+    >>> vkbloom.PlayCanvasBloom(blur_level=4).threshold is None
+    True
+    """
+
+    method: ClassVar[str] = "playcanvas"
+    published: ClassVar[bool] = True
+
+    knee: float = no_knee("playcanvas")
+    composite: Composite = choice_field("composite", ("add",))
+    intensity: float = number_field("intensity", default=0.01, slider=(0, 0.1))
+    format: BloomFormat | None = "rgba16float"
+    blur_level: int = number_field(default=16, range=(1, 16))
+
+    @property
+    def core_view(self) -> Any:
+        """The settings with the core's names."""
+        return core_view(
+            self,
+            threshold=self.threshold or None,
+            knee=0.5,
+            clamp_max=65504.0,
+            levels=self.blur_level,
+        )
