@@ -154,7 +154,7 @@ format: build/stamp/lint
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 # Their output is shown last, since a failure among the tests' lines is easily overlooked.
 sanitize: build/stamp/core build/stamp/test
-	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh 10 >build/threads.log 2>&1 & threads=$$!; \
+	PYTHON=$(abspath $(PYTHON)) tools/threads/run.sh >build/threads.log 2>&1 & threads=$$!; \
 	    PYTHON=$(abspath $(PYTHON)) tools/sanitize.sh; tests=$$?; \
 	    wait $$threads; threads=$$?; cat build/threads.log; exit $$((tests || threads))
 

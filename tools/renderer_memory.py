@@ -54,21 +54,8 @@ SIZES = ("heap", "data", "code", "descriptors", "threads")
 class _HeapInfo(ctypes.Structure):
     """struct mallinfo2 of <malloc.h>."""
 
-    _fields_ = tuple(
-        (name, ctypes.c_size_t)
-        for name in (
-            "arena",
-            "ordblks",
-            "smblks",
-            "hblks",
-            "hblkhd",
-            "usmblks",
-            "fsmblks",
-            "uordblks",
-            "fordblks",
-            "keepcost",
-        )
-    )
+    _names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
+    _fields_ = tuple((name, ctypes.c_size_t) for name in _names.split())
 
 
 def sizes() -> tuple[int, ...]:

@@ -1,55 +1,24 @@
 """Render many frames of changing size and settings, and check that the process does not grow.
 
-``python tools/soak.py [FRAMES]`` (20,000) prints memory, file descriptors and threads of the
-process after every tenth of the frames. It returns 1 if memory grows in the second half by more
-than a page for a hundred frames, or if the descriptors or threads change; of less than 1,000
+``python tools/soak.py [FRAMES]`` (20,000) prints memory in bytes, file descriptors and threads of
+the process after every tenth of the frames. It returns 1 if memory grows in the second half by
+more than a page for a hundred frames, or if the descriptors or threads change; of less than 1,000
 frames it judges nothing. Linux with glibc 2.33 or newer.
 """
 
 from __future__ import annotations
 
-import ctypes
-import gc
-import os
 import random
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
+from renderer_memory import SIZES, sizes
 
 import vkbloom
 from vkbloom._renderer.surface import Surface
 
 STEPS = 10
-
-
-class _HeapInfo(ctypes.Structure):
-    """struct mallinfo2 of <malloc.h>."""
-
-    _fields_ = [
-        (name, ctypes.c_size_t)
-        for name in (
-            "arena", "ordblks", "smblks", "hblks", "hblkhd",
-            "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
-        )
-    ]  # fmt: skip
-
-
-def counts() -> dict[str, int]:
-    """Return the figures that must not grow."""
-    gc.collect()
-    libc = ctypes.CDLL(None)
-    libc.malloc_trim(0)
-    libc.mallinfo2.restype = _HeapInfo
-    heap = libc.mallinfo2()
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return {
-        "kilobytes of heap in use": (heap.uordblks + heap.hblkhd) // 1024,
-        "kilobytes resident": pages * os.sysconf("SC_PAGESIZE") // 1024,
-        "descriptors": len(os.listdir("/proc/self/fd")),
-        "threads": len(os.listdir("/proc/self/task")),
-    }
 
 
 def frame(
@@ -113,13 +82,12 @@ def main(total: int) -> int:
             renderer.apply(np.zeros((8, 8, 3), np.float32))
             # One array replaces all idle pages, so that each count sees the same number of them.
             renderer._core.pages(256 << 20)
-            rows.append(counts())
-            shown = ", ".join(f"{value} {name}" for name, value in rows[-1].items())
+            rows.append(dict(zip(SIZES, sizes(), strict=True)))
+            shown = ", ".join(f"{name} {value}" for name, value in rows[-1].items())
             print(f"{(step + 1) * (total // STEPS):>8} frames: {shown}", flush=True)
     print(f"{time.perf_counter() - begin:.0f} s")
     middle, last = rows[STEPS // 2 - 1], rows[-1]
-    name = "kilobytes of heap in use"
-    grown = (last[name] - middle[name]) * 1024 / (total / 2)
+    grown = (last["heap"] - middle["heap"]) / (total / 2)
     print(f"{grown:.1f} bytes of heap a frame in the second half")
     same = all(last[name] == middle[name] for name in ("descriptors", "threads"))
     # Fewer frames are still filling caches.

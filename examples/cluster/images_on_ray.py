@@ -33,17 +33,15 @@ class Bloom:
         return {"path": batch["path"], "final": [frame["final"] for frame in frames]}
 
 
-def dataset(
-    paths: Iterable[Path], *, actors: int = 2, limit: int = LIMIT, actor: Any = Bloom
-) -> Any:
+def dataset(paths: Iterable[Path], *, actors: int = 2) -> Any:
     """Return a Ray dataset with the path and the picture of each image."""
     options = ray.data.DataContext.get_current().execution_options
     options.preserve_order = True
-    options.resource_limits = options.resource_limits.copy(object_store_memory=limit)
+    options.resource_limits = options.resource_limits.copy(object_store_memory=LIMIT)
     rows = [{"path": str(path.resolve())} for path in paths]
     blocks = -(-len(rows) // BATCH)
     return ray.data.from_items(rows, override_num_blocks=blocks).map_batches(
-        actor, batch_size=BATCH, compute=ray.data.ActorPoolStrategy(size=actors)
+        Bloom, batch_size=BATCH, compute=ray.data.ActorPoolStrategy(size=actors)
     )
 
 

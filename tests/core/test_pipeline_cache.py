@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from vkbloom import Pyramid, Renderer, Scene, Separable
-from vkbloom._io import pipeline_cache
+from vkbloom._io import disk_cache
 
 SIZE = (16, 16)
+PIPELINES = disk_cache.DiskCache("pipelines")
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "not" / "there yet"
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(folder))
-    return folder
+    monkeypatch.setattr(PIPELINES, "written", {})
+    return folder / "pipelines"
 
 
 def render(scene: Scene) -> None:
@@ -34,7 +36,7 @@ def only_file(folder: Path) -> Path:
 
 
 def driver_of(file: Path) -> bytes:
-    return bytes.fromhex(file.stem.removeprefix("pipelines-"))
+    return bytes.fromhex(file.stem)
 
 
 def test_a_file_is_made_for_the_driver(folder: Path, scene: Scene) -> None:
@@ -42,8 +44,8 @@ def test_a_file_is_made_for_the_driver(folder: Path, scene: Scene) -> None:
         assert not folder.exists()
         renderer.render(scene, size=SIZE)
         file = only_file(folder)
-        assert file.read_bytes().startswith(pipeline_cache.MAGIC)
-        kept = pipeline_cache.read(driver_of(file))
+        assert file.read_bytes().startswith(disk_cache.MAGIC)
+        kept = PIPELINES.read(driver_of(file))
         # The header of Vulkan's cache data: its length, 32, and version, 1.
         assert kept is not None
         assert kept[:8] == bytes([32, 0, 0, 0, 1, 0, 0, 0])
@@ -66,12 +68,12 @@ def test_it_is_given_to_the_driver(
     render(scene)
     given: list[bytes | None] = []
 
-    def read(driver_uuid: bytes) -> bytes | None:
-        given.append(real_read(driver_uuid))
+    def read(self: disk_cache.DiskCache, driver_uuid: bytes) -> bytes | None:
+        given.append(real_read(self, driver_uuid))
         return given[-1]
 
-    real_read = pipeline_cache.read
-    monkeypatch.setattr(pipeline_cache, "read", read)
+    real_read = disk_cache.DiskCache.read
+    monkeypatch.setattr(disk_cache.DiskCache, "read", read)
     render(scene)
     assert len(given) == 1
     assert given[0]
@@ -82,13 +84,13 @@ def test_it_is_given_to_the_driver(
     [
         lambda content: b"",
         lambda content: content[:5],
-        lambda content: content[: len(pipeline_cache.MAGIC) + 16],
+        lambda content: content[: len(disk_cache.MAGIC) + 16],
         lambda content: content[:-1],
         lambda content: content + b"more",
         lambda content: content[:-1] + bytes([content[-1] ^ 1]),
         lambda content: bytes(len(content)),
         lambda content: b"another program's file " * 100,
-        lambda content: content.replace(b"pipelines 1", b"pipelines 2"),
+        lambda content: content.replace(b"cache 1", b"cache 2"),
         lambda content: os.urandom(1 << 20),
     ],
     ids=[
@@ -110,24 +112,23 @@ def test_a_damaged_file_is_replaced(folder: Path, scene: Scene, damage: object) 
     file = only_file(folder)
     content = file.read_bytes()
     file.write_bytes(damage(content))
-    assert pipeline_cache.read(driver_of(file)) is None
+    assert PIPELINES.read(driver_of(file)) is None
     render(scene)
-    assert pipeline_cache.read(driver_of(only_file(folder))) is not None
+    assert PIPELINES.read(driver_of(only_file(folder))) is not None
 
 
 def test_another_drivers_file_is_replaced(folder: Path, scene: Scene) -> None:
     render(scene)
     file = only_file(folder)
     driver, other = driver_of(file), bytes(16)
-    data = pipeline_cache.read(driver)
+    data = PIPELINES.read(driver)
     assert data is not None
     # Written for another driver, and then renamed.
-    pipeline_cache.write(other, data)
-    other_file = folder / f"pipelines-{other.hex()}.bin"
-    other_file.replace(file)
-    assert pipeline_cache.read(driver) is None
+    PIPELINES.write(other, data)
+    (folder / f"{other.hex()}.bin").replace(file)
+    assert PIPELINES.read(driver) is None
     render(scene)
-    assert pipeline_cache.read(driver) is not None
+    assert PIPELINES.read(driver) is not None
 
 
 @pytest.mark.parametrize(
@@ -141,11 +142,11 @@ def test_a_right_digest_over_wrong_data_does_no_harm(
     render(scene)
     file = only_file(folder)
     driver = driver_of(file)
-    pipeline_cache.write(driver, data)
-    assert pipeline_cache.read(driver) == data
+    PIPELINES.write(driver, data)
+    assert PIPELINES.read(driver) == data
     with Renderer() as renderer:
         renderer.render(scene, size=SIZE)
-    assert pipeline_cache.read(driver) not in (data, None)
+    assert PIPELINES.read(driver) not in (data, None)
 
 
 def test_a_folder_in_place_of_the_file(folder: Path, scene: Scene) -> None:
@@ -176,17 +177,28 @@ def test_no_folder_is_no_cache(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_files_of_each_kind_are_bounded(folder: Path) -> None:
+    for kind in ("pipelines", "shaders"):
+        for number in range(4):
+            cache = disk_cache.DiskCache(kind)  # of another process
+            cache.max_bytes = 300
+            cache.write(bytes([number]), bytes(100 - disk_cache.HEADER_SIZE))
+            cache.write(bytes([number]), bytes(100 - disk_cache.HEADER_SIZE))
+        names = sorted(file.stem for file in (folder.parent / kind).iterdir())
+        assert names == ["01", "02", "03"]
+
+
 def test_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("VKBLOOM_CACHE_DIR")
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert pipeline_cache.folder() == tmp_path / "vkbloom"
+    assert disk_cache.folder() == tmp_path / "vkbloom"
     monkeypatch.setenv("HOME", str(tmp_path))
     for ignored in ("", "relative"):
         monkeypatch.setenv("XDG_CACHE_HOME", ignored)
-        assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
+        assert disk_cache.folder() == tmp_path / ".cache" / "vkbloom"
     monkeypatch.delenv("XDG_CACHE_HOME")
-    assert pipeline_cache.folder() == tmp_path / ".cache" / "vkbloom"
+    assert disk_cache.folder() == tmp_path / ".cache" / "vkbloom"
 
 
 def test_a_cpu_compiles_each_shader_of_a_plan_once(

@@ -226,7 +226,7 @@ def test_how_the_compiler_is_ended_is_named(
     hook.write_text("//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(0.125); }\n")
     monkeypatch.setattr(compiler, "find_compiler", lambda: str(tool))
     monkeypatch.setattr(compiler, "MAX_SECONDS", 0.5)
-    monkeypatch.setattr(compiler, "cache_file", lambda _: None)
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
     with pytest.raises(ShaderError, match=f"the compiler was ended by {name}: "):
         compile_all(read_file(read_source(hook)))
 

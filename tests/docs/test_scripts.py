@@ -27,36 +27,18 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "examples/gradients/glare_removal.py": ("a.png", "scipy"),
     "examples/gradients/learned.py": ("a.png", "torch"),
     "examples/gradients/recovered_psf.py": ("a.png", "scipy"),
-    "tools/check_table.py": ("a.md", "click"),
-    "tools/derivatives_table.py": ("a.md", "numpy"),
     "tools/docs_pictures.py": ("pictures", "matplotlib"),
-    "tools/first_apply.py": ("tutorial", "numpy"),
-    "tools/fit_recovery.py": ("a.md --count 1", "scipy"),
-    "tools/fit_screenshots.py": ("a.md", "scipy"),
-    "tools/glare_pictures.py": (".", "OpenImageIO"),
     "tools/laws.py": ("--out a.md", "cv2"),
     "tools/line_counts.py": ("", "numpy"),
-    "tools/measured_table.py": ("a.md --rounds 1", "numpy"),
-    "tools/night_picture.py": ("night.jpg", "OpenImageIO"),
-    "tools/photo_sheet.py": (".", "skimage"),
-    "tools/preset_pictures.py": ("a.png", "OpenImageIO"),
-    "tools/psf_atlas.py": (".", "matplotlib"),
     "tools/requirements.py": ("all", "numpy"),
     "tools/run_notebooks.py": ("", "nbclient"),
     "tools/soak.py": ("20", "numpy"),
-    "tools/steadiness_tables.py": (".", "numpy"),
-    "tools/translate_table.py": ("a.md", "scipy"),
+    "tools/tables/write.py": ("--quick --out .", "skimage"),
 }
 
 
 #: Those that take more than five seconds of a processor; their functions have tests of their own.
-LONG: Final = (
-    "tools/check_table.py",
-    "tools/fit_recovery.py",
-    "tools/fit_screenshots.py",
-    "tools/psf_atlas.py",
-    "tools/steadiness_tables.py",
-)
+LONG: Final = ("tools/tables/write.py",)
 
 #: What is run elsewhere, by its path or folder, and where: a test, a target of make.
 ELSEWHERE: Final = {
@@ -72,11 +54,11 @@ ELSEWHERE: Final = {
     "tools/free_threaded/": "Makefile",
     "tools/fuzz/": "tests/io/test_fuzz.py",
     "tools/libplacebo/": "Makefile",
-    "tools/make_scene.py": "tests/scene/test_assets.py",
     "tools/renderer_memory.py": "tests/core/test_lifetime.py",
     "tools/sanitize.sh": "Makefile",
     "tools/sanitizer_report.py": "tools/sanitize.sh",
     "tools/setup_system.sh": "Makefile",
+    "tools/tables/": "tools/tables/write.py",
     "tools/threads/": "Makefile",
 }
 

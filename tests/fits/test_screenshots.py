@@ -1,6 +1,6 @@
 """Fits of two 8-bit screenshots: the settings of a bloom, or that there is none.
 
-The pairs are those of ``tools/fit_screenshots.py``, which writes the table of ``docs/fits.md``.
+The pairs are those of ``tools/tables/screenshots.py``, whose table is in ``docs/fits.md``.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from vkbloom import Renderer
 
 pytest.importorskip("skimage.data")
 pytest.importorskip("PIL.Image")
-_FILE = Path(__file__).parents[2] / "tools" / "fit_screenshots.py"
-_SPEC = importlib.util.spec_from_file_location("fit_screenshots", _FILE)
+_FILE = Path(__file__).parents[2] / "tools" / "tables" / "screenshots.py"
+_SPEC = importlib.util.spec_from_file_location("screenshots", _FILE)
 assert _SPEC is not None
 assert _SPEC.loader is not None
 pairs: Any = importlib.util.module_from_spec(_SPEC)

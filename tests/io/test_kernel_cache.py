@@ -24,7 +24,7 @@ APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(kernel_cache, "_written", 0)
+    monkeypatch.setattr(kernel_cache.CACHE, "written", {})
     monkeypatch.setattr(kernel_cache, "MIN_SECONDS", 0)
     # Nothing is found in memory.
     monkeypatch.setattr(array_cache, "_of_renderers", lambda: array_cache.ArrayCache(0, 0))
@@ -130,10 +130,10 @@ def test_many_at_once_leave_one_whole_file(folder: Path) -> None:
 def test_files_are_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kernel_cache.find_or_make((0,), kernel_of(1))
     size = next(folder.iterdir()).stat().st_size
-    monkeypatch.setattr(kernel_cache, "MAX_BYTES", 3 * size)
+    monkeypatch.setattr(kernel_cache.CACHE, "max_bytes", 3 * size)
     for number in (1, 2, 0, 3):  # 0 is found, so that 1 is the oldest.
         # Of another process each.
-        monkeypatch.setattr(kernel_cache, "_written", 0)
+        monkeypatch.setattr(kernel_cache.CACHE, "written", {})
         kernel_cache.find_or_make((number,), kernel_of(1))
     assert len([*folder.iterdir()]) == 3
     for number in (0, 2, 3):
@@ -145,7 +145,7 @@ def test_files_are_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_sweep_does_not_replace_all_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kernel_cache.find_or_make((0,), kernel_of(1))
     size = next(folder.iterdir()).stat().st_size
-    monkeypatch.setattr(kernel_cache, "MAX_BYTES", 3 * size)
+    monkeypatch.setattr(kernel_cache.CACHE, "max_bytes", 3 * size)
     for number in range(1, 9):
         kernel_cache.find_or_make((number,), kernel_of(1))
     for number in range(3):

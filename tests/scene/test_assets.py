@@ -1,4 +1,4 @@
-"""The built-in scene is sound, and tools/make_scene.py still makes it.
+"""The built-in scene is sound, and is that of the files in examples/saucer.
 
 The glTF files and images are read here with NumPy and OpenImageIO alone, so that a fault of the
 package's own loaders cannot hide one of theirs. The package has the arrays that its loaders make of
@@ -7,7 +7,6 @@ these files.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -21,7 +20,6 @@ import numpy.typing as npt
 import OpenImageIO as oiio
 import pytest
 
-from tests.exhaustive import witness
 from vkbloom._scene import Scene
 
 Array = npt.NDArray[Any]
@@ -45,8 +43,6 @@ FACE_TABLE = {
     "pz": ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
     "nz": ((-1, 0, 0), (0, -1, 0), (0, 0, -1)),
 }
-
-WHOLE = witness("the script takes 18 s; its meshes and its sky are tested in part")
 
 
 @dataclass(frozen=True)
@@ -139,28 +135,6 @@ def read_face(path: Path) -> Array:
     return pixels
 
 
-@pytest.fixture(scope="module")
-def make_scene() -> Iterator[Any]:
-    """The script, as a module."""
-    spec = importlib.util.spec_from_file_location("make_scene", ROOT / "tools" / "make_scene.py")
-    assert spec is not None
-    assert spec.loader is not None
-    # Dataclasses look up their module.
-    module = sys.modules["make_scene"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["make_scene"]
-
-
-@pytest.fixture(scope="module")
-def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files made anew."""
-    folder = tmp_path_factory.mktemp("saucer")
-    script = ROOT / "tools" / "make_scene.py"
-    subprocess.run([sys.executable, str(script), "--out", str(folder)], check=True)
-    return folder
-
-
 @pytest.fixture(scope="module", params=MESHES)
 def parts(request: pytest.FixtureRequest) -> list[Part]:
     return read_parts(FILES / f"{request.param}.gltf")
@@ -171,53 +145,7 @@ def sky() -> dict[str, Array]:
     return {name: read_face(FILES / f"starfield_{name}.png") for name in FACES}
 
 
-# ------------------------------------------------------------------- the script
-
-
-@WHOLE
-def test_script_writes_the_files_that_are_there(fresh: Path) -> None:
-    made = {path.name for path in fresh.iterdir()}
-    assert made == {path.name for path in (*FILES.iterdir(), PACKED)} - {"README.md"}
-
-
-@pytest.mark.parametrize("name", MESHES)
-def test_script_makes_the_same_mesh(make_scene: Any, tmp_path: Path, name: str) -> None:
-    is_glow = name == "saucer_glow"
-    meshes = make_scene.body_meshes() | ({"beam": make_scene.beam_mesh()} if is_glow else {})
-    root = make_scene.saucer(with_beam=is_glow)
-    make_scene.write_gltf(tmp_path / f"{name}.gltf", root, meshes, glow=is_glow)
-    document = read_json(FILES / f"{name}.gltf")
-    assert read_json(tmp_path / f"{name}.gltf") == document
-    old, new = (folder / f"{name}.bin" for folder in (FILES, tmp_path))
-    for index in range(len(document["accessors"])):
-        # Half a unit of the last decimal that the script keeps of positions is 5e-6.
-        np.testing.assert_allclose(
-            read_accessor(document, new.read_bytes(), index),
-            read_accessor(document, old.read_bytes(), index),
-            rtol=0,
-            atol=1e-5,
-        )
-
-
-def test_script_makes_the_same_gas(make_scene: Any, sky: dict[str, Array]) -> None:
-    """Of the starfield some texels without its stars, which make a texel only brighter."""
-    rng = np.random.Generator(np.random.PCG64(make_scene.SKY_SEED))
-    pole = np.array([0.35, 0.78, 0.52])
-    view = make_scene.face_directions(make_scene.FACE_SIZE)[:, ::16, ::16]
-    gas = make_scene.nebula(view, rng, pole / np.linalg.norm(pole))
-    faces = np.stack([sky[name][::16, ::16] for name in FACES])
-    brighter = faces - (np.clip(gas, 0, 1) * 255 + 0.5).astype(np.int64)
-    assert brighter.min() >= -1
-    assert 0.8 < (brighter <= 1).mean() < 1
-
-
-@WHOLE
-@pytest.mark.parametrize("name", FACES)
-def test_script_makes_the_same_starfield(fresh: Path, sky: dict[str, Array], name: str) -> None:
-    made = read_face(fresh / f"starfield_{name}.png")
-    assert made.shape == sky[name].shape
-    # One level: a value halfway between two may round either way on another machine.
-    assert np.abs(made.astype(np.int64) - sky[name]).max() <= 1
+# ------------------------------------------------------------------- the packed arrays
 
 
 def arrays_of(scene: Scene) -> list[Array]:
@@ -236,18 +164,6 @@ def test_the_built_in_scene_is_that_of_the_files() -> None:
     loaded = Scene.from_gltf(FILES / "saucer.gltf", glow=glow, skybox=faces)
     for built_in, of_files in zip(arrays_of(Scene.ufo()), arrays_of(loaded), strict=True):
         np.testing.assert_array_equal(built_in, of_files, strict=True)
-
-
-@WHOLE
-def test_script_packs_the_same_arrays(fresh: Path) -> None:
-    with np.load(PACKED) as old, np.load(fresh / PACKED.name) as new:
-        assert old.files == new.files
-        for name in old.files:
-            # As above; the y of normals and positions is negated, indices are exact.
-            step = {"f": 1e-5, "u": 1 if name == "sky" else 0}[old[name].dtype.kind]
-            np.testing.assert_allclose(
-                new[name].astype(np.float64), old[name].astype(np.float64), rtol=0, atol=step
-            )
 
 
 def test_the_built_in_scene_needs_no_extra() -> None:

@@ -14,6 +14,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 from daemons import NODES, Cluster, Ray, Slurm, Ssh, adopt, end, end_all, output, wait_until
 from workload import IMAGE
@@ -21,6 +22,7 @@ from workload import IMAGE
 import vkbloom
 
 CHUNKS = 200
+IMAGES = 64
 KILLED_PARTS = ("3", "7")
 ORIGIN = "import vkbloom; print(vkbloom.Renderer().info.driver_info)"
 
@@ -33,8 +35,7 @@ class Trials:
         self.times: list[tuple[str, float]] = []
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(examples, folder)
-        for name in ("workload.py", "try_images.py"):
-            shutil.copy(Path(__file__).with_name(name), folder)
+        shutil.copy(Path(__file__).with_name("workload.py"), folder)
 
     def say(self, what: str, seconds: float) -> None:
         """Add a row to the table."""
@@ -158,11 +159,22 @@ class Trials:
         ).strip()
 
     def images(self, cluster: Ray) -> None:
-        """Run the example with Ray Data."""
+        """Run the example with Ray Data, and compare its pictures with those of `map`."""
+        noise, inputs = np.random.default_rng(0), self.folder / "images"
+        inputs.mkdir()
+        paths = [inputs / f"{number:03}.exr" for number in range(IMAGES)]
+        for path in paths:
+            vkbloom.write(path, noise.random((360, 640, 3), np.float32) * 2)
         begun = time.perf_counter()
-        text = self.finish(self.start(sys.executable, "try_images.py", cluster=cluster))
-        print("\n".join(line for line in text.splitlines() if line.startswith("images: ")))
+        words = ("images_on_ray.py", "images", "pictures")
+        self.finish(self.start(sys.executable, *words, cluster=cluster))
         self.say("Ray Data", time.perf_counter() - begun)
+        with vkbloom.Renderer() as renderer:
+            expected = renderer.map(map(vkbloom.read, paths), framebuffers="final")
+            for path, frames in zip(paths, expected, strict=True):
+                found = vkbloom.read(self.folder / "pictures" / path.name)
+                if not np.array_equal(found, frames["final"]):
+                    raise RuntimeError(f"{path.name}: other pixels than those of map")
 
 
 def others(folder: Path, driver: str | None) -> list[tuple[tuple[str, str], dict[str, str]]]:

@@ -1,7 +1,7 @@
 """Hold engines as they run to the laws of a bloom: python tools/engines/laws.py NAME=PYTHON...
 
 Runs ``vkbloom check --command`` on each, which is about a hundred runs of the engine, and measures
-it as tools/measured_table.py does the presets. Writes two tables of docs/engines.md.
+it as tools/tables does the presets. Writes two tables of docs/engines.md.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from compare import FOLDER, replace_in_page
 import vkbloom
 from vkbloom import testing
 
-sys.path.append(str(Path(__file__).parents[1]))
-from measured_table import FLAT, FRAME, SHARES, VALUE, spread
+sys.path.append(str(Path(__file__).parents[1] / "tables"))
+from presets import FLAT, FRAME, SHARES, VALUE, spread
 
 #: For the laws: the engine's output that is its bloom, and its parameters.
 LAWS = {

@@ -22,7 +22,7 @@ import OpenImageIO
 import stores
 
 import vkbloom
-from vkbloom._io import pipeline_cache
+from vkbloom._io import disk_cache
 from vkbloom._scene import ktx, skybox
 from vkbloom._scene.gltf import load_mesh
 
@@ -160,18 +160,20 @@ def _image_seeds(shape: tuple[int, int, int]) -> list[bytes]:
 
 
 def _pipelines(data: bytes) -> None:
-    path = FOLDER / "cache" / f"pipelines-{DRIVER.hex()}.bin"
-    path.parent.mkdir(exist_ok=True)
-    path.write_bytes(data)
-    found = pipeline_cache.unwrap(path.read_bytes(), DRIVER)
+    os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "cache")
+    cache = disk_cache.DiskCache("pipelines")
+    file = cache.file(DRIVER)
+    assert file is not None
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(data)
+    found = cache.read(DRIVER)
     # Only a completely written file counts as the driver's data.
-    header = pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, found or b"")
-    assert found is None or data == header + found
+    assert found is None or data == disk_cache.header(DRIVER, found) + found
 
 
 def _pipeline_seeds() -> list[bytes]:
     kept = struct.pack("<IIII", 32, 1, 0x10005, 0) + bytes(16) + b"pipelines"
-    return [pipeline_cache.MAGIC + pipeline_cache.digest(DRIVER, kept) + kept]
+    return [disk_cache.header(DRIVER, kept) + kept]
 
 
 #: Blocks that the examples do not have.

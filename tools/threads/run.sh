@@ -1,26 +1,22 @@
 #!/bin/sh
-# Runs threads.c, the core without Python, under ThreadSanitizer: run.sh [SECONDS] (60).
-# PYTHON: an interpreter with setuptools.
+# Makes all calls of the core in 16 threads (tests/core/all_calls.py) with a core that is built for
+# ThreadSanitizer: run.sh [CALLS] (400). PYTHON: an interpreter with the test requirements.
 set -eu
 
 cd "$(dirname "$0")/../.."
-PYTHON=${PYTHON:-python3}
+PYTHON=$(realpath -s "${PYTHON:-python3}")
 folder=$PWD/build/threads
-mkdir -p "$folder"
-# Write the shaders as C, and find volk.
-volk=$("$PYTHON" - <<'END'
-import setuptools
-setuptools.setup = lambda **_: None
-import setup
-setup.write_spirv(setup.processes())
-print(setup.volk_folder())
-END
-)
-sources=$(ls csrc/*/*.c | grep -v '^csrc/python/')
-# Not optimized: the compiler takes most of the time.
-# shellcheck disable=SC2086  # file names of this repository
-${CC:-cc} -std=gnu11 -g -O0 -fno-omit-frame-pointer -Wall -Wextra -Werror -DVK_NO_PROTOTYPES \
-    -fsanitize=thread -Icsrc -I. -Ibuild/spirv -I"$volk" \
-    $sources build/spirv/spirv.c tools/threads/threads.c -o "$folder/threads" -lm -ldl -lpthread
-exec env TSAN_OPTIONS="suppressions=$PWD/tools/threads/threads.supp:exitcode=66" \
-    "$folder/threads" "${1:-60}"
+rm -rf "$folder/package"
+mkdir -p "$folder/package"
+# A separate package, so that the sanitized core does not replace the one in use.
+cp -r python/vkbloom "$folder/package/"
+rm -f "$folder"/package/vkbloom/_core*.so
+VKBLOOM_CFLAGS="-fsanitize=thread -fno-omit-frame-pointer -g -O1" VKBLOOM_LDFLAGS=-fsanitize=thread \
+    "$PYTHON" setup.py --quiet build_ext --build-temp "$folder/temp" --build-lib "$folder/package"
+cat tools/threads/threads.supp tools/free_threaded/tsan.supp >"$folder/tsan.supp"
+# Without randomized addresses, whose range may be larger than the sanitizer's.
+env LD_PRELOAD="$(${CC:-cc} -print-file-name=libtsan.so)" \
+    TSAN_OPTIONS="suppressions=$folder/tsan.supp:exitcode=66:history_size=4" \
+    PYTHONPATH="$folder/package:$PWD" \
+    setarch -R "$PYTHON" -m tests.core.all_calls "${1:-400}"
+echo "ThreadSanitizer found nothing"

@@ -23,7 +23,7 @@ from vkbloom._custom.file import CustomFile
 from vkbloom._custom.glsl import BODY, Shader
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.spirv import without_contraction
-from vkbloom._io import pipeline_cache
+from vkbloom._io.disk_cache import DiskCache
 
 #: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result.
 MAX_PROCESSOR_SECONDS: Final = 20
@@ -33,8 +33,7 @@ LARGEST_RESULT: Final = 64 << 20
 
 #: The package's GLSL that `#include` finds.
 LIBRARY: Final = Path(__file__).parent / "glsl"
-#: Of a shader's code in the cache; a change of what is stored changes it.
-CACHE_MAGIC: Final = b"vkbloom own shader 1\n"
+CACHE: Final = DiskCache("shaders")
 SPIRV_MAGIC: Final = 0x07230203
 MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
@@ -70,49 +69,17 @@ def compile_shader(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
     code = cached_code(shader)
     if code is None:
         code = compiled(file, one, shader)
-        if kept := cache_file(shader):
-            write_cached(kept, code)
+        CACHE.write(_key(shader), code)
     return code
 
 
 def cached_code(shader: Shader) -> bytes | None:
     """Return the SPIR-V of a shader that was compiled before; None if the cache has it not."""
-    kept = cache_file(shader)
-    return None if kept is None else read_cached(kept)
+    return CACHE.read(_key(shader))
 
 
-def cache_file(shader: Shader) -> Path | None:
-    """Return the file of a shader's code in the cache; None without a cache."""
-    folder = pipeline_cache.folder()
-    if folder is None:
-        return None
-    key = hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode())
-    return folder / "own" / f"{key.hexdigest()}.spv"
-
-
-def read_cached(file: Path) -> bytes | None:
-    """Return the code in a file of the cache; None if it is missing or damaged."""
-    try:
-        content = file.read_bytes()
-    except OSError:
-        return None
-    code = content[len(CACHE_MAGIC) + 32 :]
-    return code if content == wrapped(code) else None
-
-
-def wrapped(code: bytes) -> bytes:
-    """Return the content of a file of the cache."""
-    return CACHE_MAGIC + hashlib.sha256(code).digest() + code
-
-
-def write_cached(file: Path, code: bytes) -> None:
-    """Write a file of the cache, which only saves time: failing to write it is not an error."""
-    with contextlib.suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(wrapped(code))
-        os.replace(temporary, file)
+def _key(shader: Shader) -> bytes:
+    return hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).digest()
 
 
 def compiled(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:

@@ -14,7 +14,7 @@ import numpy as np
 
 from vkbloom._doctor.finding import Finding
 from vkbloom._free_memory import ADVICE, address_space_left
-from vkbloom._io import pipeline_cache
+from vkbloom._io import disk_cache
 
 # Address space of a render of a small image on lavapipe, with the interpreter.
 _AMPLE: Final = 1 << 30
@@ -87,7 +87,7 @@ def caches() -> list[Finding]:
     """Examine whether the caches of vkbloom and of the drivers can be written."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     drivers = ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
-    found = [_cache("VKBLOOM_CACHE_DIR", pipeline_cache.folder())]
+    found = [_cache("VKBLOOM_CACHE_DIR", disk_cache.folder())]
     return found + [_cache(name, os.environ.get(name) or home) for name in drivers]
 
 

@@ -230,15 +230,16 @@ class Renderer:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
-        from vkbloom._io import pipeline_cache  # noqa: PLC0415  costs start-up time
+        from vkbloom._io.disk_cache import DiskCache  # noqa: PLC0415  costs start-up time
 
+        self._pipelines = DiskCache("pipelines")
         self._core = _core.Renderer(
             adapter,
             bundled_driver(),
             bool(validation),
             os.environ.get("VKBLOOM_VARIANT") or "auto",
             _frame_seconds(),
-            pipeline_cache.read,
+            self._pipelines.read,
         )
         self._driver_uuid = self._core.info[5]
         self.info = from_core(self._core.info)
@@ -961,10 +962,8 @@ class Renderer:
         """Write the driver's pipeline cache to disk if it has new pipelines."""
         count = self._core.pipeline_count
         if count != self._saved_pipelines:
-            from vkbloom._io import pipeline_cache  # noqa: PLC0415  costs start-up time
-
             # Errors are ignored, since the cache only makes the next start faster. A ValueError
             # means that another thread has closed the renderer.
             with contextlib.suppress(_core.Error, ValueError):
-                pipeline_cache.write(self._driver_uuid, self._core.pipeline_cache())
+                self._pipelines.write(self._driver_uuid, self._core.pipeline_cache())
                 self._saved_pipelines = count

@@ -40,7 +40,7 @@ _contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
     weakref.WeakValueDictionary()
 )
 
-# The arrays of the built-in scene, made by tools/make_scene.py from the files in examples/saucer.
+# The arrays of the built-in scene, packed from the files in examples/saucer, as its README.md says.
 _UFO: Final = Path(__file__).parents[1] / "assets" / "ufo.npz"
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "reduced",
     "resized",
     "scaled",
+    "sheet",
     "sheet_png",
 ]
 
@@ -142,7 +143,17 @@ def sheet_png(
     cell: tuple[int, int],
     title: str = "",
 ) -> bytes:
-    """Return pictures with two lines of text below each as PNG.
+    """Return a `sheet` as PNG."""
+    return png(sheet(tiles, columns, cell, title))
+
+
+def sheet(
+    tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
+    columns: int,
+    cell: tuple[int, int],
+    title: str = "",
+) -> NDArray[np.uint8]:
+    """Return pictures with two lines of text below each.
 
     - `tiles`: Pictures that are not larger than a cell, with their lines.
     - `cell`: Width and height in pixels.
@@ -153,7 +164,7 @@ def sheet_png(
     gap, caption = text, 3 * text
     heading = 2 * text * bool(title)
     rows = -(-len(tiles) // columns)
-    sheet = np.full(
+    drawn = np.full(
         (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
         24,
         np.uint8,
@@ -165,11 +176,11 @@ def sheet_png(
         top = gap + heading + row * (height + caption + gap)
         y = top + (height - picture.shape[0]) // 2
         x = left + (width - picture.shape[1]) // 2
-        sheet[top : top + height, left : left + width] = 40
-        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[:, :, :3]
+        drawn[top : top + height, left : left + width] = 40
+        drawn[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[:, :, :3]
         baseline = top + height + text + text // 4
         labels += [(left, baseline + i * (text + 2), line) for i, line in enumerate(lines)]
-    return png(labelled(sheet, labels, text))
+    return labelled(drawn, labels, text)
 
 
 def labelled(

@@ -1,18 +1,15 @@
 """The kernels of convolutions on disk: the diffraction of an aperture takes a second to compute.
 
-A file is used only if its checksum is right for its content and for what the kernel follows from:
-its function and sizes, the package's source of the formulas, and the version of NumPy. All files
-together have `MAX_BYTES` at the most; the ones whose last use is longest ago are removed. A kernel
-that was computed in less than `MIN_SECONDS` has no file: reading one takes a part of that, too.
+Their key is what a kernel follows from: its function and sizes, the package's source of the
+formulas, and the version of NumPy. A kernel that was computed in less than `MIN_SECONDS` has no
+file: reading one takes a part of that, too.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import hashlib
-import os
 import struct
 import time
 from collections.abc import Callable
@@ -23,16 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._core_kernel import CoreKernel
-from vkbloom._io import pipeline_cache
-from vkbloom._io.safe_writing import write_file
+from vkbloom._io.disk_cache import DiskCache
 from vkbloom.psf._values import ArrayValue
 
-__all__ = ["MAX_BYTES", "MIN_SECONDS", "find_or_make", "folder"]
+__all__ = ["CACHE", "MIN_SECONDS", "find_or_make"]
 
-MAGIC: Final = b"vkbloom kernel 1\n"
-#: The bound of all files. A process writes no more than that in total, so that a long sweep of
-#: kernels does not replace the files of other processes again and again.
-MAX_BYTES: Final = 256 << 20
+CACHE: Final = DiskCache("kernels")
 #: Of processor time of the thread.
 MIN_SECONDS: Final = 0.02
 
@@ -45,13 +38,6 @@ _OWN: Final = {f"vkbloom.psf._{name}" for name in ("aperture", "eye", "lens", "r
 _SOURCES: Final = ("_core_kernel.py", "_methods/convolution.py", "_methods/blender_kernels.py")
 
 Pixels: TypeAlias = NDArray[np.float32]
-_written = 0
-
-
-def folder() -> Path | None:
-    """Return the folder of the files; None if VKBLOOM_CACHE_DIR is empty."""
-    base = pipeline_cache.folder()
-    return None if base is None else base / "kernels"
 
 
 def find_or_make(what: tuple[object, ...], make: Callable[[], CoreKernel]) -> CoreKernel:
@@ -59,16 +45,16 @@ def find_or_make(what: tuple[object, ...], make: Callable[[], CoreKernel]) -> Co
 
     `what`: All that the kernel follows from: numbers, strings, tuples, point-spread functions.
     """
-    base, key = folder(), _key(what)
-    if base is None or key is None:
+    key = _key(what)
+    if key is None or CACHE.file(key) is None:
         return make()
-    file = base / f"{key.hex()}.bin"
-    kernel = _read(file, key)
-    if kernel is None:
-        start = time.thread_time()
-        kernel = make()
-        if time.thread_time() - start >= MIN_SECONDS:
-            _write(file, _pack(kernel, key))
+    data = CACHE.read(key)
+    if data is not None:
+        return _unpack(data)
+    start = time.thread_time()
+    kernel = make()
+    if time.thread_time() - start >= MIN_SECONDS:
+        CACHE.write(key, _pack(kernel))
     return kernel
 
 
@@ -110,15 +96,14 @@ def _formulas() -> bytes | None:
     return digest.digest()
 
 
-def _pack(kernel: CoreKernel, key: bytes) -> bytes:
+def _pack(kernel: CoreKernel) -> bytes:
     """Return the content of a kernel's file."""
     height, width = kernel.pixels.shape[:2]
     filled = np.asarray(kernel.pixels.any(axis=2))
     rows, columns = _extent(filled, 1), _extent(filled, 0)
     part = kernel.pixels[rows, columns, : 1 if kernel.is_grey else 4]
     sides = width, height, columns.start, rows.start, part.shape[1], part.shape[0], part.shape[2]
-    data = _HEADER.pack(kernel.serial, *sides) + part.tobytes()
-    return MAGIC + _digest(key, data) + data
+    return _HEADER.pack(kernel.serial, *sides) + part.tobytes()
 
 
 def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
@@ -127,47 +112,10 @@ def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
     return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0)
 
 
-def _digest(key: bytes, data: bytes | memoryview) -> bytes:
-    return hashlib.blake2b(data, key=key, digest_size=_DIGEST_SIZE).digest()
-
-
-def _read(file: Path, key: bytes) -> CoreKernel | None:
-    """Return the kernel of a file; None if it is missing, damaged or another's."""
-    start = len(MAGIC) + _DIGEST_SIZE
-    try:
-        content = file.read_bytes()
-        if content[:start] != MAGIC + _digest(key, memoryview(content)[start:]):
-            return None
-        # The time of its last use.
-        os.utime(file)
-    except OSError:
-        return None
-    serial, width, height, left, top, *part = _HEADER.unpack_from(content, start)
-    across, down, channels = part
+def _unpack(data: bytes) -> CoreKernel:
+    """Return the kernel of a file."""
+    serial, width, height, left, top, across, down, channels = _HEADER.unpack_from(data)
     pixels: Pixels = np.zeros((height, width, 4), np.float32)
-    values: Pixels = np.frombuffer(content, np.float32, offset=start + _HEADER.size)
+    values: Pixels = np.frombuffer(data, np.float32, offset=_HEADER.size)
     pixels[top : top + down, left : left + across] = values.reshape(down, across, channels)
     return CoreKernel(pixels, serial, channels == 1)
-
-
-def _write(file: Path, content: bytes) -> None:
-    """Write a file. The cache only saves time, so failing to write it is not an error."""
-    global _written  # noqa: PLW0603  of the process
-    if _written + len(content) > MAX_BYTES:
-        return
-    with contextlib.suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_file(file, content)
-        _written += len(content)
-        _remove_oldest(file.parent)
-
-
-def _remove_oldest(base: Path) -> None:
-    """Remove files until the rest has no more bytes than allowed."""
-    states = sorted((file.stat().st_mtime_ns, file.stat().st_size, file) for file in base.iterdir())
-    total = sum(size for _, size, _ in states)
-    for _, size, file in states:
-        if total <= MAX_BYTES:
-            return
-        file.unlink(missing_ok=True)
-        total -= size

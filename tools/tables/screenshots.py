@@ -1,6 +1,4 @@
-"""Fit pairs of 8-bit screenshots with and without bloom, and print the table of docs/fits.md.
-
-python tools/fit_screenshots.py docs/fit_screenshots_table.md
+"""Pairs of 8-bit screenshots with and without bloom, and what a fit finds of each.
 
 The photographs are scikit-image's, made smaller. Both pictures of a pair are rounded to 8 bits in
 sRGB. Blooms have known settings; the other pairs differ by what is no bloom.
@@ -9,9 +7,7 @@ sRGB. Blooms have known settings; the other pairs differ by what is no bloom.
 from __future__ import annotations
 
 import io
-import sys
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -135,40 +131,25 @@ def fitted(
     )
 
 
-def main(path: Path) -> None:
-    """Write the table."""
-    lines = [
-        "| photograph | target | saturated | found: threshold, intensity | explained | verdict |",
-        "|---|---|---|---|---|---|",
-    ]
-    with vkbloom.Renderer("software") as renderer:
-        for bloom in BLOOMS:
-            image, target = with_bloom(renderer, bloom)
-            truth = f"`{bloom.preset}`, {bloom.threshold:g}, {bloom.intensity:g}"
-            found = fitted(renderer, (image, target), bloom.preset)
-            lines.append(line(bloom.photograph, truth, target, found))
-            print(lines[-1], flush=True)
-        for name, change in OTHERS:
-            image, target = without_bloom(name, change)
-            for preset in ("bevy_natural", "unity_urp"):
-                found = fitted(renderer, (image, target), preset)
-                lines.append(line(name, f"{change}; from `{preset}`", target, found))
-                print(lines[-1], flush=True)
-    path.write_text("\n".join([*lines, ""]))
-
-
-def line(name: str, what: str, target: Pixels, found: vkbloom.FitResult) -> str:
+def row(name: str, what: str, target: Pixels, found: vkbloom.FitResult) -> list[str]:
     """Return a row of the table."""
     saturated = (target == 255).any(axis=2).mean()
     values = f"{found.settings.threshold:.3f}, {found.settings.intensity:.3f}"
     if found.cause.startswith("no bloom"):
         values = ""
-    name = name.replace("_", " ")
-    share = 100 * max(0.0, found.explained)
-    return (
-        f"| {name} | {what} | {100 * saturated:.1f} % | {values} | {share:.1f} % | {found.words} |"
-    )
+    share = f"{100 * max(0.0, found.explained):.1f} %"
+    return [name.replace("_", " "), what, f"{100 * saturated:.1f} %", values, share, found.words]
 
 
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+def rows(renderer: vkbloom.Renderer, quick: bool) -> Iterator[list[str]]:
+    """Yield the rows of all pairs, or of two."""
+    for bloom in BLOOMS[: 1 if quick else None]:
+        image, target = with_bloom(renderer, bloom)
+        truth = f"`{bloom.preset}`, {bloom.threshold:g}, {bloom.intensity:g}"
+        found = fitted(renderer, (image, target), bloom.preset)
+        yield row(bloom.photograph, truth, target, found)
+    for name, change in [*OTHERS][: 1 if quick else None]:
+        image, target = without_bloom(name, change)
+        for preset in ("bevy_natural", "unity_urp"):
+            found = fitted(renderer, (image, target), preset)
+            yield row(name, f"{change}; from `{preset}`", target, found)

@@ -1,0 +1,52 @@
+"""Write the tables of figures that the pages of docs/ include.
+
+``python tools/tables/write.py [--out docs] [NAME ...]``; without names all of them, which takes an
+hour on two cores. Names are those of `TABLES`. Costs are wall-clock times: run nothing else then.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+import fits
+import presets
+import psfs
+
+import vkbloom
+
+#: Functions of a renderer and of whether to measure a part only, by the name of the table's file.
+TABLES: Final = {
+    "check": presets.check,
+    "derivatives": presets.derivatives,
+    "measured": presets.measured,
+    "stability": presets.stability,
+    "resolution": presets.resolution,
+    "psf": psfs.functions,
+    "psf_pyramids": psfs.pyramids,
+    "psf_presets": psfs.of_presets,
+    "fit": fits.recovery,
+    "fit_screenshots": fits.screenshots,
+    "translate": fits.translations,
+}
+
+
+def main() -> None:
+    """Measure, and write each table when it is complete."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TABLES))
+    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--adapter", default="software")
+    parser.add_argument("--quick", action="store_true", help="a part of each, as a check only")
+    arguments = parser.parse_args()
+    with vkbloom.Renderer(arguments.adapter) as renderer:
+        for name in arguments.names or TABLES:
+            file = arguments.out / f"{name}_table.md"
+            text = TABLES[name](renderer, arguments.quick)
+            file.write_text(f"On {renderer.info.summary}.\n\n{text}", encoding="utf-8")
+            print(file, flush=True)
+
+
+if __name__ == "__main__":
+    main()
