@@ -18,7 +18,6 @@ enum {
     SPV_INPUT = 1,
     SPV_UNIFORM = 2,
     SPV_PUSH_CONSTANT = 9,
-    SPV_UNROLL = 1,  // how a loop is declared
 };
 
 enum vkb_opcode {

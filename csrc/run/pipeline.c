@@ -1,7 +1,6 @@
 #include "run/pipeline.h"
 
 #include "graph/specialize.h"
-#include "graph/unroll.h"
 #include "scene/scene.h"
 
 #include <string.h>
@@ -390,17 +389,15 @@ static bool create_module(const struct vkb_device *device, const struct vkb_shad
 
     if (!vkb_specialize(shader, constants, &code, &size, error))
         return false;
-    // A GPU's compiler decides for itself.
-    const bool done = (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU
-                       || vkb_unroll(&code, &size, error))
-                   && VK(error, device->vk.vkCreateShaderModule(
-                                    device->handle,
-                                    &(VkShaderModuleCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                                        .codeSize = size,
-                                        .pCode = code,
-                                    },
-                                    NULL, module));
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
     vkb_free(code);
     return done;
 }

@@ -2,7 +2,6 @@
 // Arguments: a file of modules, each after its number of bytes; how many changes of each; a seed.
 #include "graph/layers.h"
 #include "graph/specialize.h"
-#include "graph/unroll.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -72,19 +71,10 @@ static int read_module(const uint32_t *words, size_t count)
     memset(&constants, 1, sizeof constants);
     const struct vkb_shader shader = {.name = "changed", .code = exact, .size = size};
     const int taken = vkb_specialize(&shader, &constants, &code, &made_size, &error);
-    if (taken) {
-        vkb_unroll(&code, &made_size, &error);
+    if (taken)
         vkb_free(code);
-    }
     if (vkb_layer_shader(&shader, &made, &error))
         vkb_free((void *)made.code);
-    uint32_t *raw = malloc(size);
-    if (!raw)
-        abort();
-    memcpy(raw, words, size);
-    made_size = size;
-    vkb_unroll(&raw, &made_size, &error);
-    vkb_free(raw);
     free(exact);
     return taken;
 }

@@ -1,7 +1,4 @@
-"""Modules whose constants are folded before a driver sees them, and whose loops are unrolled.
-
-csrc/graph/specialize.c and csrc/graph/unroll.c.
-"""
+"""Modules whose constants are folded before a driver sees them: csrc/graph/specialize.c."""
 
 from __future__ import annotations
 
@@ -20,16 +17,12 @@ from tests.core.builds import ROOT, compiler, require_header
 from tests.core.test_spirv import modules
 from tests.exhaustive import examples
 
-CONSTANT, VARIABLE, STORE, ACCESS_CHAIN, LOOP_MERGE = 43, 59, 62, 65, 246
-FUNCTION_STORAGE = 7
+CONSTANT, STORE = 43, 62
 SOURCES = (
     "vulkan/error",
     "vulkan/process",
     "graph/params",
     "graph/specialize",
-    "graph/unroll",
-    "graph/unroll_copy",
-    "graph/unroll_values",
     "graph/module",
     "graph/instructions",
 )
@@ -80,24 +73,6 @@ def specialize(library: ctypes.CDLL) -> Specialize:
 
 
 @pytest.fixture(scope="module")
-def unroll(library: ctypes.CDLL) -> Callable[[bytes], bytes]:
-    """vkb_unroll."""
-    library.vkb_alloc.restype = ctypes.c_void_p
-
-    def call(code: bytes) -> bytes:
-        error = ctypes.create_string_buffer(1 << 14)
-        out = ctypes.c_void_p(library.vkb_alloc(error, len(code), 1))
-        size = ctypes.c_size_t(len(code))
-        ctypes.memmove(out, code, len(code))
-        assert library.vkb_unroll(ctypes.byref(out), ctypes.byref(size), error) & 0xFF
-        unrolled = ctypes.string_at(out, size.value)
-        library.vkb_free(out)
-        return unrolled
-
-    return call
-
-
-@pytest.fixture(scope="module")
 def accepted(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bytes], str]:
     """What spirv-val says of a module: "" if it is valid."""
     validator = shutil.which("spirv-val")
@@ -113,21 +88,14 @@ def accepted(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bytes], str]
     return validate
 
 
-def test_folded_modules_are_valid(
-    specialize: Specialize, unroll: Callable[[bytes], bytes], accepted: Callable[[bytes], str]
-) -> None:
+def test_folded_modules_are_valid(specialize: Specialize, accepted: Callable[[bytes], str]) -> None:
     random = np.random.default_rng(1)
-    unrolled = 0
     for code, _ in modules():
         for _ in range(examples(1)):
             constants = random.choice([0, 1, 2, 3, 4, 8], 40).tolist()
             folded = specialize(code, constants)
             assert accepted(folded) == "", constants
             assert len(folded) < len(code)
-            if (code := unroll(folded)) != folded:
-                assert accepted(code) == "", constants
-                unrolled += 1
-    assert unrolled > 0
 
 
 #: Conditions on two constants, as GLSL and Python write them.
@@ -269,100 +237,3 @@ def test_changed_modules_are_read_within_their_bounds(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     taken, changed = map(int, done.stdout.split())
     assert 0 < taken < changed == 80 * len(small)
-
-
-UNROLLED = """#version 450
-#extension GL_EXT_control_flow_attributes : require
-layout(constant_id = 0) const int A = 0;
-layout(local_size_x = 1) in;
-layout(std430, binding = 0) buffer Values { int values[]; };
-void main()
-{
-    int held[8], last = 7;
-    for (int i = 0; i < A; ++i) // UNROLL
-        held[i] = 1000 * i;
-    for (int i = 0; i < A; ++i) { // UNROLL
-        for (int j = 0; j < i; ++j) // UNROLL
-            if (j % 2 == 1)
-                held[i] += j;
-        if (values[i] > 0)
-            values[i + 10] = held[A - 1 - i] + 1;
-        else
-            values[i + 10] = held[i] + last;
-        last = i;
-    }
-    BODY
-}
-"""
-
-
-def compiled(body: str, folder: Path) -> bytes:
-    """A module of UNROLLED, with variables as values."""
-    source, plain, inlined = (folder / name for name in ("loops.comp", "plain.spv", "inlined.spv"))
-    lines = UNROLLED.replace("BODY", body).splitlines()
-    source.write_text(
-        "\n".join(f"[[unroll]] {line}" if "// UNROLL" in line else line for line in lines)
-    )
-    subprocess.run(["glslangValidator", "-V", "--quiet", source, "-o", plain], check=True)
-    passes = ["--ssa-rewrite", "--eliminate-dead-code-aggressive", "--merge-blocks"]
-    subprocess.run(["spirv-opt", *passes, plain, "-o", inlined], check=True)
-    return inlined.read_bytes()
-
-
-def count(code: bytes, opcode: int, *operands: int) -> int:
-    """The instructions with an opcode, and with these last operands if any are given."""
-    words = np.frombuffer(code, np.uint32)
-    found, position = 0, 5
-    while position < len(words):
-        length = int(words[position]) >> 16
-        last = words[position + length - len(operands) : position + length]
-        found += int(words[position]) & 0xFFFF == opcode and (last == operands).all()
-        position += length
-    return found
-
-
-def test_loops_are_written_iteration_by_iteration(
-    specialize: Specialize,
-    unroll: Callable[[bytes], bytes],
-    accepted: Callable[[bytes], str],
-    tmp_path: Path,
-) -> None:
-    code = compiled("", tmp_path)
-    for a in range(9):
-        expected, last = [], 7
-        held = [1000 * i + sum(j for j in range(i) if j % 2 == 1) for i in range(a)]
-        for i in range(a):
-            # What a later iteration adds comes after this one.
-            other = held[a - 1 - i] if a - 1 - i <= i else 1000 * (a - 1 - i)
-            expected += [other + 1, held[i] + last]
-            last = i
-        unrolled = unroll(specialize(code, [a]))
-        assert accepted(unrolled) == "", a
-        assert count(unrolled, LOOP_MERGE) == 0
-        assert count(unrolled, VARIABLE, FUNCTION_STORAGE) == 0
-        assert stored(unrolled) == expected
-
-
-#: What comes in a module after loops that could be unrolled.
-STAYING = {
-    "not asked for": "for (int i = 0; i < A; ++i) values[i] = i;",
-    "unknown end": "for (int i = 0; i < values[9]; ++i) // UNROLL\nvalues[i] = i;",
-    "break": "for (int i = 0; i < A; ++i) { // UNROLL\nif (values[i] > 3) break; values[i] = 1; }",
-    "continue": (
-        "for (int i = 0; i < A; ++i) { // UNROLL\nif (values[i] > 3) continue; values[i] = 1; }"
-    ),
-    "stored under a condition": "if (values[20] > 3) held[1] = 3; values[21] = held[1];",
-    "never stored": "int other[4]; other[1] = 3; values[21] = other[2];",
-    "unknown place": "values[21] = held[values[20]];",
-    "beyond the end": "values[21] = held[A + 6];",
-    "the whole array": "int other[8] = held; values[21] = other[1];",
-    "another instruction": "atomicAdd(values[21], 1);",
-}
-
-
-@pytest.mark.parametrize("body", STAYING.values(), ids=STAYING)
-def test_other_modules_stay(
-    body: str, specialize: Specialize, unroll: Callable[[bytes], bytes], tmp_path: Path
-) -> None:
-    folded = specialize(compiled(body, tmp_path), [3])
-    assert unroll(folded) == folded
