@@ -21,7 +21,7 @@ _DEFAULT = Probe()
 LEVELS: Final = (0.5, 0.1, 0.01)
 #: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
 SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05}
-# A contour nearer to its middle, in pixels, is a few pixels, which are never round.
+# Contours nearer to their middle, in pixels, are a few pixels, which are never round.
 _LEAST_RADIUS: Final = 3.0
 _ANGLES: Final = 90
 _SQUARE: Final = 16
@@ -32,8 +32,9 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     """Return how far from circles the contours of the point spread are.
 
     For each of 1/2, 1/10 and 1/100 of the peak: the greatest distance of the contour from the
-    centroid, divided by the smallest. 1 is a circle, 1.41 a square. Contours that are nearer than
-    three pixels, or that leave the image, are not in the result.
+    centroid, divided by the smallest. 1 is a circle, 1.41 a square. Distances below three pixels
+    count as three. Contours that are nearer everywhere, or that leave the image, are not in the
+    result.
 
     Parameters
     ----------
@@ -68,7 +69,9 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     most = min(x, y, plane.shape[1] - 1 - x, plane.shape[0] - 1 - y)
     steps = np.arange(0.0, most, 0.125)
     angles = np.arange(_ANGLES) * (2 * math.pi / _ANGLES)
-    rays = _bilinear(plane, x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps))
+    rays = _bilinear(
+        plane, x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps)
+    )
     found = {}
     for level in LEVELS:
         above = rays >= level * peak
@@ -77,8 +80,8 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
         last = len(steps) - 1 - above[:, ::-1].argmax(axis=1)
         inner, outer = (rays[np.arange(_ANGLES), last + i] for i in (0, 1))
         radii = steps[last] + 0.125 * (inner - level * peak) / np.maximum(inner - outer, 1e-300)
-        if radii.min() >= _LEAST_RADIUS:
-            found[level] = float(radii.max() / radii.min())
+        if radii.max() >= _LEAST_RADIUS:
+            found[level] = float(radii.max() / max(radii.min(), _LEAST_RADIUS))
     return found
 
 
@@ -152,12 +155,14 @@ def assert_sizes(
     __tracebackhide__ = True
     allowed = SIZE_LIMITS | (limits or {})
     width, height = (_beside(side) for side in probe.size)
-    base = _square_figures(bloom, dataclasses.replace(probe, size=(width, height)))
+    # At the same pixels in all sizes, since a chain of halved images spreads each differently.
+    at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
+    base = _square_figures(bloom, dataclasses.replace(probe, size=(width, height)), at)
     law = "the bloom of a square does not depend on whether the size is a multiple of 16"
     told: dict[str, str] = {}
     for step in (-3, -2, -1, 1, 2, 3):
         size = (width + step, height + step)
-        found = _square_figures(bloom, dataclasses.replace(probe, size=size))
+        found = _square_figures(bloom, dataclasses.replace(probe, size=size), at)
         off = {
             "width": abs(found[0] - base[0]) / base[0] if base[0] > 0 else 0.0,
             "energy": abs(found[1] - base[1]) / base[1],
@@ -180,11 +185,13 @@ def _beside(side: int) -> int:
     return 16 * (multiple - (multiple & (multiple - 1) == 0))
 
 
-def _square_figures(bloom: Bloom, probe: Probe) -> tuple[float, float, float, float]:
+def _square_figures(
+    bloom: Bloom, probe: Probe, at: tuple[int, int]
+) -> tuple[float, float, float, float]:
     """Return width, energy, and the shift along x and y of the bloom of a square."""
     __tracebackhide__ = True
     image = probe.flat(0.0)
-    left, top = ((side - _SQUARE) // 2 for side in probe.size)
+    left, top = at
     image[top : top + _SQUARE, left : left + _SQUARE] = probe.value
     lit = (probe.apply(bloom, image)[0] - probe.apply(bloom, probe.flat(0.0))[0]).mean(axis=2)
     energy = float(lit.sum())

@@ -237,7 +237,9 @@ def assert_history(
     figure("frames", float(sum(share > allowed["stays"] for share in left)))
     told = []
     if not is_within(law, steady, allowed["steady"], "steady"):
-        told.append(f"the bloom of an image that stays the same changes by {steady:.3g} of its mean")
+        told.append(
+            f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
+        )
     if not is_within(law, left[0], allowed["stays"], "stays"):
         told.append(
             f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "

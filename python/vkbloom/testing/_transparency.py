@@ -89,8 +89,7 @@ def _colours_alike(
     _judge(law, found[..., :3] - opaque[..., :3], colours.max(), limit, "")
     # A picture contains its image; the bloom alone has another light, or no alpha of its own.
     is_picture = found.shape[2] == 4 and bool(
-        (found[..., :3] >= colours - limit * colours.max()).all()
-        and np.ptp(found[..., 3]) > 0
+        (found[..., :3] >= colours - limit * colours.max()).all() and np.ptp(found[..., 3]) > 0
     )
     return found, is_picture
 
