@@ -17,6 +17,7 @@ import pytest
 
 from tests.core.builds import compiler, core_with_faults, succeed
 from tests.exhaustive import some
+from tests.processes import output
 
 # Its levels are not exactly twice as large as the next, for which the shaders have variants.
 IMAGE = """
@@ -45,6 +46,7 @@ class Mutation:
     test: str
     equal: tuple[str, ...]  # before the change, or beside it
     different: tuple[str, ...]  # the first one is what the mutated pass writes
+    cases: str  # of the self-test, one of which is in this variant
 
 
 MUTATIONS = {
@@ -57,6 +59,7 @@ MUTATIONS = {
         test=IMAGE.format(settings="Pyramid(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),
+        cases=": pyramid, ",
     ),
     # In the horizontal pass of two, the second tap to each side is read where the third one is.
     "tap moved by one": Mutation(
@@ -67,6 +70,7 @@ MUTATIONS = {
         test=IMAGE.format(settings="Separable()"),
         equal=("glow", "blur_vertical"),
         different=("bloom", "final"),
+        cases=": tutorial, ",
     ),
     "missing half-texel": Mutation(
         shader="kawase_up.frag",
@@ -78,6 +82,7 @@ MUTATIONS = {
         test=IMAGE.format(settings="DualKawase(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),
+        cases=": dual-kawase, ",
     ),
     # In the vertical pass of two, of a scene.
     "rows flipped": Mutation(
@@ -88,6 +93,7 @@ MUTATIONS = {
         test=SCENE,
         equal=("glow", "glow_depth", "scene", "depth"),
         different=("blur_vertical", "bloom", "final"),
+        cases=": tutorial, ",
     ),
 }
 
@@ -112,6 +118,16 @@ def build_changed(module, target):
 
 setup.build_module = build_changed
 setup.write_spirv(setup.processes())
+"""
+
+
+# Prints what some cases of the self-test find.
+SELF_TEST = """
+import json, sys
+from vkbloom._doctor import self_test
+told = [one for one in self_test.run("software", sys.argv[1]) if "group" in one]
+assert len(told) > 3, told
+print(json.dumps({f"{one['group']}: {one['name']}": one["wrong"] for one in told if one["wrong"]}))
 """
 
 
@@ -171,3 +187,11 @@ def test_is_found_and_named(
         mutation.different, "failed"
     )
     assert f"</a>: <strong>{first}</strong>" in (report / "index.html").read_text()
+
+    # On this device, whose other variants are right.
+    monkeypatch.delenv("VKBLOOM_VARIANT")
+    wrong = json.loads(output("-c", SELF_TEST, mutation.cases, cwd=mutant))
+    assert len(wrong) == 1, wrong
+    (case,) = wrong
+    assert case.startswith("fragment shaders: ")
+    assert f"; written by {mutation.shader.replace('.', '_')} (fragment)" in wrong[case]

@@ -16,6 +16,7 @@ EXCEPTIONS: Final[dict[str, dict[str, str]]] = {
         "test_values_that_are_not_finite[fragment-float16]": _INFINITY,
         "test_values_that_are_not_finite[cpu-float16]": _INFINITY,
         "test_values_that_are_not_finite[gpu-float16]": _INFINITY,
+        "NaN and infinity: pyramid, float16": _INFINITY,
         "test_lines_that_shared_memory_cannot_hold": _SIDES,
         **{
             f"test_huge_colours[{tonemap}-{encoding}]": _POWER

@@ -1,4 +1,7 @@
-"""Every method, format and size of `apply` against `vkbloom.reference`, and on flat images."""
+"""Every method and size of `apply` against `vkbloom.reference`, and on flat images.
+
+Formats, presets and last passes are cases of the self-test (tests/device/test_self_test.py).
+"""
 
 from __future__ import annotations
 
@@ -11,22 +14,21 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns, some
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS, presets_of_low_levels
+from tests.methods.cases import DTYPES, METHODS
 from tests.tolerance import (
-    FORMATS,
     assert_close,
     assert_matches_reference,
     real,
     tolerance,
 )
 from vkbloom import (
-    Convolution,
     Renderer,
     Separable,
     Settings,
     presets,
     reference,
 )
+from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
 
 Image = NDArray[Any]
 
@@ -59,22 +61,6 @@ def test_reference_of_a_large_image(renderer: Renderer) -> None:
     size = (1920, 1080) if EXHAUSTIVE else (640, 360)
     image = hdr_picture(*size, 3, "float16")
     settings = METHODS["pyramid-firefly"].replace(bloom_scale=0.5)
-    assert_matches_reference(renderer.apply(image, settings), image, settings)
-
-
-@pytest.mark.parametrize(
-    ("method", "dtype", "format"),
-    by_turns(
-        ["tutorial", "loops-layers", "knee", "direct", "pyramid-firefly", "dual-kawase"],
-        DTYPES,
-        turns=FORMATS.values(),
-    ),
-)
-def test_format_of_the_bloom_buffers(
-    renderer: Renderer, method: str, dtype: str, format: Any
-) -> None:
-    image = hdr_picture(45, 30, 4, dtype)
-    settings = METHODS[method].replace(format=format)
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
@@ -119,28 +105,6 @@ def test_no_settings_are_bevys(renderer: Renderer) -> None:
     assert_matches_reference(frames, image, Separable())
 
 
-LOW = presets_of_low_levels(64)
-
-
-# (Convolutions have tests of their own, as Blender's fog glow has among the engines' frames: a
-# transform's error is relative to the largest value.)
-@pytest.mark.parametrize(
-    ("name", "dtype"),
-    by_turns(
-        [
-            name
-            for name in presets
-            if not isinstance(presets[name], Convolution) and name != "blender_fog_glow"
-        ],
-        turns=DTYPES,
-    ),
-)
-def test_presets(renderer: Renderer, name: str, dtype: str) -> None:
-    image = hdr_picture(61, 43, 3, dtype)
-    settings = presets[name] if EXHAUSTIVE else LOW[name]
-    assert_matches_reference(renderer.apply(image, settings), image, settings)
-
-
 @pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=DTYPES))
 def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -> None:
     settings = METHODS[method].replace(threshold=None)
@@ -179,10 +143,6 @@ def test_white_is_not_above_a_threshold_of_one(renderer: Renderer) -> None:
 
 # --- Composite, exposure, tone map, encoding ---
 
-COMPOSITES = ("add", "mix", "screen")
-TONEMAPS = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
-ENCODINGS = ("none", "gamma22", "srgb", "pq", "hlg")
-
 
 def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:
     """Compare final with what the reference makes of the renderer's own bloom."""
@@ -197,24 +157,6 @@ def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> No
 def bright(dtype: str) -> Image:
     values = 0.1 + 0.8 * np.random.default_rng(3).random((14, 19, 4))
     return np.rint(255 * values).astype(np.uint8) if dtype == "uint8" else values.astype(dtype)
-
-
-@pytest.mark.parametrize(
-    ("composite", "tonemap", "encoding", "dtype"),
-    [
-        (composite, tonemap, encoding, dtype)
-        for tonemap, encoding, (composite, dtype) in by_turns(
-            TONEMAPS, ENCODINGS, turns=itertools.product(COMPOSITES, DTYPES)
-        )
-    ],
-)
-def test_composite_tonemap_and_encoding(
-    renderer: Renderer, composite: Any, tonemap: Any, encoding: Any, dtype: str
-) -> None:
-    settings = Separable(
-        composite=composite, tonemap=tonemap, encoding=encoding, intensity=0.3, exposure=0.5
-    )
-    assert_composite(renderer, bright(dtype), settings)
 
 
 @pytest.mark.parametrize("composite", COMPOSITES)

@@ -3,37 +3,102 @@
 from __future__ import annotations
 
 import json
-from typing import Final
+import time
+from pathlib import Path
+from typing import Any, Final
 
 import click
+from tqdm import tqdm
 
 import vkbloom
-from vkbloom._doctor import examine
+from vkbloom._cli.device_options import adapter_option
+from vkbloom._cli.terminal import hides_progress, say
+from vkbloom._doctor import examine, self_test
 
 _COLOURS: Final = {"ok": "green", "note": "yellow", "problem": "red"}
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print one object with all findings.")
-def command(as_json: bool) -> int:
+@click.option(
+    "--self-test",
+    "compares",
+    is_flag=True,
+    help="Compare about 200 cases with the reference on this device instead, in about a minute. "
+    "Please attach the output of --json to a report.",
+)
+@adapter_option
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=False,
+    flag_value="-",
+    metavar="[FILE]",
+    help="Print one object with all findings; with a file, write it there and print the table.",
+)
+def command(compares: bool, adapter: str, as_json: str | None) -> int:
     """Check whether this machine can render, and explain what prevents it.
 
     Examines the Vulkan loader, its drivers and layers, the adapters, the caches and the optional
     packages. Renders a small test scene on each adapter and checks the result. The exit status is
     1 if no adapter renders it correctly.
+
+    With --self-test, it renders with every method, format and kind of derivative on one adapter.
+    The exit status is 1 if a value is farther from the reference than the documentation allows.
     """
-    findings, can_render = examine()
-    if as_json:
-        found = {"version": vkbloom.__version__, "can_render": can_render}
-        found["findings"] = [finding._asdict() for finding in findings]
-        click.echo(json.dumps(found, indent=2))
+    found = _compared(adapter) if compares else _examined()
+    text = json.dumps(found, indent=2)
+    if as_json == "-":
+        click.echo(text)
     else:
-        for finding in findings:
-            status = click.style(f"{finding.status:9}", _COLOURS[finding.status])
-            click.echo(f"{status}{finding.topic:30}  {finding.found}")
-            if finding.advice:
-                click.echo(f"{'':41}-> {finding.advice}")
-        able = "can render" if can_render else "cannot render"
-        problems = sum(finding.status == "problem" for finding in findings)
-        click.echo(f"\nThis machine {able}. Problems found: {problems}.")
-    return 0 if can_render else 1
+        (_show_groups if compares else _show_findings)(found)
+    if as_json not in (None, "-"):
+        Path(as_json).write_text(f"{text}\n", encoding="utf-8")
+        say(f"wrote {as_json}")
+    return 0 if found["passed" if compares else "can_render"] else 1
+
+
+def _examined() -> dict[str, Any]:
+    findings, can_render = examine()
+    entries = [finding._asdict() for finding in findings]
+    return {"version": vkbloom.__version__, "can_render": can_render, "findings": entries}
+
+
+def _show_findings(found: dict[str, Any]) -> None:
+    for finding in found["findings"]:
+        status = click.style(f"{finding['status']:9}", _COLOURS[finding["status"]])
+        click.echo(f"{status}{finding['topic']:30}  {finding['found']}")
+        if finding["advice"]:
+            click.echo(f"{'':41}-> {finding['advice']}")
+    able = "can render" if found["can_render"] else "cannot render"
+    problems = sum(finding["status"] == "problem" for finding in found["findings"])
+    click.echo(f"\nThis machine {able}. Problems found: {problems}.")
+
+
+def _compared(adapter: str) -> dict[str, Any]:
+    start, told = time.perf_counter(), []
+    with tqdm(unit="case", leave=False, disable=hides_progress()) as bar:
+        for one in self_test.run(adapter):
+            told.append(one)
+            bar.total = one.get("count", bar.total)
+            bar.update("group" in one)
+    return self_test.report(adapter, told, time.perf_counter() - start)
+
+
+def _show_groups(found: dict[str, Any]) -> None:
+    if found["device"]:
+        click.echo(vkbloom.AdapterInfo(**found["device"]).summary)
+    click.echo(f"\n{'group':18}{'cases':>6}{'wrong':>6}{'error':>10}{'allowed':>10}{'seconds':>9}")
+    for group in found["groups"]:
+        error, allowed = (
+            "" if group[name] is None else f"{group[name]:.2g}"
+            for name in ("largest_error", "allowed")
+        )
+        line = f"{group['name']:18}{group['cases']:6}{group['wrong']:6}{error:>10}{allowed:>10}"
+        click.secho(f"{line}{group['seconds']:9.1f}", fg="red" if group["wrong"] else None)
+    for one in found["wrong"]:
+        click.echo(f"\nwrong: {one['group']}: {one['name']}\n       {one['wrong']}")
+    for line in found["unknown"]:
+        click.echo(f"\nnot known: {line}")
+    click.echo(
+        f"\n{found['cases']} cases in {found['seconds']:.0f} s, wrong: {len(found['wrong'])}."
+    )

@@ -1,0 +1,165 @@
+"""Compare this device with `vkbloom.reference` in about 200 cases: ``vkbloom doctor --self-test``.
+
+They run in a child process, so that a driver's crash is told with the case in which it came.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any, Final
+
+import vkbloom
+from vkbloom._doctor.cases import Case, cases
+from vkbloom._doctor.deviations import Deviation
+
+PROGRAM = ("-m", "vkbloom._doctor.self_test")
+_MARK: Final = "vkbloom-case "
+#: What the tests have drawn with, by parts of the driver's name and of its version.
+DRAWN: Final = {
+    "llvmpipe": ("Mesa 22.3.6", "Mesa 25.0.7"),
+    "SwiftShader": ("SwiftShader",),
+    "NVIDIA": ("580.",),
+}
+
+
+def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
+    """Yield a report of the device, then one of each case; `only`: a part of the cases' names."""
+    command = [sys.executable, *PROGRAM, adapter, only]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, errors="replace"
+    ) as child:
+        running = {"group": "device", "name": adapter}
+        assert child.stdout is not None
+        for line in child.stdout:
+            if line.startswith(_MARK):
+                told = json.loads(line.removeprefix(_MARK))
+                running = told.pop("next", running)
+                if told:
+                    yield told
+    if child.returncode:
+        wrong = f"the process ended with status {child.returncode}; its errors are printed above"
+        yield running | {"wrong": wrong}
+
+
+def report(adapter: str, told: list[dict[str, Any]], seconds: float) -> dict[str, Any]:
+    """Return what `run` told as one object, to be written as JSON."""
+    device: dict[str, Any] = next(
+        (one for one in told if "device" in one), {"device": None, "unknown": []}
+    )
+    done = [one for one in told if "device" not in one]
+    groups = []
+    for name in dict.fromkeys(one["group"] for one in done):
+        group = [one for one in done if one["group"] == name]
+        worst = max(group, key=lambda one: one.get("share", 0.0))
+        groups.append(
+            {
+                "name": name,
+                "cases": len(group),
+                "wrong": sum(bool(one["wrong"]) for one in group),
+                "largest_error": worst.get("off"),
+                "allowed": worst.get("allowed"),
+                "worst": worst["name"],
+                "seconds": sum(one.get("seconds", 0.0) for one in group),
+            }
+        )
+    wrong = [{key: one[key] for key in ("group", "name", "wrong")} for one in done if one["wrong"]]
+    return {
+        "self_test": 1,
+        "version": vkbloom.__version__,
+        "platform": platform.platform(),
+        "adapter": adapter,
+        "device": device["device"],
+        "unknown": device["unknown"],
+        "passed": bool(done) and not wrong,
+        "cases": len(done),
+        "seconds": seconds,
+        "groups": groups,
+        "wrong": wrong,
+    }
+
+
+def unknown(info: vkbloom.AdapterInfo) -> list[str]:
+    """Return what no test of vkbloom has drawn with before."""
+    versions = next(
+        (known for name, known in DRAWN.items() if name in f"{info.driver} {info.name}"), ()
+    )
+    if not versions:
+        return [f"driver: {info.driver or info.name} has not been tried; {', '.join(DRAWN)} have"]
+    if any(version in f"{info.driver_info} {info.driver}" for version in versions):
+        return []
+    tried = " and ".join(versions)
+    return [f"driver: version {info.driver_info} has not been tried; {tried} have"]
+
+
+class _Renderers(contextlib.ExitStack):
+    """An open renderer of each set of variants; adapters that lack one have none."""
+
+    def __init__(self, adapter: str) -> None:
+        super().__init__()
+        self.adapter = adapter
+        self.opened: dict[str, vkbloom.Renderer] = {}
+
+    def get(self, variant: str) -> vkbloom.Renderer:
+        if variant not in self.opened:
+            if variant != "auto":
+                os.environ["VKBLOOM_VARIANT"] = variant
+            self.opened[variant] = self.enter_context(vkbloom.Renderer(self.adapter))
+        return self.opened[variant]
+
+
+def judge(case: Case, renderer: vkbloom.Renderer) -> dict[str, Any]:
+    """Run a case; return its error of the largest share of what is allowed, and its time."""
+    start = time.perf_counter()
+    worst = Deviation("", 0.0, 0.0)
+    try:
+        for found in case.check(renderer):
+            worst = max(worst, found, key=lambda one: one.share)
+            if found.wrong:
+                # The first one in the order of the data flow: later ones follow from it.
+                worst = found
+                break
+    except Exception as error:
+        # Of the driver, or of what the driver made vkbloom do.
+        worst = Deviation("", 0.0, 0.0, f"{type(error).__name__}: {error}")
+    return {
+        "group": case.group,
+        "name": case.name,
+        "off": worst.off if worst.off == worst.off else None,
+        "allowed": worst.allowed,
+        "share": min(worst.share, 1e9),
+        "wrong": worst.wrong,
+        "seconds": time.perf_counter() - start,
+    }
+
+
+def _tell(**told: Any) -> None:
+    # A driver may have printed without a line's end.
+    print(f"\n{_MARK}{json.dumps(told)}", flush=True)
+
+
+def main() -> None:
+    """Run the cases on the adapter that the command line names."""
+    adapter, only = sys.argv[1:]
+    chosen = [case for case in cases() if only in f"{case.group}: {case.name}"]
+    with _Renderers(adapter) as renderers:
+        try:
+            info = renderers.get("auto").info
+        except (vkbloom.Error, ValueError, OSError) as error:
+            _tell(group="device", name=adapter, wrong=f"{type(error).__name__}: {error}")
+            return
+        _tell(device=dataclasses.asdict(info), unknown=unknown(info), count=len(chosen))
+        for case in chosen:
+            _tell(next={"group": case.group, "name": case.name})
+            _tell(**judge(case, renderers.get(case.variant)))
+
+
+if __name__ == "__main__":
+    main()
