@@ -14,7 +14,7 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import measuring
+from vkbloom.testing._deviations import NotTaken, measuring
 from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import Subject, fitting_probe
@@ -47,6 +47,8 @@ class LawRow:
         The assertion's message, or the reason why it could not be tested; empty if the law holds.
     why : str
         Why a bloom that is no fault may break the law.
+    applies : bool
+        Whether the bloom takes what the law needs, such as a region or alpha.
     """
 
     name: str
@@ -57,6 +59,7 @@ class LawRow:
     law: str
     message: str
     why: str
+    applies: bool = True
 
     @property
     def words(self) -> str:
@@ -96,7 +99,7 @@ class LawReport:
     required: tuple[str, ...] = ()
 
     def assert_held(self, *names: str) -> None:
-        """Assert that the laws of these names hold; without a name, all of them.
+        """Assert that the laws of these names hold; without a name, all that apply to the bloom.
 
         Parameters
         ----------
@@ -112,7 +115,9 @@ class LawReport:
         __tracebackhide__ = True
         known = {row.name: row for row in self.rows}
         try:
-            chosen = [law_name(name, known) for name in names] or list(known)
+            chosen = [law_name(name, known) for name in names] or [
+                name for name, row in known.items() if row.applies
+            ]
         except ValueError as error:
             raise ValueError(f"names: {error}") from None
         broken = [known[name] for name in chosen if not known[name].held]
@@ -249,7 +254,7 @@ def law_report(
 
 def _row(law: Law, subject: Subject) -> LawRow:
     """Test a law."""
-    message, why = "", law.why
+    message, why, applies = "", law.why, True
     held: bool | None = True
     # NaN and infinity among the test images are no fault of the caller's arithmetic.
     with measuring() as found, np.errstate(all="ignore"):
@@ -261,7 +266,7 @@ def _row(law: Law, subject: Subject) -> LawRow:
                 why = law.explain(subject, why)
         except (TypeError, ValueError) as error:
             # Not of the bloom itself: report has called it before.
-            message, held = str(error), None
+            message, held, applies = str(error), None, not isinstance(error, NotTaken)
     limited = [one for one in found if not math.isinf(one.allowed)] if held is not None else []
     worst = max(limited, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
     figures: dict[str, float] = {}
@@ -276,4 +281,5 @@ def _row(law: Law, subject: Subject) -> LawRow:
         law=worst.law if worst else law.formula,
         message=message,
         why=why,
+        applies=applies,
     )

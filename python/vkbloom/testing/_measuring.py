@@ -71,7 +71,8 @@ def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
     """Return the colours of a framebuffer as a function of the image."""
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        return renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer][..., :3]
+        found = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
+        return found[..., : image.shape[2]]
 
     return bloom
 

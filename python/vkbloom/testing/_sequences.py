@@ -290,7 +290,7 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     contrast = (amplitudes / np.maximum(mean, 1e-3 * largest)).max(axis=(1, 2))
     return Flicker(
         jod=_jod(lights, fps),
-        frequencies=np.fft.rfftfreq(count, 1 / fps)[1:],
+        frequencies=np.asarray(np.fft.rfftfreq(count, 1 / fps)[1:], np.float64),
         contrast=contrast,
     )
 

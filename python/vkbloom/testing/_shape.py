@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -128,7 +129,7 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
 
 @checked
 def assert_sizes(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: dict[str, float] | None = None
+    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a bloom is nearly the same in images whose sizes differ by a few pixels.
 
@@ -153,7 +154,7 @@ def assert_sizes(
         `bloom` is not such a callable.
     """
     __tracebackhide__ = True
-    allowed = SIZE_LIMITS | (limits or {})
+    allowed = SIZE_LIMITS | dict(limits or {})
     width, height = (_beside(side) for side in probe.size)
     # At the same pixels in all sizes, since a chain of halved images spreads each differently.
     at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
@@ -200,9 +201,9 @@ def _square_figures(
     variance, shifts = 0.0, []
     for axis, first in ((0, left), (1, top)):
         profile = lit.sum(axis=axis) / energy
-        at = np.arange(len(profile)) - (first + (_SQUARE - 1) / 2)
-        shifts.append(float(profile @ at))
-        variance += float(profile @ (at - shifts[-1]) ** 2) - (_SQUARE**2 - 1) / 12
+        places = np.arange(len(profile)) - (first + (_SQUARE - 1) / 2)
+        shifts.append(float(profile @ places))
+        variance += float(profile @ (places - shifts[-1]) ** 2) - (_SQUARE**2 - 1) / 12
     figure("squared_width", variance)
     return math.sqrt(max(variance, 0.0)), energy, shifts[0], shifts[1]
 
