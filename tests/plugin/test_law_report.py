@@ -49,7 +49,7 @@ def row(report: LawReport, name: str) -> LawRow:
 
 
 def broken(report: LawReport) -> list[str]:
-    return [each.name for each in report.rows if not each.held]
+    return [each.name for each in report.rows if each.applies and not each.held]
 
 
 def test_a_gaussian() -> None:
@@ -115,7 +115,7 @@ FAULTS: dict[str, tuple[Bloom, Bloom, set[str]]] = {
     "every other pixel": (
         every_other_pixel,
         lambda a: gaussian(a, 4.0),
-        {*OF_A_GRID, "stability", "energy"},
+        {*OF_A_GRID, "stability", "energy", "border", "jitter"},
     ),
 }
 
@@ -125,7 +125,8 @@ def test_a_fault_is_named(name: str) -> None:
     fault, twin, laws = FAULTS[name]
     found, right = (testing.report(bloom, size=(64, 64)) for bloom in (fault, twin))
     new = set(broken(found)) - set(broken(right))
-    assert new - {"bounded_fireflies"} == laws, found
+    # Some of these functions mix alpha with colours, too.
+    assert new - {"bounded_fireflies", "alpha"} == laws, found
 
 
 PACKAGES: dict[str, Callable[[Any, Image, float], Image]] = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import fail, figure, is_within
+from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
 from vkbloom.testing._point_spread import point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
 
@@ -113,7 +113,7 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     check_number("limit", limit, 1.0, math.inf)
     found = roundness(bloom, probe)
     if not found:
-        raise ValueError(
+        raise NotTaken(
             "probe: no contour is inside of the image and three pixels from the middle"
         )
     law = "the contours of the bloom of a pixel are circles"

@@ -47,8 +47,8 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
     """
     __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)
-    if probe.dtype.kind == "u":
-        raise NotTaken(f"probe: {probe.dtype} clamps a sum of picture and glow at 1")
+    if probe.dtype.kind == "u" or probe.colours < 3:
+        raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
     glow, is_picture = _colours_alike(bloom, probe, *_lights(probe, (1.0, 0.5)), limit)
     if not is_picture:
         return
