@@ -1,4 +1,4 @@
-"""Faults of blooms that people have reported, each with a correct twin and the law that names it."""
+"""Faults of blooms that people have reported, each with a correct twin and the law it breaks."""
 
 from __future__ import annotations
 

@@ -61,6 +61,8 @@ def test_a_gaussian() -> None:
     assert found.gain == pytest.approx(1)
     found.assert_held("superposition", "gain", "symmetric", "centroid_kept", "separable")
     for each in found.rows:
+        if not each.applies:
+            continue
         assert each.held == (each.off <= each.limit)
         assert bool(each.message) == (not each.held)
         assert each.figures[max(each.figures, key=lambda name: each.figures[name] == each.off)] >= 0
@@ -130,8 +132,8 @@ def test_a_fault_is_named(name: str) -> None:
 
 
 PACKAGES: dict[str, Callable[[Any, Image, float], Image]] = {
-    "scipy.ndimage": lambda ndi, a, s: ndi.gaussian_filter(a, (s, s, 0)),
-    "cv2": lambda cv2, a, s: cv2.GaussianBlur(a, (0, 0), s),
+    "scipy.ndimage": lambda ndi, a, s: ndi.gaussian_filter(a, (s, s, 0), mode="nearest"),
+    "cv2": lambda cv2, a, s: cv2.GaussianBlur(a, (0, 0), s, borderType=cv2.BORDER_REPLICATE),
     "skimage.filters": lambda filters, a, s: filters.gaussian(a, s, channel_axis=-1),
 }
 
@@ -275,7 +277,11 @@ def test_images_of_grey_have_no_laws_of_colour() -> None:
     probe = Probe(size=(32, 32), channels=None, dtype="uint8")
     found = testing.report(lambda image: image, probe=probe)
     untested = [each.name for each in found.rows if each.held is None]
-    assert untested == ["bounded_fireflies", "unclamped", "colour", "grey", "channels", "finite"]
+    of_colours = ["colour", "grey", "channels"]
+    assert untested == [
+        *("bounded_fireflies", "unclamped", *of_colours),
+        *("views", "round", "alpha", "finite"),
+    ]
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "float16"])

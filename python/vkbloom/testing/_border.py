@@ -22,7 +22,7 @@ _DEFAULT = Probe()
 BORDER_LIMITS: Final = {
     "stale": 1e-3,
     "wrap": 0.01,
-    "inside": 0.04,
+    "inside": 0.025,
     "edge": 2.0,
     "corner": 3.0,
     "lost": 0.05,
@@ -263,7 +263,7 @@ def _near(bloom: Bloom, probe: Probe, dark: Image) -> dict[str, tuple[int, int]]
         profile = np.abs(spread.mean(axis=2)).sum(axis=axis)
         variance = profile @ (np.arange(side) - probe.centre[axis] - _LIGHT // 2) ** 2
         deviation = math.sqrt(float(variance / profile.sum())) if energy > 0 else 0.0
-        near.append(round(min(max(1.5 * deviation - _LIGHT // 2, 1), side // 4)))
+        near.append(min(max(math.ceil(1.5 * deviation) - _LIGHT // 2, 1), side // 4))
     return {"left": (near[0], probe.centre[1]), "top": (probe.centre[0], near[1])}
 
 

@@ -113,9 +113,7 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     check_number("limit", limit, 1.0, math.inf)
     found = roundness(bloom, probe)
     if not found:
-        raise NotTaken(
-            "probe: no contour is inside of the image and three pixels from the middle"
-        )
+        raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
     told = [
         f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction as in "
