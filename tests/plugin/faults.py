@@ -77,7 +77,8 @@ def off_at_odd_sizes(image: Image) -> Image:
 def halved(image: Image) -> Image:
     height, width, channels = image.shape
     even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    return even.reshape((height + 1) // 2, 2, (width + 1) // 2, 2, channels).mean((1, 3))
+    boxes = even.reshape((height + 1) // 2, 2, (width + 1) // 2, 2, channels)
+    return np.asarray(boxes.mean((1, 3)))
 
 
 def doubled(image: Image, shape: tuple[int, ...]) -> Image:
@@ -86,7 +87,7 @@ def doubled(image: Image, shape: tuple[int, ...]) -> Image:
 
 
 def above_one(image: Image) -> Image:
-    return image * (image.max(axis=2, keepdims=True) > 1)
+    return np.asarray(image * (image.max(axis=2, keepdims=True) > 1))
 
 
 def box(image: Image, side: int = 13) -> Image:
@@ -166,7 +167,8 @@ def at_present(image: Image, *, time: float | None = None) -> Image:
 
 
 def strobing(image: Image, *, time: float | None = None) -> Image:
-    return gaussian(image) * (1 + 0.5 * np.sign(np.sin(2 * np.pi * 10 * (time or 0) + 0.1)))
+    share = 1 + 0.5 * np.sign(np.sin(2 * np.pi * 10 * (time or 0) + 0.1))
+    return np.asarray(gaussian(image) * share)
 
 
 _keeps = picture(lambda alpha, _: alpha, of_colours)
