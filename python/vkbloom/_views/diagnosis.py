@@ -106,7 +106,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
 
     A cause is named only if it explains every value: within one level of the coarser integer type,
     within 0.4 % for floats, and so that at most half of the difference remains. For a shift, a
-    tenth of the difference may remain, as its interpolation is unknown.
+    tenth of the difference may remain, as its interpolation is unknown; it needs scikit-image.
 
     Parameters
     ----------
