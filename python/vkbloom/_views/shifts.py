@@ -53,9 +53,10 @@ def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None
         moved = ndimage.shift(part_a, shift, order=1, mode="grid-wrap")
         return _rms((moved - part_b)[inner])
 
-    y, x = optimize.minimize(
+    best = optimize.minimize(
         difference, start, method="Nelder-Mead", options={"xatol": 5e-3, "fatol": 0.0}
-    ).x
+    )
+    y, x = map(float, best.x)
     shifts = {(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS} | {(x, y)}
     explained = [
         (residual, shift)
