@@ -23,8 +23,8 @@ _REMAINS: Final = 0.1
 _REMAINS_OF_WHOLE: Final = 0.02
 _WINDOW: Final = 512  # pixels; the side of the part in which a shift is searched
 _LONGEST: Final = 0.25  # of the image's side
-# Whole shifts, quarters and eighths are tried, too: the estimate is less exact than its judgement.
-_PARTS: Final = (1, 4, 8)
+# Shifts by quarters and eighths are tried, too: the estimate is less exact than its judgement.
+_PARTS: Final = (4, 8)
 
 
 def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None:
@@ -57,19 +57,18 @@ def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None
         difference, start, method="Nelder-Mead", options={"xatol": 5e-3, "fatol": 0.0}
     )
     y, x = map(float, best.x)
-    shifts = {(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS} | {(x, y)}
-    explained = [
-        (residual, shift)
-        for shift in sorted(shifts)
-        if max(map(abs, shift)) >= MIN_SHIFT
-        and max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _LONGEST
-        and (residual := _residual(a[window], b[window], shift, step)) is not None
-    ]
-    if not explained:
-        return None
-    _, shift = min(explained)
-    found = _residual(a, b, shift, step)
-    return None if found is None else (shift, found)
+    rounded = [(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS]
+    for shift in dict.fromkeys((*rounded, (x, y))):
+        is_short = max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _LONGEST
+        # Most pairs are refused by a part of them.
+        if (
+            is_short
+            and max(map(abs, shift)) >= MIN_SHIFT
+            and _residual(a[window], b[window], shift, step) is not None
+            and (residual := _residual(a, b, shift, step)) is not None
+        ):
+            return shift, residual
+    return None
 
 
 def _brightest_window(image: _Image) -> tuple[slice, slice]:
