@@ -16,8 +16,11 @@ from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
 from vkbloom._io import safe_writing
+from vkbloom._views import markup
 
 __all__ = ["search_options"]
+
+_RULE: Final = markup.element("hr")
 
 
 def search_options(
@@ -181,9 +184,6 @@ def _object(found: vkbloom.FitResult) -> dict[str, Any]:
 
 def _write(found: Sequence[vkbloom.FitResult], path: Path) -> None:
     """Write the reports of all results as one page."""
-    reports = "<hr>".join(one._repr_html_() for one in found)
-    page = (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom fit</title>'
-        f'<body style="font-family:sans-serif">{reports}</body></html>'
-    )
+    reports = [part for one in found for part in (markup.Markup(one._repr_html_()), _RULE)]
+    page = markup.page("vkbloom fit", *reports[:-1], style="body{font-family:sans-serif}")
     safe_writing.write_file(path, page.encode())
