@@ -29,7 +29,7 @@ def search_options(
     """Add the options of a search; the arguments are their defaults.
 
     The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
-    `told`, a function that prints results and returns the exit status.
+    `show_results`, a function that prints results and returns the exit status.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -52,8 +52,10 @@ def search_options(
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
-            told = functools.partial(_tell, max_loss=max_loss, out=out, as_json=as_json)
-            return command(search=search, told=told, **rest)
+            show_results = functools.partial(
+                _show_results, max_loss=max_loss, out=out, as_json=as_json
+            )
+            return command(search=search, show_results=show_results, **rest)
 
         for option in reversed((*_of_search(vary, loss, max_calls), *_OF_RESULTS)):
             run = option(run)
@@ -133,7 +135,7 @@ def _bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
     return found
 
 
-def _tell(
+def _show_results(
     found: Sequence[vkbloom.FitResult], *, max_loss: float | None, out: str | None, as_json: bool
 ) -> int:
     """Print results, the best one first, and return the exit status."""

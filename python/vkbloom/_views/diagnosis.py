@@ -64,10 +64,6 @@ class Diagnosis:
     text : str
         What `str` returns.
 
-    See Also
-    --------
-    diagnose : Returns it.
-
     Examples
     --------
     >>> from vkbloom import testing
@@ -123,10 +119,6 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     ------
     TypeError, ValueError
         An image is not an array of one of these dtypes and shapes.
-
-    See Also
-    --------
-    FrameRegression.compare : Its message names the cause.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-__all__ = ["Markup", "element", "figure", "image", "joined", "page", "table"]
+__all__ = ["Markup", "element", "encoded_image", "figure", "image", "joined", "page", "table"]
 
 _NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
 
@@ -44,7 +44,11 @@ def element(name: str, *content: object, **attributes: object) -> Markup:
 
 def image(png: bytes, alt: str, **attributes: object) -> Markup:
     """Return an image with its data."""
-    data = base64.b64encode(png).decode("ascii")
+    return encoded_image(base64.b64encode(png).decode("ascii"), alt, **attributes)
+
+
+def encoded_image(data: str, alt: str, **attributes: object) -> Markup:
+    """Return an image of a PNG file in base64."""
     return element("img", src=f"data:image/png;base64,{data}", alt=alt, **attributes)
 
 
