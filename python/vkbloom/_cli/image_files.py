@@ -130,7 +130,7 @@ def read_picture(
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
-    if (not_finite := image_reading.specials_note(*counts)) is not None:
+    if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
