@@ -80,7 +80,7 @@ def _store_array(block: Any, name: str, value: Any) -> None:
 
 
 def _stage_block(stage: Glare) -> np.ndarray[Any, Any]:
-    block = _STAGE.copy()
+    block = _copy(_STAGE)
     block["kind"] = _index("glare", stage.stage, _core.STAGES)
     for name in _core.GLARE_VALUES:
         if (value := getattr(stage, name, None)) is not None:
@@ -92,12 +92,17 @@ def _stage_block(stage: Glare) -> np.ndarray[Any, Any]:
     return block
 
 
+def _copy(block: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return a copy. (That of NumPy copies member by member.)"""
+    return np.ndarray((), block.dtype, bytearray(block.tobytes()))
+
+
 def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
     """Return the block of a method with these fields; those that it lacks have their defaults.
 
     Raises ValueError or TypeError if the core has no room for a value.
     """
-    block = _SETTINGS.copy()
+    block = _copy(_SETTINGS)
     block["method"] = _index("method", method, _core.METHODS)
     block["thresholded"] = fields.get("threshold") is not None
     for name, value in fields.items():
