@@ -93,7 +93,7 @@ def _stage_block(stage: Glare) -> np.ndarray[Any, Any]:
 
 
 def _copy(block: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return a copy. (That of NumPy copies member by member.)"""
+    """Return a copy, faster than NumPy, which copies member by member."""
     return np.ndarray((), block.dtype, bytearray(block.tobytes()))
 
 
