@@ -2,12 +2,12 @@
 
 #include <string.h>
 
-struct vkb_resource_layout {
+// The layouts for passes with these descriptors after the parameters.
+struct vkb_pass_layouts {
     enum vkb_binding_kind kind;
     VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
     uint32_t count;
-    VkDescriptorSetLayout set;
-    VkPipelineLayout pipeline;
+    struct vkb_layouts made;
 };
 
 static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
@@ -30,33 +30,56 @@ static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkS
                                          NULL, sampler));
 }
 
-static const struct binding_kind {
-    struct vkb_binding_types types;
-    uint32_t most_reads;
-} binding_kinds[VKB_BINDING_KINDS] = {
-    [VKB_BINDINGS_DRAW] = {{.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER}, VKB_MAX_READS},
-    [VKB_BINDINGS_DISPATCH] = {{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-                               VKB_MAX_READS},
-    [VKB_BINDINGS_LOAD] = {{VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-                           VKB_MAX_LOADS},
-    [VKB_BINDINGS_WORDS] = {{VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
-                             VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
-                            VKB_MAX_WORDS},
+static const struct vkb_binding_types binding_types[VKB_BINDING_KINDS] = {
+    [VKB_BINDINGS_DRAW] = {.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER},
+    [VKB_BINDINGS_DISPATCH] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                               VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+    [VKB_BINDINGS_LOAD] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+    [VKB_BINDINGS_WORDS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                            VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
 };
 
-struct layouts {
-    VkDescriptorSetLayout set;
-    VkPipelineLayout pipeline;
-};
-
-// Creates the layouts of a pass's descriptors: the parameters and `count` others.
-static bool create_layouts(const struct vkb_device *device, enum vkb_binding_kind kind,
-                           const VkDescriptorType *descriptors, uint32_t count,
-                           struct layouts *layouts, struct vkb_error *error)
+bool vkb_layouts_create(const struct vkb_device *device,
+                        const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
+                        uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    const bool draw = kind == VKB_BINDINGS_DRAW;
+
+    return VK(error, vk->vkCreateDescriptorSetLayout(
+                         device->handle,
+                         &(VkDescriptorSetLayoutCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
+                             .bindingCount = count,
+                             .pBindings = bindings,
+                         },
+                         NULL, &layouts->set))
+        && VK(error,
+              vk->vkCreatePipelineLayout(device->handle,
+                                         &(VkPipelineLayoutCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                             .setLayoutCount = 1,
+                                             .pSetLayouts = &layouts->set,
+                                             .pushConstantRangeCount = constants > 0,
+                                             .pPushConstantRanges =
+                                                 &(VkPushConstantRange){
+                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
+                                                     .size = constants,
+                                                 },
+                                         },
+                                         NULL, &layouts->pipeline));
+}
+
+void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts)
+{
+    device->vk.vkDestroyPipelineLayout(device->handle, layouts->pipeline, NULL);
+    device->vk.vkDestroyDescriptorSetLayout(device->handle, layouts->set, NULL);
+    *layouts = (struct vkb_layouts){0};
+}
+
+static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layouts *layouts,
+                           struct vkb_error *error)
+{
+    const bool draw = layouts->kind == VKB_BINDINGS_DRAW;
     const VkShaderStageFlags stages =
         draw ? VK_SHADER_STAGE_FRAGMENT_BIT : VK_SHADER_STAGE_COMPUTE_BIT;
     VkDescriptorSetLayoutBinding rows[VKB_MAX_DESCRIPTORS + 1] = {
@@ -68,85 +91,24 @@ static bool create_layouts(const struct vkb_device *device, enum vkb_binding_kin
         },
     };
 
-    for (uint32_t i = 0; i < count; ++i)
+    for (uint32_t i = 0; i < layouts->count; ++i)
         rows[i + 1] = (VkDescriptorSetLayoutBinding){
             .binding = i + 1,
-            .descriptorType = descriptors[i],
+            .descriptorType = layouts->descriptors[i],
             .descriptorCount = 1,
             .stageFlags = stages,
         };
-    return VK(error, vk->vkCreateDescriptorSetLayout(
-                         device->handle,
-                         &(VkDescriptorSetLayoutCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                             .bindingCount = count + 1,
-                             .pBindings = rows,
-                         },
-                         NULL, &layouts->set))
-        && VK(error,
-              vk->vkCreatePipelineLayout(device->handle,
-                                         &(VkPipelineLayoutCreateInfo){
-                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                                             .setLayoutCount = 1,
-                                             .pSetLayouts = &layouts->set,
-                                             .pushConstantRangeCount = kind == VKB_BINDINGS_WORDS,
-                                             .pPushConstantRanges =
-                                                 &(VkPushConstantRange){
-                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
-                                                     .size = sizeof(struct vkb_words),
-                                                 },
-                                         },
-                                         NULL, &layouts->pipeline));
-}
-
-// The layouts of a pass of that kind that reads so many images, and nothing else.
-static bool create_usual(const struct vkb_device *device, struct vkb_bindings *bindings,
-                         enum vkb_binding_kind kind, uint32_t images, struct vkb_error *error)
-{
-    const struct vkb_binding_types types = binding_kinds[kind].types;
-    VkDescriptorType descriptors[VKB_MAX_READS + 1];
-    struct layouts layouts = {0};
-
-    for (uint32_t i = 0; i < images; ++i)
-        descriptors[i] = types.read;
-    descriptors[images] = types.target;
-    const bool done = create_layouts(device, kind, descriptors,
-                                     images + (kind != VKB_BINDINGS_DRAW), &layouts, error);
-    bindings->set_layouts[kind][images] = layouts.set;
-    bindings->layouts[kind][images] = layouts.pipeline;
-    return done;
-}
-
-bool vkb_bindings_create(const struct vkb_device *device, struct vkb_bindings *bindings,
-                         struct vkb_error *error)
-{
-    *bindings = (struct vkb_bindings){0};
-    bool done = true;
-
-    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
-        for (uint32_t images = 0; done && images <= binding_kinds[kind].most_reads; ++images)
-            done = create_usual(device, bindings, (enum vkb_binding_kind)kind, images, error);
-    if (!done)
-        vkb_bindings_destroy(device, bindings);
-    return done;
+    const uint32_t constants = layouts->kind == VKB_BINDINGS_WORDS ? sizeof(struct vkb_words) : 0;
+    return vkb_layouts_create(device, rows, layouts->count + 1, constants, &layouts->made, error);
 }
 
 void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *bindings)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
-
-    for (int kind = 0; kind < VKB_BINDING_KINDS; ++kind)
-        for (uint32_t i = 0; i <= VKB_MAX_READS; ++i) {
-            vk->vkDestroyPipelineLayout(device->handle, bindings->layouts[kind][i], NULL);
-            vk->vkDestroyDescriptorSetLayout(device->handle, bindings->set_layouts[kind][i], NULL);
-        }
-    for (size_t i = 0; i < bindings->resource_layout_count; ++i) {
-        vk->vkDestroyPipelineLayout(device->handle, bindings->resource_layouts[i].pipeline, NULL);
-        vk->vkDestroyDescriptorSetLayout(device->handle, bindings->resource_layouts[i].set, NULL);
-    }
-    vkb_free(bindings->resource_layouts);
-    vk->vkDestroySampler(device->handle, bindings->filter, NULL);
-    vk->vkDestroySampler(device->handle, bindings->nearest, NULL);
+    for (size_t i = 0; i < bindings->layout_count; ++i)
+        vkb_layouts_destroy(device, &bindings->layouts[i].made);
+    vkb_free(bindings->layouts);
+    device->vk.vkDestroySampler(device->handle, bindings->filter, NULL);
+    device->vk.vkDestroySampler(device->handle, bindings->nearest, NULL);
     *bindings = (struct vkb_bindings){0};
 }
 
@@ -180,7 +142,7 @@ static enum vkb_binding_kind kind_of(const struct vkb_pass_row *pass)
 
 struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
 {
-    return binding_kinds[kind_of(pass)].types;
+    return binding_types[kind_of(pass)];
 }
 
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
@@ -202,78 +164,58 @@ VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource)
 }
 
 // The descriptors after the parameters.
-static struct vkb_resource_layout described(const struct vkb_pass_row *pass)
+static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
 {
-    struct vkb_resource_layout layout = {.kind = kind_of(pass)};
-    const struct vkb_binding_types types = binding_kinds[layout.kind].types;
+    struct vkb_pass_layouts layouts = {.kind = kind_of(pass)};
+    const struct vkb_binding_types types = binding_types[layouts.kind];
 
-    while (layout.count < pass->read_count)
-        layout.descriptors[layout.count++] = types.read;
+    while (layouts.count < vkb_pass_descriptor_images(pass))
+        layouts.descriptors[layouts.count++] = types.read;
     for (uint32_t i = 0; i < pass->resource_count; ++i)
-        layout.descriptors[layout.count++] = vkb_resource_descriptor(pass->resources[i]);
-    if (layout.kind != VKB_BINDINGS_DRAW)
-        layout.descriptors[layout.count++] = types.target;
-    return layout;
+        layouts.descriptors[layouts.count++] = vkb_resource_descriptor(pass->resources[i]);
+    if (layouts.kind != VKB_BINDINGS_DRAW)
+        layouts.descriptors[layouts.count++] = types.target;
+    return layouts;
 }
 
-static const struct vkb_resource_layout *find_layout(const struct vkb_bindings *bindings,
-                                                     const struct vkb_resource_layout *layout)
+static uint32_t find_layouts(const struct vkb_bindings *bindings,
+                             const struct vkb_pass_layouts *layouts)
 {
-    for (size_t i = 0; i < bindings->resource_layout_count; ++i) {
-        const struct vkb_resource_layout *kept = &bindings->resource_layouts[i];
-        if (kept->kind == layout->kind && kept->count == layout->count
-            && memcmp(kept->descriptors, layout->descriptors, sizeof kept->descriptors) == 0)
-            return kept;
+    uint32_t i = 0;
+
+    for (; i < bindings->layout_count; ++i) {
+        const struct vkb_pass_layouts *kept = &bindings->layouts[i];
+        if (kept->kind == layouts->kind && kept->count == layouts->count
+            && memcmp(kept->descriptors, layouts->descriptors, sizeof kept->descriptors) == 0)
+            break;
     }
-    return NULL;
+    return i;
 }
 
 bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,
                           const struct vkb_pass_row *pass, uint32_t *number,
                           struct vkb_error *error)
 {
-    struct vkb_resource_layout layout = described(pass);
-    struct layouts made = {0};
+    struct vkb_pass_layouts layouts = described(pass);
 
-    *number = 0;
-    if (pass->resource_count == 0)
+    *number = find_layouts(bindings, &layouts);
+    if (*number < bindings->layout_count)
         return true;
-    const struct vkb_resource_layout *kept = find_layout(bindings, &layout);
-    if (!kept) {
-        if (!vkb_grow(error, &bindings->resource_layouts, &bindings->resource_layout_capacity,
-                      bindings->resource_layout_count + 1, sizeof layout))
-            return false;
-        const bool done =
-            create_layouts(device, layout.kind, layout.descriptors, layout.count, &made, error);
-        layout.set = made.set;
-        layout.pipeline = made.pipeline;
-        if (!done) {
-            device->vk.vkDestroyDescriptorSetLayout(device->handle, layout.set, NULL);
-            return false;
-        }
-        bindings->resource_layouts[bindings->resource_layout_count++] = layout;
-        kept = &bindings->resource_layouts[bindings->resource_layout_count - 1];
+    if (!vkb_grow(error, &bindings->layouts, &bindings->layout_capacity, bindings->layout_count + 1,
+                  sizeof layouts))
+        return false;
+    if (!create_layouts(device, &layouts, error)) {
+        vkb_layouts_destroy(device, &layouts.made);
+        return false;
     }
-    *number = (uint32_t)(kept - bindings->resource_layouts) + 1;
+    bindings->layouts[bindings->layout_count++] = layouts;
     return true;
 }
 
-VkDescriptorSetLayout vkb_bindings_set_layout(const struct vkb_bindings *bindings,
-                                              const struct vkb_pass_row *pass)
+const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                               const struct vkb_pass_row *pass)
 {
-    const struct vkb_resource_layout layout = described(pass);
+    const struct vkb_pass_layouts layouts = described(pass);
 
-    return pass->resource_count
-             ? find_layout(bindings, &layout)->set
-             : bindings->set_layouts[kind_of(pass)][vkb_pass_descriptor_images(pass)];
-}
-
-VkPipelineLayout vkb_bindings_layout(const struct vkb_bindings *bindings,
-                                     const struct vkb_pass_row *pass)
-{
-    const struct vkb_resource_layout layout = described(pass);
-
-    return pass->resource_count
-             ? find_layout(bindings, &layout)->pipeline
-             : bindings->layouts[kind_of(pass)][vkb_pass_descriptor_images(pass)];
+    return &bindings->layouts[find_layouts(bindings, &layouts)].made;
 }

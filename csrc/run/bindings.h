@@ -1,5 +1,5 @@
-// The descriptors of a pass: samplers, descriptor set layouts and pipeline layouts. All of them are
-// created with the device, because there are few.
+// The descriptors of a pass: samplers, descriptor set layouts and pipeline layouts. Each is created
+// at its first use.
 #ifndef VKB_BINDINGS_H
 #define VKB_BINDINGS_H
 
@@ -20,20 +20,27 @@ struct vkb_words {
     int32_t reads[VKB_MAX_WORDS][4];  // width, height, words in a row, 0
 };
 
-struct vkb_resource_layout;
-
-struct vkb_bindings {
-    VkSampler filter, nearest;  // each created at its first use
-    // By the number of images that a pass reads.
-    VkDescriptorSetLayout set_layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
-    VkPipelineLayout layouts[VKB_BINDING_KINDS][VKB_MAX_READS + 1];
-    // Of passes with resources, each created at its first use.
-    struct vkb_resource_layout *resource_layouts;
-    size_t resource_layout_count, resource_layout_capacity;
+// A descriptor set layout, and the pipeline layout with only this set.
+struct vkb_layouts {
+    VkDescriptorSetLayout set;
+    VkPipelineLayout pipeline;
 };
 
-bool vkb_bindings_create(const struct vkb_device *device, struct vkb_bindings *bindings,
-                         struct vkb_error *error);
+// `constants`: the bytes of push constants of a compute shader. What is made before a failure is
+// left to vkb_layouts_destroy.
+bool vkb_layouts_create(const struct vkb_device *device,
+                        const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
+                        uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error);
+void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts);
+
+struct vkb_pass_layouts;
+
+struct vkb_bindings {
+    VkSampler filter, nearest;
+    struct vkb_pass_layouts *layouts;
+    size_t layout_count, layout_capacity;
+};
+
 // Destroying a zeroed object is safe.
 void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *bindings);
 
@@ -42,8 +49,7 @@ void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *
 bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
                           enum vkb_format format, VkSampler *sampler, struct vkb_error *error);
 
-// Creates the layouts of a pass with resources, if they are not there. *number differs between
-// layouts; 0: the pass has no resources.
+// Creates the layouts of a pass, if they are not there. *number differs between layouts.
 bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,
                           const struct vkb_pass_row *pass, uint32_t *number,
                           struct vkb_error *error);
@@ -62,10 +68,8 @@ struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
 
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
 
-// The descriptor set layout of the pass, and the pipeline layout with only this set.
-VkDescriptorSetLayout vkb_bindings_set_layout(const struct vkb_bindings *bindings,
-                                              const struct vkb_pass_row *pass);
-VkPipelineLayout vkb_bindings_layout(const struct vkb_bindings *bindings,
-                                     const struct vkb_pass_row *pass);
+// The layouts of a pass that vkb_bindings_prepare has made.
+const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                               const struct vkb_pass_row *pass);
 
 #endif

@@ -3,41 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#ifdef _WIN32
-static void *open_library(void)
-{
-    return NULL;  // memory is exported as descriptors of files, which that system does not have
-}
-
-static void *find_function(void *library, const char *name)
-{
-    (void)library, (void)name;
-    return NULL;
-}
-
-static void close_descriptor(int descriptor)
-{
-    (void)descriptor;
-}
-#else
 #include <dlfcn.h>
 #include <unistd.h>
-
-static void *open_library(void)
-{
-    return dlopen("libcuda.so.1", RTLD_NOW | RTLD_LOCAL);
-}
-
-static void *find_function(void *library, const char *name)
-{
-    return dlsym(library, name);
-}
-
-static void close_descriptor(int descriptor)
-{
-    close(descriptor);
-}
-#endif
 
 // As in CUDA's header.
 typedef int result;
@@ -174,14 +141,14 @@ static bool check(const struct vkb_cuda *cuda, struct vkb_error *error, result a
 // The library stays open: other users of the process have it open, too.
 static bool load(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    void *library = open_library(), *function;
+    void *library = dlopen("libcuda.so.1", RTLD_NOW | RTLD_LOCAL), *function;
 
     if (!library)
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "CUDA: libcuda.so.1 does not open; arrays on the device need NVIDIA's "
                         "driver");
 #define LATER_LOAD(member, symbol, arguments) \
-    function = find_function(library, symbol); \
+    function = dlsym(library, symbol); \
     memcpy(&cuda->member, &function, sizeof function);
 #define LOAD(member, symbol, arguments) \
     LATER_LOAD(member, symbol, arguments) \
@@ -359,7 +326,7 @@ static bool import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
     };
 
     if (!CU(error, cuda->cuImportExternalMemory(&memory->handle, &handle))) {
-        close_descriptor(descriptor);
+        close(descriptor);
         return false;
     }
     return CU(error, cuda->cuExternalMemoryGetMappedBuffer(&memory->address, memory->handle,
@@ -372,7 +339,7 @@ bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
 {
     *memory = (struct vkb_cuda_memory){0};
     if (!enter(cuda, error)) {
-        close_descriptor(descriptor);
+        close(descriptor);
         return false;
     }
     const bool done = leave(cuda, import(cuda, descriptor, size, memory, error));
@@ -408,7 +375,7 @@ void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vk
 
     if (!enter(cuda, error)
         || !leave(cuda, CU(error, cuda->cuImportExternalSemaphore(&semaphore, &handle)))) {
-        close_descriptor(descriptor);
+        close(descriptor);
         return NULL;
     }
     return semaphore;

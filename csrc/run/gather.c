@@ -1,4 +1,5 @@
 #include "run/gather.h"
+#include "run/pipeline.h"
 
 #include "spirv.h"
 
@@ -39,69 +40,14 @@ static bool create_layouts(const struct vkb_device *device, const struct kind *k
             .descriptorCount = 1,
             .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
         };
-    return VK(error, device->vk.vkCreateDescriptorSetLayout(
-                         device->handle,
-                         &(VkDescriptorSetLayoutCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                             .bindingCount = BINDINGS,
-                             .pBindings = bindings,
-                         },
-                         NULL, &gather->sets))
-        && VK(error, device->vk.vkCreatePipelineLayout(
-                         device->handle,
-                         &(VkPipelineLayoutCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                             .setLayoutCount = 1,
-                             .pSetLayouts = &gather->sets,
-                             .pushConstantRangeCount = 1,
-                             .pPushConstantRanges =
-                                 &(VkPushConstantRange){
-                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
-                                     .size = sizeof(struct vkb_gather_layout),
-                                 },
-                         },
-                         NULL, &gather->layout));
-}
-
-static bool create_pipeline(const struct vkb_device *device, VkPipelineCache cache,
-                            const struct vkb_shader *shader, struct vkb_gather_pipeline *gather,
-                            struct vkb_error *error)
-{
-    VkShaderModule module;
-
-    if (!VK(error, device->vk.vkCreateShaderModule(
-                       device->handle,
-                       &(VkShaderModuleCreateInfo){
-                           .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                           .codeSize = shader->size,
-                           .pCode = shader->code,
-                       },
-                       NULL, &module)))
-        return false;
-    const bool done =
-        VK(error, device->vk.vkCreateComputePipelines(
-                      device->handle, cache, 1,
-                      &(VkComputePipelineCreateInfo){
-                          .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                          .stage =
-                              {
-                                  .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                  .stage = VK_SHADER_STAGE_COMPUTE_BIT,
-                                  .module = module,
-                                  .pName = "main",
-                              },
-                          .layout = gather->layout,
-                      },
-                      NULL, &gather->handle));
-    device->vk.vkDestroyShaderModule(device->handle, module, NULL);
-    return done;
+    return vkb_layouts_create(device, bindings, BINDINGS, sizeof(struct vkb_gather_layout),
+                              &gather->layouts, error);
 }
 
 static void destroy(const struct vkb_device *device, struct vkb_gather_pipeline *pipeline)
 {
     device->vk.vkDestroyPipeline(device->handle, pipeline->handle, NULL);
-    device->vk.vkDestroyPipelineLayout(device->handle, pipeline->layout, NULL);
-    device->vk.vkDestroyDescriptorSetLayout(device->handle, pipeline->sets, NULL);
+    vkb_layouts_destroy(device, &pipeline->layouts);
     *pipeline = (struct vkb_gather_pipeline){0};
 }
 
@@ -115,7 +61,8 @@ bool vkb_gather_create(const struct vkb_device *device, VkPipelineCache cache,
         return true;
     destroy(device, pipeline);
     return create_layouts(device, &kinds[kind], pipeline, error)
-        && create_pipeline(device, cache, kinds[kind].shader, pipeline, error);
+        && vkb_compute_create(device, cache, kinds[kind].shader, &(struct vkb_constants){0},
+                              pipeline->layouts.pipeline, &pipeline->handle, error);
 }
 
 void vkb_gather_destroy(const struct vkb_device *device, struct vkb_gather *gather)
@@ -174,15 +121,15 @@ bool vkb_gather_record(const struct vkb_device *device, const struct vkb_gather 
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = pool,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &pipeline->sets,
+                           .pSetLayouts = &pipeline->layouts.set,
                        },
                        &set)))
         return false;
     write_set(device, set, work);
     vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->handle);
-    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->layout, 0, 1,
-                                &set, 0, NULL);
-    vk->vkCmdPushConstants(commands, pipeline->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+    vk->vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE,
+                                pipeline->layouts.pipeline, 0, 1, &set, 0, NULL);
+    vk->vkCmdPushConstants(commands, pipeline->layouts.pipeline, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                            sizeof work->layout, &work->layout);
     vk->vkCmdDispatch(commands, groups.width, groups.height, work->layers ? work->layers : 1);
     return true;

@@ -3,6 +3,7 @@
 #ifndef VKB_GATHER_H
 #define VKB_GATHER_H
 
+#include "run/bindings.h"
 #include "vulkan/memory.h"
 
 enum vkb_gather_kind {
@@ -17,8 +18,7 @@ enum vkb_gather_kind {
 // Created at the first use of each kind; destroying a zeroed or half-created one is safe.
 struct vkb_gather {
     struct vkb_gather_pipeline {
-        VkDescriptorSetLayout sets;
-        VkPipelineLayout layout;
+        struct vkb_layouts layouts;
         VkPipeline handle;
     } pipelines[VKB_GATHER_COUNT];
 };

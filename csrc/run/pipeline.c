@@ -27,16 +27,15 @@ struct vkb_render_pass_entry {
 struct pipeline_key {
     VkRenderPass render_pass;
     struct vkb_hash vertex, shader;
-    uint32_t geometry, reading;  // enum vkb_geometry, enum vkb_reading
-    uint32_t textured, blend;    // enum vkb_blend
+    uint32_t geometry;         // enum vkb_geometry
+    uint32_t textured, blend;  // enum vkb_blend
     uint32_t target_count;
-    uint32_t image_count;  // of the descriptors
-    uint32_t layout;       // of a pass with resources
+    uint32_t layout;  // the number of the layouts
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (7 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                          + (5 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
@@ -50,18 +49,14 @@ bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_dat
                           struct vkb_error *error)
 {
     *pipelines = (struct vkb_pipelines){0};
-    if (VK(error, device->vk.vkCreatePipelineCache(
-                      device->handle,
-                      &(VkPipelineCacheCreateInfo){
-                          .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
-                          .initialDataSize = cache_size,
-                          .pInitialData = cache_data,
-                      },
-                      NULL, &pipelines->cache))
-        && vkb_bindings_create(device, &pipelines->bindings, error))
-        return true;
-    vkb_pipelines_destroy(device, pipelines);
-    return false;
+    return VK(error, device->vk.vkCreatePipelineCache(
+                         device->handle,
+                         &(VkPipelineCacheCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
+                             .initialDataSize = cache_size,
+                             .pInitialData = cache_data,
+                         },
+                         NULL, &pipelines->cache));
 }
 
 void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines *pipelines)
@@ -241,18 +236,46 @@ static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
     };
 }
 
-static bool create_compute(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
-                           const struct vkb_pass_row *pass, VkShaderModule module,
-                           VkPipeline *pipeline, struct vkb_error *error)
+static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
+                          const struct vkb_constants *constants, VkShaderModule *module,
+                          struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateComputePipelines(
-                         device->handle, pipelines->cache, 1,
-                         &(VkComputePipelineCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                             .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
-                             .layout = vkb_bindings_layout(&pipelines->bindings, pass),
-                         },
-                         NULL, pipeline));
+    uint32_t *code;
+    size_t size;
+
+    if (!vkb_specialize(shader, constants, &code, &size, error))
+        return false;
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
+    vkb_free(code);
+    return done;
+}
+
+bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
+                        const struct vkb_shader *shader, const struct vkb_constants *constants,
+                        VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkShaderModule module;
+
+    if (!create_module(device, shader, constants, &module, error))
+        return false;
+    const bool done = VK(error, device->vk.vkCreateComputePipelines(
+                                    device->handle, cache, 1,
+                                    &(VkComputePipelineCreateInfo){
+                                        .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                                        .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
+                                        .layout = layout,
+                                    },
+                                    NULL, pipeline));
+    device->vk.vkDestroyShaderModule(device->handle, module, NULL);
+    return done;
 }
 
 static const struct geometry_state {
@@ -374,32 +397,10 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                               .pAttachments = blends,
                           },
                       .pDynamicState = &dynamic_viewport,
-                      .layout = vkb_bindings_layout(&pipelines->bindings, pass),
+                      .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
                       .renderPass = render_pass,
                   },
                   NULL, pipeline));
-}
-
-static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
-                          const struct vkb_constants *constants, VkShaderModule *module,
-                          struct vkb_error *error)
-{
-    uint32_t *code;
-    size_t size;
-
-    if (!vkb_specialize(shader, constants, &code, &size, error))
-        return false;
-    const bool done =
-        VK(error,
-           device->vk.vkCreateShaderModule(device->handle,
-                                           &(VkShaderModuleCreateInfo){
-                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                                               .codeSize = size,
-                                               .pCode = code,
-                                           },
-                                           NULL, module));
-    vkb_free(code);
-    return done;
 }
 
 static bool create_pipeline(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
@@ -408,12 +409,15 @@ static bool create_pipeline(const struct vkb_device *device, const struct vkb_pi
 {
     // A driver copies what it needs of a module: none has to be kept.
     VkShaderModule modules[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};
+
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH)
+        return vkb_compute_create(device, pipelines->cache, pass->shader, &pass->constants,
+                                  vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                                  pipeline, error);
     const bool done =
-        (!pass->vertex || create_module(device, pass->vertex, &pass->constants, &modules[0], error))
+        create_module(device, pass->vertex, &pass->constants, &modules[0], error)
         && create_module(device, pass->shader, &pass->constants, &modules[1], error)
-        && (pass->geometry == VKB_GEOMETRY_DISPATCH
-                ? create_compute(device, pipelines, pass, modules[1], pipeline, error)
-                : create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error));
+        && create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error);
     for (int i = 0; i < 2; ++i)
         device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);
     return done;
@@ -443,11 +447,9 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     key.vertex = vkb_shader_hash(pass->vertex);
     key.shader = vkb_shader_hash(pass->shader);
     key.geometry = pass->geometry;
-    key.reading = pass->reading;
     key.textured = pass->textured;
     key.blend = pass->blend;
     key.target_count = pass->target_count;
-    key.image_count = vkb_pass_descriptor_images(pass);
     key.constants = pass->constants;
     key.render_pass = render_pass;
 

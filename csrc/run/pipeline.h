@@ -47,4 +47,9 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
                        const struct vkb_pass_row *pass, VkRenderPass render_pass,
                        VkPipeline *pipeline, struct vkb_error *error);
 
+// Creates a compute pipeline, which the caller keeps.
+bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
+                        const struct vkb_shader *shader, const struct vkb_constants *constants,
+                        VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error);
+
 #endif

@@ -156,7 +156,7 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
     const struct vkb_pass_row *pass = binding->pass;
     const struct VolkDeviceTable *vk = &run->device->vk;
     const struct vkb_bindings *bindings = &run->frame->pipelines.bindings;
-    const VkDescriptorSetLayout layout = vkb_bindings_set_layout(bindings, pass);
+    const struct vkb_layouts *layouts = vkb_bindings_layouts(bindings, pass);
     VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -165,13 +165,13 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = run->submission->descriptors,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &layout,
+                           .pSetLayouts = &layouts->set,
                        },
                        &set))
         || !write_descriptors(run, binding, set, error))
         return false;
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
-                                vkb_bindings_layout(bindings, pass), 0, 1, &set, 0, NULL);
+                                layouts->pipeline, 0, 1, &set, 0, NULL);
     return true;
 }
 
@@ -291,9 +291,10 @@ static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pas
         const struct vkb_image *image = &run->images[pass->reads[i]]->image;
         describe_words(image, image->row_pitch, words.reads[i]);
     }
-    run->device->vk.vkCmdPushConstants(run->submission->commands.buffer,
-                                       vkb_bindings_layout(&run->frame->pipelines.bindings, pass),
-                                       VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
+    run->device->vk.vkCmdPushConstants(
+        run->submission->commands.buffer,
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->pipeline,
+        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
 }
 
 // `output`: what the pass stores to; NULL: its image.
