@@ -67,7 +67,7 @@ struct vkb_stage {
 
 // A pass of a method that was given at run time (methods/own.c). The owner of the settings keeps
 // the shader as long as there are rows of it.
-struct vkb_own_pass {
+struct vkb_custom_pass {
     char name[VKB_NAME_SIZE];  // of the image that it writes
     const struct vkb_shader *shader;
     uint32_t width, height;
@@ -102,8 +102,8 @@ struct vkb_settings {
     uint32_t stage_count;
     // Python packs what is before here.
     struct vkb_kernel_data kernel;
-    struct vkb_kernel_data dirt;        // the picture of the stage of dirt
-    const struct vkb_own_pass *passes;  // of VKB_METHOD_OWN
+    struct vkb_kernel_data dirt;           // the picture of the stage of dirt
+    const struct vkb_custom_pass *passes;  // of VKB_METHOD_OWN
     uint32_t pass_count;
 };
 

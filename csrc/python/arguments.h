@@ -5,8 +5,8 @@
 #include "python/objects.h"
 
 #include "methods/source.h"
-#include "run/exports.h"
-#include "run/upload.h"
+#include "share/exported_memory.h"
+#include "transfer/upload.h"
 
 // The members of the blocks of a settings object and of a stage of glare, by name: offset, code of
 // the elements and their number. New references; NULL with an exception set.
@@ -71,7 +71,7 @@ struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **ex
 // called on a zeroed one. The tuple keeps their shaders, to which the rows of a graph refer.
 struct vkb_held_passes {
     PyObject *tuple;
-    struct vkb_own_pass *rows;
+    struct vkb_custom_pass *rows;
 };
 
 // Asks the settings of such a method for its passes.
