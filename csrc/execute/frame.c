@@ -5,6 +5,9 @@
 
 #include <string.h>
 
+static const struct vkb_sink *const sinks[] = {&vkb_host_sink, &vkb_cuda_sink, &vkb_screen_sink};
+enum { SINK_COUNT = sizeof sinks / sizeof sinks[0] };
+
 bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
                       struct vkb_frame *frame, struct vkb_error *error)
 {
@@ -64,48 +67,8 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     return true;
 }
 
-static VkDeviceSize larger(VkDeviceSize a, VkDeviceSize b)
-{
-    return a > b ? a : b;
-}
-
-// Reserves what is between images and exported memory, if the requests use any.
-static bool reserve_exported(struct vkb_run *run, const struct vkb_request *requests,
-                             uint32_t request_count, struct vkb_error *error)
-{
-    struct vkb_readback *readback = &run->submission->readback;
-    const uint32_t layers = run->graph->layers;
-    const VkDeviceSize counts_size =
-        (VkDeviceSize)(layers ? layers : request_count) * VKB_COUNTS_SIZE;
-    VkDeviceSize scratch = 0;
-
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (run->inputs[kind].input) {
-            scratch =
-                larger(scratch, vkb_exported_input_scratch(run->device, run->inputs[kind].input));
-            readback->counted = true;
-        }
-    for (uint32_t i = 0; i < request_count; ++i)
-        for (uint32_t output = 0; output < requests[i].plan->output_count; ++output)
-            if (requests[i].outputs[output].exported) {
-                const struct vkb_output *one = &requests[i].outputs[output];
-                scratch = larger(scratch, vkb_exported_output_scratch(run->device, one));
-                readback->counted = true;
-            }
-    if (!readback->counted)
-        return true;
-    // An invocation of strided_copy.glsl writes 16 bytes.
-    if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(),
-                            (scratch + 15) / 16 * 16, &readback->scratch, error)
-        || !vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                               counts_size, &readback->counts, error))
-        return false;
-    memset(readback->counts.mapped, 0, (size_t)counts_size);
-    return vkb_buffer_flush(run->device, &readback->counts, error);
-}
-
-// Reserves the memory that the requests can need.
-static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
+// Reserves what the passes of the requests can need.
+static bool reserve(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
@@ -120,19 +83,11 @@ static bool reserve(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         passes += plan->graph.pass_count;
         sets += vkb_record_sets(run->device, &plan->graph) + surfaces + VKB_INPUT_COUNT
               + plan->output_count;
-        for (uint32_t output = 0; output < plan->output_count; ++output) {
-            const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
-            if (!vkb_readback_plan(run->device, &submission->readback, row->format, row->width,
-                                   &requests[i].outputs[output], error))
-                return false;
-        }
     }
     return reserve_descriptors(run, sets, error)
         && vkb_timer_reserve(run->device, passes, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
-                              params * passes, &submission->uniforms, error)
-        && vkb_readback_reserve(run->device, &submission->readback, error)
-        && reserve_exported(run, requests, request_count, error);
+                              params * passes, &submission->uniforms, error);
 }
 
 static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
@@ -264,22 +219,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
             return false;
     if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
         return false;
-    for (uint32_t i = 0; i < request->plan->output_count; ++i) {
-        struct vkb_cached_image *cached = run->images[request->plan->outputs[i]];
-        if (!request->outputs[i].exported
-            || !vkb_exported_dispatches(run->device, &request->outputs[i]))
-            vkb_readback_record(run->device, submission->commands.buffer, &submission->readback,
-                                &cached->image, &request->outputs[i]);
-        if (request->outputs[i].exported
-            && !vkb_exported_record_output(run, &cached->image, &request->outputs[i], error))
+    for (size_t i = 0; i < SINK_COUNT; ++i)
+        if (sinks[i]->record && !sinks[i]->record(run, error))
             return false;
-        // A pass that stored to the caller's memory did not write the image.
-        cached->content.valid =
-            cached->content.valid && request->outputs[i].sink != VKB_SINK_STORED;
-    }
-    if (run->show)
-        vkb_screen_record(run->device, submission->commands.buffer, run->show->screen,
-                          &run->images[request->plan->outputs[0]]->image);
     return true;
 }
 
@@ -289,18 +231,12 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
     VkCommandBuffer commands = submission->commands.buffer;
-    struct vkb_sync order = {0};
 
-    if (run->show) {
-        if (!vkb_screen_acquire(device, &run->frame->submissions, run->show,
-                                submission->commands.available, error))
+    for (size_t i = 0; i < SINK_COUNT; ++i)
+        if (sinks[i]->prepare && !sinks[i]->prepare(run, requests, request_count, error))
             return false;
-        if (!run->show->acquired)
-            return true;
-        order.waits[VKB_EXTERNAL_SCREEN].semaphore = submission->commands.available;
-        order.signals[VKB_EXTERNAL_SCREEN].semaphore =
-            run->show->screen->images[run->show->screen->index].rendered;
-    }
+    if (run->show && !run->show->acquired)
+        return true;
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
@@ -313,12 +249,8 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
     vkb_barrier_record_host_read(device, commands);
     // Not earlier: the host records while CUDA copies the inputs.
-    if (!vkb_buffer_flush(device, &submission->uniforms, error)
-        || !vkb_exported_begin(run, requests, request_count, &order, error)
-        || !vkb_submission_submit(device, submission, &order, error))
-        return false;
-    vkb_exported_end(requests, request_count, &order);
-    return true;
+    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_wait(run, error)
+        && vkb_submission_submit(device, submission, &run->sync, error);
 }
 
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
@@ -405,7 +337,10 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
             requests[i].non_finite = frame->non_finite;
         *submission = run.submission;
         vkb_sources_end(&run, source, true);
-        return !show || vkb_screen_present(device, show->screen, error);
+        for (size_t i = 0; i < SINK_COUNT; ++i)
+            done = (!sinks[i]->finish || sinks[i]->finish(&run, requests, request_count, error))
+                && done;
+        return done;
     }
     if (!done) {
         vkb_sources_end(&run, source, false);

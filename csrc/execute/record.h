@@ -31,7 +31,21 @@ struct vkb_run {
     size_t constant_starts[4];
     uint32_t constant_count;
     bool unknown_non_finite;  // whether the source has NaN or infinity is counted on the device
+    struct vkb_sync sync;     // what the submission waits for and signals
 };
+
+// A place where framebuffers go; frame.c has a list of all. Functions may be NULL.
+struct vkb_sink {
+    // Before the commands are recorded: memory, and an image of the surface.
+    bool (*prepare)(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
+                    struct vkb_error *error);
+    // After the passes of run->request.
+    bool (*record)(struct vkb_run *run, struct vkb_error *error);
+    // After the submission.
+    bool (*finish)(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
+                   struct vkb_error *error);
+};
+extern const struct vkb_sink vkb_host_sink, vkb_cuda_sink, vkb_screen_sink;
 
 // The most descriptor sets that the graph's passes need, without those of surfaces.
 uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph);

@@ -1,6 +1,7 @@
 #include "share/exported_images.h"
 
 #include <limits.h>
+#include <string.h>
 
 static size_t element_size(enum vkb_format format)
 {
@@ -66,23 +67,21 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
                     (double)size / (1 << 20));
 }
 
-VkDeviceSize vkb_exported_input_scratch(const struct vkb_device *device,
-                                        const struct vkb_input *input)
+static VkDeviceSize input_scratch(const struct vkb_device *device, const struct vkb_input *input)
 {
     return dispatches(device) || is_direct(device, input)
              ? 0
              : (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
 }
 
-bool vkb_exported_dispatches(const struct vkb_device *device, const struct vkb_output *output)
+static bool reads_image(const struct vkb_device *device, const struct vkb_output *output)
 {
     return dispatches(device) && output->format != VKB_FORMAT_DEPTH32_FLOAT;
 }
 
-VkDeviceSize vkb_exported_output_scratch(const struct vkb_device *device,
-                                         const struct vkb_output *output)
+static VkDeviceSize output_scratch(const struct vkb_device *device, const struct vkb_output *output)
 {
-    return vkb_exported_dispatches(device, output) || vkb_readback_is_complete(output)
+    return reads_image(device, output) || vkb_readback_is_complete(output)
              ? 0
              : (VkDeviceSize)output->width * output->row_count * vkb_pixel_size(output->format);
 }
@@ -228,33 +227,73 @@ static struct vkb_export *next_output(const struct vkb_request *requests, uint32
     return NULL;
 }
 
-bool vkb_exported_begin(const struct vkb_run *run, const struct vkb_request *requests,
-                        uint32_t request_count, struct vkb_sync *order, struct vkb_error *error)
+static VkDeviceSize larger(VkDeviceSize a, VkDeviceSize b)
 {
-    uint32_t request = 0, at = 0;
+    return a > b ? a : b;
+}
 
+// Reserves what is between images and exported memory, if the requests use any, and the point at
+// which the outputs are complete.
+static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
+                    struct vkb_error *error)
+{
+    struct vkb_readback *readback = &run->submission->readback;
+    const uint32_t layers = run->graph->layers;
+    const VkDeviceSize counts_size =
+        (VkDeviceSize)(layers ? layers : request_count) * VKB_COUNTS_SIZE;
+    VkDeviceSize scratch = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].input) {
+            scratch = larger(scratch, input_scratch(run->device, run->inputs[kind].input));
+            readback->counted = true;
+        }
+    for (uint32_t i = 0; i < request_count; ++i)
+        for (uint32_t output = 0; output < requests[i].plan->output_count; ++output)
+            if (requests[i].outputs[output].exported) {
+                const struct vkb_output *one = &requests[i].outputs[output];
+                scratch = larger(scratch, output_scratch(run->device, one));
+                readback->counted = true;
+            }
+    if (!readback->counted)
+        return true;
+    uint32_t request = 0, at = 0;
+    const struct vkb_export *output = next_output(requests, request_count, &request, &at);
+    if (output)
+        vkb_export_signal(output, &run->sync.signals[VKB_EXTERNAL_CUDA]);
+    // An invocation of strided_copy.glsl writes 16 bytes.
+    if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(),
+                            (scratch + 15) / 16 * 16, &readback->scratch, error)
+        || !vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                               counts_size, &readback->counts, error))
+        return false;
+    memset(readback->counts.mapped, 0, (size_t)counts_size);
+    return vkb_buffer_flush(run->device, &readback->counts, error);
+}
+
+bool vkb_exported_wait(struct vkb_run *run, struct vkb_error *error)
+{
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
         const struct vkb_input *input = run->inputs[kind].input;
         if (!input)
             continue;
         if (!vkb_export_filled(input->exported, error))
             return false;
-        vkb_export_wait(input->exported, &order->waits[VKB_EXTERNAL_CUDA]);
+        vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
     }
-    const struct vkb_export *output = next_output(requests, request_count, &request, &at);
-    if (output)
-        vkb_export_signal(output, &order->signals[VKB_EXTERNAL_CUDA]);
     return true;
 }
 
-void vkb_exported_end(const struct vkb_request *requests, uint32_t request_count,
-                      const struct vkb_sync *order)
+static bool finish(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
+                   struct vkb_error *error)
 {
     uint32_t request = 0, at = 0;
     struct vkb_export *output;
 
+    (void)error;
     while ((output = next_output(requests, request_count, &request, &at)))
-        output->drawn = order->signals[VKB_EXTERNAL_CUDA].value;
+        output->drawn = run->sync.signals[VKB_EXTERNAL_CUDA].value;
+    return true;
 }
 
 static bool copy_strided_image(struct vkb_run *run, struct vkb_image *image,
@@ -270,11 +309,11 @@ static bool copy_strided_image(struct vkb_run *run, struct vkb_image *image,
         && copy_strided(run, work, error);
 }
 
-bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
-                                const struct vkb_output *output, struct vkb_error *error)
+static bool record_output(struct vkb_run *run, struct vkb_image *image,
+                          const struct vkb_output *output, struct vkb_error *error)
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
-    const bool from_image = vkb_exported_dispatches(run->device, output);
+    const bool from_image = reads_image(run->device, output);
     const bool copied = !from_image && vkb_readback_is_complete(output);
     const uint32_t size = (uint32_t)element_size(output->format);
     const uint32_t pixel = (uint32_t)vkb_pixel_size(output->format);
@@ -300,7 +339,11 @@ bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
     if (from_image) {
         if (!copy_strided_image(run, image, &work, error))
             return false;
-    } else if (!copied) {
+    } else {
+        vkb_readback_copy(run->device, commands, image, output,
+                          copied ? work.to.buffer : work.from.buffer, 0);
+    }
+    if (!from_image && !copied) {
         vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_COPY_TARGET,
                            VKB_ACCESS_DISPATCH_LOADED);
         if (!copy_strided(run, &work, error))
@@ -311,3 +354,17 @@ bool vkb_exported_record_output(struct vkb_run *run, struct vkb_image *image,
                                copied ? VKB_ACCESS_COPY_TARGET : VKB_ACCESS_DISPATCH_STORED);
     return true;
 }
+
+static bool record(struct vkb_run *run, struct vkb_error *error)
+{
+    const struct vkb_plan *plan = run->request->plan;
+
+    for (uint32_t i = 0; i < plan->output_count; ++i)
+        if (run->request->outputs[i].exported
+            && !record_output(run, &run->images[plan->outputs[i]]->image, &run->request->outputs[i],
+                              error))
+            return false;
+    return true;
+}
+
+const struct vkb_sink vkb_cuda_sink = {prepare, record, finish};

@@ -1,5 +1,7 @@
 #include "transfer/readback.h"
 
+#include "execute/record.h"
+
 #include <string.h>
 
 // Bytes of a row of the image, which may have more channels than the output.
@@ -64,9 +66,10 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     return true;
 }
 
-bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, struct vkb_output *output,
-                       struct vkb_error *error)
+// Selects how the output, which is rows of an image of this format and width, is copied.
+static bool plan_output(const struct vkb_device *device, struct vkb_readback *readback,
+                        enum vkb_format format, uint32_t width, struct vkb_output *output,
+                        struct vkb_error *error)
 {
     output->format = format;
     output->width = width;
@@ -108,16 +111,27 @@ bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_
         && output->imported_offset % VKB_WORD_SIZE == 0 && output->imported_offset % align == 0;
 }
 
-bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
-                          struct vkb_error *error)
+static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
+                    struct vkb_error *error)
 {
-    return vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+    struct vkb_readback *readback = &run->submission->readback;
+
+    for (uint32_t i = 0; i < request_count; ++i) {
+        const struct vkb_plan *plan = requests[i].plan;
+        for (uint32_t output = 0; output < plan->output_count; ++output) {
+            const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
+            if (!plan_output(run->device, readback, row->format, row->width,
+                             &requests[i].outputs[output], error))
+                return false;
+        }
+    }
+    return vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                               readback->used, &readback->staging, error);
 }
 
-static void record_copy(const struct vkb_device *device, VkCommandBuffer commands,
-                        struct vkb_image *image, const struct vkb_output *output, VkBuffer to,
-                        VkDeviceSize offset)
+void vkb_readback_copy(const struct vkb_device *device, VkCommandBuffer commands,
+                       struct vkb_image *image, const struct vkb_output *output, VkBuffer to,
+                       VkDeviceSize offset)
 {
     VkBufferImageCopy copy = {
         .bufferOffset = offset,
@@ -131,31 +145,28 @@ static void record_copy(const struct vkb_device *device, VkCommandBuffer command
         commands, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_SOURCE), to, 1, &copy);
 }
 
-static void record_staging(const struct vkb_device *device, VkCommandBuffer commands,
-                           const struct vkb_readback *readback, struct vkb_image *image,
-                           const struct vkb_output *output)
+static bool record(struct vkb_run *run, struct vkb_error *error)
 {
-    record_copy(device, commands, image, output, readback->staging.handle, output->offset);
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const struct vkb_readback *readback = &run->submission->readback;
+
+    (void)error;
+    for (uint32_t i = 0; i < run->request->plan->output_count; ++i) {
+        struct vkb_cached_image *cached = run->images[run->request->plan->outputs[i]];
+        const struct vkb_output *output = &run->request->outputs[i];
+        if (output->sink == VKB_SINK_STAGING)
+            vkb_readback_copy(run->device, commands, &cached->image, output,
+                              readback->staging.handle, output->offset);
+        else if (output->sink == VKB_SINK_PAGES)
+            vkb_readback_copy(run->device, commands, &cached->image, output, output->imported,
+                              output->imported_offset);
+        // A pass that stored to the caller's memory did not write the image.
+        cached->content.valid = cached->content.valid && output->sink != VKB_SINK_STORED;
+    }
+    return true;
 }
 
-static void record_pages(const struct vkb_device *device, VkCommandBuffer commands,
-                         const struct vkb_readback *readback, struct vkb_image *image,
-                         const struct vkb_output *output)
-{
-    (void)readback;
-    record_copy(device, commands, image, output, output->imported, output->imported_offset);
-}
-
-// Without all channels, a dispatch follows, which leaves the others out.
-static void record_exported(const struct vkb_device *device, VkCommandBuffer commands,
-                            const struct vkb_readback *readback, struct vkb_image *image,
-                            const struct vkb_output *output)
-{
-    record_copy(device, commands, image, output,
-                vkb_readback_is_complete(output) ? output->exported->buffer.handle
-                                                 : readback->scratch.handle,
-                0);
-}
+const struct vkb_sink vkb_host_sink = {.prepare = prepare, .record = record};
 
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,
                       struct vkb_error *error)
@@ -183,11 +194,13 @@ static void take_first(unsigned char *to, const unsigned char *from, size_t pixe
         memcpy(to + i * size, from + i * pixel, size);
 }
 
-static void fetch_staging(const struct vkb_readback *readback, const struct vkb_output *output)
+void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
 {
     const size_t pixels = (size_t)output->width * output->row_count;
-    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
 
+    if (output->sink != VKB_SINK_STAGING)
+        return;
+    const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;
     if (vkb_readback_is_complete(output)) {
         memcpy(output->memory, from, row_size(output) * output->row_count);
         return;
@@ -208,32 +221,6 @@ static void fetch_staging(const struct vkb_readback *readback, const struct vkb_
         drop_alpha(output->memory, from, pixels, 4);
         break;
     }
-}
-
-// A new sink is a row here; NULL: there is nothing to do.
-static const struct sink {
-    void (*record)(const struct vkb_device *device, VkCommandBuffer commands,
-                   const struct vkb_readback *readback, struct vkb_image *image,
-                   const struct vkb_output *output);
-    void (*fetch)(const struct vkb_readback *readback, const struct vkb_output *output);
-} sinks[] = {
-    [VKB_SINK_NONE] = {NULL, NULL},          [VKB_SINK_STAGING] = {record_staging, fetch_staging},
-    [VKB_SINK_PAGES] = {record_pages, NULL}, [VKB_SINK_EXPORTED] = {record_exported, NULL},
-    [VKB_SINK_STORED] = {NULL, NULL},
-};
-
-void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
-                         const struct vkb_readback *readback, struct vkb_image *image,
-                         const struct vkb_output *output)
-{
-    if (sinks[output->sink].record)
-        sinks[output->sink].record(device, commands, readback, image, output);
-}
-
-void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
-{
-    if (sinks[output->sink].fetch)
-        sinks[output->sink].fetch(readback, output);
 }
 
 void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback)

@@ -13,7 +13,7 @@
 enum { VKB_IMPORTED_BYTES = 1 << 20 };
 
 // How the pixels of an output leave the device.
-enum vkb_sink {
+enum vkb_sink_kind {
     VKB_SINK_NONE,      // they do not
     VKB_SINK_STAGING,   // the device copies to staging memory, and the host from there
     VKB_SINK_PAGES,     // the device copies to the caller's memory, which it has imported
@@ -30,10 +30,10 @@ struct vkb_output {
     struct vkb_export *exported;    // instead of host memory; NULL: none
     size_t layer_stride;            // there, of a batch
     struct vkb_page_run *pages;  // the run that contains the memory; NULL: none, or a small array
-    // Set by vkb_readback_plan.
+    // Set before the recording (vkb_host_sink).
     enum vkb_format format;
     uint32_t width;
-    enum vkb_sink sink;
+    enum vkb_sink_kind sink;
     VkBuffer imported;  // the caller's memory as a buffer; VK_NULL_HANDLE: it is none
     VkDeviceSize imported_offset;
     VkDeviceSize offset;  // in the staging memory
@@ -52,24 +52,16 @@ struct vkb_readback {
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);
 
-// Selects how the output, which is rows of an image of this format and width, is copied.
-bool vkb_readback_plan(const struct vkb_device *device, struct vkb_readback *readback,
-                       enum vkb_format format, uint32_t width, struct vkb_output *output,
-                       struct vkb_error *error);
 // Whether the output has all channels of its image.
 bool vkb_readback_is_complete(const struct vkb_output *output);
 // Whether a pass can store words to the output's memory: it must have all `height` rows of the
 // image.
 bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
                               uint32_t height);
-// Call after vkb_readback_plan for all outputs: reserves the staging memory.
-bool vkb_readback_reserve(const struct vkb_device *device, struct vkb_readback *readback,
-                          struct vkb_error *error);
-
-// Records what the output's sink needs.
-void vkb_readback_record(const struct vkb_device *device, VkCommandBuffer commands,
-                         const struct vkb_readback *readback, struct vkb_image *image,
-                         const struct vkb_output *output);
+// Records the copy of the output's rows of an image to a buffer.
+void vkb_readback_copy(const struct vkb_device *device, VkCommandBuffer commands,
+                       struct vkb_image *image, const struct vkb_output *output, VkBuffer to,
+                       VkDeviceSize offset);
 
 // Call when the device has finished, before the first fetch.
 bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback *readback,

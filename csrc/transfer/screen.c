@@ -1,5 +1,7 @@
 #include "transfer/screen.h"
 
+#include "execute/record.h"
+
 #include "vulkan/labels.h"
 
 #include <string.h>
@@ -203,8 +205,8 @@ static bool renew(struct vkb_device *device, struct vkb_screen *screen, const st
     return screen->swapchain && create_images(device, screen, extent, error);
 }
 
-bool vkb_screen_acquire(struct vkb_device *device, struct vkb_submissions *submissions,
-                        struct vkb_show *show, VkSemaphore available, struct vkb_error *error)
+static bool acquire(struct vkb_device *device, struct vkb_submissions *submissions,
+                    struct vkb_show *show, VkSemaphore available, struct vkb_error *error)
 {
     const uint64_t patience = 1000000000;  // ns; some compositors give a hidden window no image
     struct vkb_screen *screen = show->screen;
@@ -225,8 +227,8 @@ bool vkb_screen_acquire(struct vkb_device *device, struct vkb_submissions *submi
         || vkb_check(error, result, "vkAcquireNextImageKHR");
 }
 
-void vkb_screen_record(const struct vkb_device *device, VkCommandBuffer commands,
-                       struct vkb_screen *screen, struct vkb_image *from)
+static void copy_to_screen(const struct vkb_device *device, VkCommandBuffer commands,
+                           struct vkb_screen *screen, struct vkb_image *from)
 {
     struct vkb_image *to = &screen->images[screen->index].image;
     const VkImageLayout layout = vkb_access_layout(VKB_ACCESS_COPY_TARGET);
@@ -261,8 +263,7 @@ void vkb_screen_record(const struct vkb_device *device, VkCommandBuffer commands
     vkb_label_end(device, commands);
 }
 
-bool vkb_screen_present(struct vkb_device *device, struct vkb_screen *screen,
-                        struct vkb_error *error)
+static bool present(struct vkb_device *device, struct vkb_screen *screen, struct vkb_error *error)
 {
     const VkPresentInfoKHR info = {
         .sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR,
@@ -279,3 +280,39 @@ bool vkb_screen_present(struct vkb_device *device, struct vkb_screen *screen,
     return result == VK_SUBOPTIMAL_KHR || result == VK_ERROR_OUT_OF_DATE_KHR
         || vkb_check(error, result, "vkQueuePresentKHR");
 }
+
+static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,
+                    struct vkb_error *error)
+{
+    const VkSemaphore available = run->submission->commands.available;
+
+    (void)requests, (void)request_count;
+    if (!run->show)
+        return true;
+    if (!acquire(run->device, &run->frame->submissions, run->show, available, error))
+        return false;
+    if (run->show->acquired) {
+        const struct vkb_screen *screen = run->show->screen;
+        run->sync.waits[VKB_EXTERNAL_SCREEN].semaphore = available;
+        run->sync.signals[VKB_EXTERNAL_SCREEN].semaphore = screen->images[screen->index].rendered;
+    }
+    return true;
+}
+
+static bool record(struct vkb_run *run, struct vkb_error *error)
+{
+    (void)error;
+    if (run->show)
+        copy_to_screen(run->device, run->submission->commands.buffer, run->show->screen,
+                       &run->images[run->request->plan->outputs[0]]->image);
+    return true;
+}
+
+static bool finish(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
+                   struct vkb_error *error)
+{
+    (void)requests, (void)request_count;
+    return !run->show || present(run->device, run->show->screen, error);
+}
+
+const struct vkb_sink vkb_screen_sink = {prepare, record, finish};

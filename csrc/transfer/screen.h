@@ -40,15 +40,4 @@ struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceK
 void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *screen,
                         struct vkb_screen **screens);
 
-// Acquires an image. `available` is signalled when the image can be written.
-bool vkb_screen_acquire(struct vkb_device *device, struct vkb_submissions *submissions,
-                        struct vkb_show *show, VkSemaphore available, struct vkb_error *error);
-// Copies a framebuffer to the image that was acquired, scaled to the surface. If the proportions
-// differ, black bars are added.
-void vkb_screen_record(const struct vkb_device *device, VkCommandBuffer commands,
-                       struct vkb_screen *screen, struct vkb_image *from);
-// Presents the image after the submission that signals its semaphore.
-bool vkb_screen_present(struct vkb_device *device, struct vkb_screen *screen,
-                        struct vkb_error *error);
-
 #endif
