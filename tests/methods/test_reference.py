@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -384,10 +385,10 @@ def test_nan_and_infinity_stay_at_their_own_components(tonemap: Any) -> None:
 @pytest.mark.parametrize(
     ("image", "error", "words"),
     [
-        (np.zeros((4, 4, 3), np.int32), TypeError, "image must be uint8.*not int32"),
-        (np.zeros((4, 4)), ValueError, r"image must have the shape \(H, W, C\), not \(4, 4\)"),
-        (np.zeros((0, 4, 3)), ValueError, r"not \(0, 4, 3\)"),
-        (np.zeros((4, 4, 2)), ValueError, "image must have 3 or 4 channels, not 2"),
+        (np.zeros((4, 4, 3), np.int32), TypeError, "image: int32 is not uint8"),
+        (np.zeros((4, 4)), ValueError, r"image: shape \(4, 4\) is not \(H, W, C\)"),
+        (np.zeros((0, 4, 3)), ValueError, r"image: shape \(0, 4, 3\) is not"),
+        (np.zeros((4, 4, 2)), ValueError, "image: 2 channels are not 3 or 4"),
     ],
 )
 def test_wrong_images(image: Any, error: type[Exception], words: str) -> None:
@@ -396,27 +397,29 @@ def test_wrong_images(image: Any, error: type[Exception], words: str) -> None:
 
 
 def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match=r"size must be .*not \(0, 4\)"):
+    with pytest.raises(ValueError, match=r"size: \(0, 4\) is not"):
         reference.blur(flat(1.0), Separable(), (0, 4))
-    with pytest.raises(ValueError, match=r"format must be .*not 'rgb565'"):
+    with pytest.raises(ValueError, match="format: 'rgb565' is not"):
         reference.blur(flat(1.0), Separable(), format="rgb565")
     with pytest.raises(ValueError, match=r"firefly_filter needs .*not 2"):
         reference.blur(flat(1.0, channels=2), Pyramid(firefly_filter=True))
-    with pytest.raises(ValueError, match="bloom must have the scene's height and width"):
+    with pytest.raises(ValueError, match="bloom: height and width"):
         reference.composite(flat(1.0), flat(1.0, 3, 3), Separable())
-    with pytest.raises(TypeError, match="bloom must be an array"):
+    with pytest.raises(TypeError, match="bloom: None is not an array"):
         reference.composite(flat(1.0), None, Separable())
 
 
 @pytest.mark.parametrize("settings", [None, "kino", {"threshold": 1.0}], ids=repr)
 def test_wrong_settings(settings: Any) -> None:
-    for call in (reference.apply, reference.passes, reference.blur):
+    calls: list[Callable[[], object]] = [
+        *(partial(call, flat(1.0), settings) for call in (reference.apply, reference.blur)),
+        *(partial(call, flat(1.0), settings) for call in (reference.passes, reference.vjp)),
+        partial(reference.gain, settings),
+        partial(reference.composite, flat(1.0), flat(1.0), settings),
+    ]
+    for call in calls:
         with pytest.raises(TypeError, match=r"^settings: .* is not a Settings"):
-            call(flat(1.0), settings)
-    with pytest.raises(TypeError, match=r"^settings: "):
-        reference.gain(settings)
-    with pytest.raises(TypeError, match=r"^settings must be "):
-        reference.composite(flat(1.0), flat(1.0), settings)
+            call()
 
 
 def test_grey_can_take_the_firefly_filter() -> None:
