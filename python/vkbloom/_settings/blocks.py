@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
 
 from vkbloom import _core
 
@@ -14,6 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["settings_block"]
 
+Table = Mapping[str, tuple[int, str, int]]
+Values = Mapping[str, tuple[float, float, float]]
+
+#: The codes of the tables as those of the module struct.
+_CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
 #: Members that are arrays of numbers, and the member that counts them, if there is one.
 _COUNTS: Final[Mapping[str, str | None]] = {
     "weights": "weight_count",
@@ -22,30 +26,20 @@ _COUNTS: Final[Mapping[str, str | None]] = {
     "tint": None,
     "sun_position": None,
 }
+_MAX_FLOAT: Final = 3.4028234663852886e38
 
 
-def _defaults(
-    table: Mapping[str, tuple[int, str, int]], values: Mapping[str, tuple[float, float, float]]
-) -> np.ndarray[Any, Any]:
-    """Return a struct whose numbers have their defaults."""
-    rows = {name: row for name, row in table.items() if name}
-    formats = [
-        (np.dtype(code), (count,) if count > 1 else ())
-        if code
-        else (_STAGE.dtype, (count // _STAGE.dtype.itemsize,))
-        for _, code, count in rows.values()
-    ]
-    offsets = [offset for offset, *_ in rows.values()]
-    layout: Any = {
-        "names": [*rows],
-        "formats": formats,
-        "offsets": offsets,
-        "itemsize": table[""][2],
-    }
-    block = np.zeros((), np.dtype(layout))
+def _pack(block: bytearray, table: Table, name: str, *numbers: float) -> None:
+    offset, code, _ = table[name]
+    struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, offset, *numbers)
+
+
+def _defaults(table: Table, values: Values) -> bytes:
+    """Return a struct whose numbers have their defaults, and whose rest is 0."""
+    block = bytearray(table[""][2])
     for name, (default, _, _) in values.items():
-        block[name] = default
-    return block
+        _pack(block, table, name, default)
+    return bytes(block)
 
 
 _STAGE: Final = _defaults(_core.STAGE_BLOCK, _core.GLARE_VALUES)
@@ -58,43 +52,49 @@ def _index(name: str, value: object, names: Sequence[str]) -> int:
     return names.index(str(value))
 
 
-def _store(block: Any, name: str, value: Any, table: Mapping[str, tuple[float, ...]]) -> None:
+def _pack_value(block: bytearray, table: Table, name: str, value: float, values: Values) -> None:
     """Store a number of a table; raise ValueError if it is out of its range."""
-    _, low, high = table[name]
-    if not low <= value <= high:
+    default, low, high = values[name]
+    if not low <= value <= high and value != default:
         raise ValueError(f"{name}: {value!r} is out of range, {low!r} to {high!r}")
-    block[name] = value
+    _pack(block, table, name, int(value) if table[name][1] == "i4" else value)
 
 
-def _store_array(block: Any, name: str, value: Any) -> None:
-    rows = np.asarray(value, np.float64)
-    numbers = rows.ravel()
-    room = block[name].size
-    if not 1 <= numbers.size <= room:
-        raise ValueError(f"{name}: {numbers.size} numbers are out of range, 1 to {room}")
-    if not (abs(numbers) <= np.finfo(np.float32).max).all():
+def _pack_array(block: bytearray, name: str, value: Sequence[Any]) -> None:
+    rows = [row if isinstance(row, tuple) else (row,) for row in value]
+    numbers = [float(number) for row in rows for number in row]
+    room = _core.SETTINGS_BLOCK[name][2]
+    if not 1 <= len(numbers) <= room:
+        raise ValueError(f"{name}: {len(numbers)} numbers are out of range, 1 to {room}")
+    if not all(abs(number) <= _MAX_FLOAT for number in numbers):
         raise ValueError(f"{name}: {value!r} is out of range, finite numbers")
-    block[name][: numbers.size] = numbers
+    _pack(block, _core.SETTINGS_BLOCK, name, *numbers)
     if counter := _COUNTS[name]:
-        block[counter] = len(rows)
+        _pack(block, _core.SETTINGS_BLOCK, counter, len(rows))
 
 
-def _stage_block(stage: Glare) -> np.ndarray[Any, Any]:
-    block = _copy(_STAGE)
-    block["kind"] = _index("glare", stage.stage, _core.STAGES)
+def _pack_size(block: bytearray, size: tuple[int, int]) -> None:
+    width, height = size
+    if not all(1 <= side < 1 << 32 for side in size):
+        raise ValueError(f"bloom_size: {size!r} is out of range, sides of at least 1")
+    _pack(block, _core.SETTINGS_BLOCK, "bloom_width", width)
+    _pack(block, _core.SETTINGS_BLOCK, "bloom_height", height)
+
+
+def _stage_block(stage: Glare) -> bytearray:
+    table, block = _core.STAGE_BLOCK, bytearray(_STAGE)
+    _pack(block, table, "kind", _index("glare", stage.stage, _core.STAGES))
     for name in _core.GLARE_VALUES:
         if (value := getattr(stage, name, None)) is not None:
-            _store(block, name, value, _core.GLARE_VALUES)
-    ghosts = getattr(stage, "ghosts", ())
-    numbers = np.array([(*tint, scale) for scale, tint in ghosts], np.float32).ravel()
-    block["ghosts"][: numbers.size] = numbers
-    block["ghost_count"] = len(ghosts)
+            _pack_value(block, table, name, value, _core.GLARE_VALUES)
+    numbers = [n for scale, tint in getattr(stage, "ghosts", ()) for n in (*tint, scale)]
+    if len(numbers) > table["ghosts"][2]:
+        raise ValueError(
+            f"ghosts: {len(numbers) // 4} ghosts are out of range, 0 to {_core.MAX_GHOSTS}"
+        )
+    _pack(block, table, "ghosts", *numbers)
+    _pack(block, table, "ghost_count", len(numbers) // 4)
     return block
-
-
-def _copy(block: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return a copy, faster than NumPy, which copies member by member."""
-    return np.ndarray((), block.dtype, bytearray(block.tobytes()))
 
 
 def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
@@ -102,26 +102,26 @@ def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
 
     Raises ValueError or TypeError if the core has no room for a value.
     """
-    block = _copy(_SETTINGS)
-    block["method"] = _index("method", method, _core.METHODS)
-    block["thresholded"] = fields.get("threshold") is not None
+    table, block = _core.SETTINGS_BLOCK, bytearray(_SETTINGS)
+    _pack(block, table, "method", _index("method", method, _core.METHODS))
+    _pack(block, table, "thresholded", fields.get("threshold") is not None)
     for name, value in fields.items():
         if value is None:
             continue
         if name in _core.VALUES:
-            _store(block, name, value, _core.VALUES)
+            _pack_value(block, table, name, value, _core.VALUES)
         elif name in _core.CHOICES:
-            block[name] = _index(name, value, _core.CHOICES[name])
+            _pack(block, table, name, _index(name, value, _core.CHOICES[name]))
         elif name in _COUNTS:
-            _store_array(block, name, value)
+            _pack_array(block, name, value)
         elif name == "bloom_size":
-            block["bloom_width"], block["bloom_height"] = value
+            _pack_size(block, value)
         elif name == "format":
-            block["format"] = _index(name, value, _core.FORMATS)
-    stages = fields.get("glare", ())
+            _pack(block, table, name, _index(name, value, _core.FORMATS))
+    stages = [_stage_block(stage) for stage in fields.get("glare", ())]
     if len(stages) > _core.MAX_STAGES:
         raise ValueError(f"glare: {len(stages)} stages are out of range, 0 to {_core.MAX_STAGES}")
-    for place, stage in enumerate(stages):
-        block["stages"][place] = _stage_block(stage)
-    block["stage_count"] = len(stages)
-    return block.tobytes()
+    start, size = table["stages"][0], len(_STAGE)
+    block[start : start + size * len(stages)] = b"".join(stages)
+    _pack(block, table, "stage_count", len(stages))
+    return bytes(block)
