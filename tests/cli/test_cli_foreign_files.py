@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.io import foreign
+from tests.io.parts import written
 from tests.io.profiles import store_png
 from vkbloom._cli import bands
 from vkbloom._cli.program import program
@@ -75,10 +76,7 @@ def test_ultra_hdr_starts_from_photo(tmp_path: Path, renderer: vkbloom.Renderer)
     spec = oiio.ImageSpec(64, 64, 3, "half")
     spec.attribute("jpeg:ultrahdr", 1)
     spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
-    writer = oiio.ImageOutput.create("a.jpg")
-    assert writer.open(str(tmp_path / "a.jpg"), spec)
-    assert writer.write_image(np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
-    assert writer.close()
+    written(tmp_path / "a.jpg", spec, np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
     assert apply(tmp_path / "a.jpg", tmp_path / "b.exr").exit_code == 0
     image = vkbloom.read(tmp_path / "a.jpg")
     expected = renderer.apply(image, vkbloom.presets["photo"])["final"]

@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.exhaustive import by_turns
+from tests.io.parts import written
 from vkbloom._cli import bands, image_files
 from vkbloom._cli.bands import BloomByBands
 from vkbloom._cli.program import program
@@ -34,11 +35,7 @@ def stored(path: Path, pixels: Any, tile: int = 0) -> Path:
         spec.channelnames = ("Y", "A")[:channels]
     if tile:
         spec.tile_width = spec.tile_height = tile
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(pixels)
-    assert writer.close()
-    return path
+    return written(path, spec, pixels)
 
 
 def light(height: int, width: int, channels: int, dtype: str) -> Any:
@@ -136,19 +133,6 @@ def same_as_a_whole(
     return result
 
 
-@pytest.mark.parametrize("height", [512, 513])
-@pytest.mark.parametrize("preset", ["bevy_natural", "kino", "jimenez2014", "tutorial"])
-def test_by_bands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int], preset: str, height: int
-) -> None:
-    """Of a height that those of all levels divide, and of one that has no divisor with them."""
-    path = stored(tmp_path / "a.png", light(height, 41, 3, "uint8"))
-    held = []
-    monkeypatch.setattr(bands._Work, "_held_whole", lambda *_: held.append(1))
-    same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path, "--preset", preset)
-    assert not held
-
-
 @pytest.mark.parametrize("size", [(1, 161), (161, 1), (20000, 3)])
 def test_pictures_of_any_shape(tmp_path: Path, size: tuple[int, int]) -> None:
     """Also higher than the images of most devices: these are taken by rows."""
@@ -172,10 +156,7 @@ def test_turned_pictures(
     path = tmp_path / "a.tif"
     spec = oiio.ImageSpec(41, 50, 3, "uint8")
     spec.attribute("Orientation", orientation)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(light(50, 41, 3, "uint8"))
-    assert writer.close()
+    written(path, spec, light(50, 41, 3, "uint8"))
     result = same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path)
     assert result.shape == ((41, 50, 3) if orientation == 6 else (50, 41, 3))
 
@@ -253,14 +234,6 @@ def test_mask_or_emission_of_another_shape_is_refused(
     assert not by_rows
 
 
-def test_missing_bloom_is_noted(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
-    result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
-    assert result.exit_code == 0
-    assert "no value is above the threshold 1" in result.stderr
-    assert by_rows
-
-
 @pytest.mark.parametrize("where", ["reduce", "finals"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, vkbloom.DeviceLostError("lost")])
 def test_failure_leaves_no_file(
@@ -279,13 +252,3 @@ def test_failure_leaves_no_file(
     result = run(path, tmp_path / "b.png")
     assert result.exit_code == (130 if error is KeyboardInterrupt else 1)
     assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_a_damaged_file(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    result = run(path, tmp_path / "b.png")
-    assert result.exit_code == 1
-    assert "a.png: damaged" in result.stderr
-    assert not (tmp_path / "b.png").exists()

@@ -25,7 +25,6 @@ from vkbloom._cli.program import program
 from vkbloom._grid.order import blocks
 from vkbloom._grid.parts import read_part
 
-pytest.importorskip("zarr")
 SCRIPT = "tests.grid.grid_in_parts"
 ROOT = Path(__file__).resolve().parents[2]
 AXES: dict[str, Any] = {"intensity": np.linspace(0, 1, 5), "blur_scale": [0.5, 1.0, 2.0, 3.0]}
