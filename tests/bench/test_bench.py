@@ -112,18 +112,12 @@ def test_one_wrong_pixel_is_a_disagreement(dtype: Any) -> None:
     assert found.largest == pytest.approx(3.0, abs=3e-3)
 
 
-def test_alpha_is_not_compared() -> None:
+def test_colours_are_compared_and_not_alpha() -> None:
     ours = pictures((8, 8), np.float32)[0]
-    theirs = ours.copy()
-    theirs[..., 3] = 7
-    assert agreement("", ours, theirs, 0.0, "").agrees
-    assert agreement("", ours, theirs[..., :3], 0.0, "").agrees
-
-
-def test_images_that_cannot_be_compared_do_not_agree() -> None:
-    ours = pictures((8, 8), np.float32)[0]
-    nan = ours.copy()
-    nan[0, 0, 0] = np.nan
+    same, nan = ours.copy(), ours.copy()
+    same[..., 3], nan[0, 0, 0] = 7, np.nan
+    for theirs in (same, same[..., :3]):
+        assert agreement("", ours, theirs, 0.0, "").agrees
     for theirs in (ours[:4], ours.astype(np.float16), nan):
         assert not agreement("", ours, theirs, math.inf, "").agrees
 
@@ -156,24 +150,19 @@ def test_a_wrong_peer_is_told_and_not_timed(
 # Peers
 
 
-def test_a_missing_peer_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(peers, "find_spec", lambda name: None)
-    missing: list[str] = []
-    assert peers.gather(("OpenCV", "PyTorch"), lambda peer: {"": peer}, missing) == {}
-    assert missing == ["OpenCV is not installed", "PyTorch is not installed"]
-
-
-@pytest.mark.parametrize("error", [ImportError, OSError, RuntimeError, AttributeError])
-def test_a_peer_that_fails_is_listed(
-    monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+@pytest.mark.parametrize("error", [None, ImportError, OSError, RuntimeError, AttributeError])
+def test_a_peer_that_is_missing_or_fails_is_listed(
+    monkeypatch: pytest.MonkeyPatch, error: type[Exception] | None
 ) -> None:
     def make(_: Any) -> dict[str, Any]:
+        assert error is not None
         raise error("libcuda.so.1:\n no such file")
 
-    monkeypatch.setattr(peers, "find_spec", lambda name: True)
+    monkeypatch.setattr(peers, "find_spec", lambda name: error)
     missing: list[str] = []
     assert peers.gather(("CuPy",), make, missing) == {}
-    assert missing == ["CuPy does not run here: libcuda.so.1: no such file"]
+    fails = "CuPy does not run here: libcuda.so.1: no such file"
+    assert missing == [fails if error else "CuPy is not installed"]
 
 
 def test_every_peer_has_a_module() -> None:

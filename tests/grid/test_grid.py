@@ -304,7 +304,7 @@ class TestMemory:
     def test_grid_larger_than_memory_is_refused(
         self, filled: Call, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(Renderer, "_run_work", None)
+        monkeypatch.setattr(Renderer, "_run_requests", None)
         image = np.zeros((1000, 1000, 4), np.float32)
         axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
         told = r"1000000 points with final needs 16,000.0 GB .* grid, .* framebuffers=\(\)"
@@ -390,7 +390,7 @@ class TestRefusals:
 
     @pytest.fixture
     def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for name in ("apply", "_run_work"):
+        for name in ("apply", "_run_requests"):
             monkeypatch.setattr(Renderer, name, None)
 
     @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_errors_say_the_cure(image: NDArray[Any], error: type[Exception], cure: 
 
 
 def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
-    with pytest.raises(TypeError, match=r"^scene: a Scene is needed, not ndarray$"):
+    with pytest.raises(TypeError, match=r"^scene: ndarray is not a Scene$"):
         renderer.render(IMAGE)  # type: ignore[arg-type]
 
 

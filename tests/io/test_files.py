@@ -22,7 +22,6 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-import vkbloom._renderer.frame_files
 from tests.exhaustive import by_turns
 from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, read
 from tests.images import noise
@@ -386,15 +385,15 @@ class TestWriteErrors:
             {"glow": noise(2, 2, 4, dtype="uint8"), "final": noise(9, 9, 3, dtype="uint8")}
         )
         (tmp_path / "out_glow.png").write_text("the one before")
-        original = vkbloom._renderer.frame_files._write_image
+        original = safe_writing.check_complete
 
-        def write_image(oiio: Any, frames: Frames, name: str, *files: Path) -> bool:
-            if name == "final":
-                raise OSError(errno.ENOSPC, "full", str(files[1]))
-            return original(oiio, frames, name, *files)
+        def check(oiio: Any, temporary: Path, file: Path) -> None:
+            if file.name == "out_final.png":
+                raise OSError(errno.ENOSPC, "full", str(file))
+            original(oiio, temporary, file)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(vkbloom._renderer.frame_files, "_write_image", write_image)
+            patch.setattr(safe_writing, "check_complete", check)
             with pytest.raises(OSError, match=r"out_final\.png"):
                 frames.save(tmp_path / "out.png")
         assert names_in(tmp_path) == ["out_glow.png"]

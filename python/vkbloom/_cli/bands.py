@@ -378,7 +378,7 @@ class _Notes:
 
     def lines(self) -> Iterator[str]:
         """Yield each note once, with the name of the file."""
-        if (text := image_reading.specials_note(self.nan, self.infinite)) is not None:
+        if (text := image_reading.non_finite_note(self.nan, self.infinite)) is not None:
             yield f"{self.file} {text}"
         for text in (*self.texts, *hidden_notes(self.hidden, self.visible)):
             yield f"{self.file}: {text}"

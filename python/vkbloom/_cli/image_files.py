@@ -130,7 +130,7 @@ def read_picture(
     for told in part_notes(stored, layer):
         note(f"{source}: {told}")
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
-    if (text := image_reading.specials_note(*counts)) is not None:
+    if (text := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")

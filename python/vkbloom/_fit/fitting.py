@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import MANY_SETTINGS, checked_as
 from vkbloom._checks import check_image, check_index, import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
@@ -71,7 +71,7 @@ def fit(
     gradient: bool = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
-@checked
+@checked_as(settings=MANY_SETTINGS)
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import ANY, SETTINGS, checked_as
 
 from ._image import as_float, format_of, storage
 from ._sampling import Array
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["composite", "composite_checked"]
 
 
-@checked
+@checked_as(bloom=ANY, settings=SETTINGS)
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import SETTINGS, checked_as
 from vkbloom._settings.fields import fields_of
 
 from ._framebuffers import checked_image, framebuffers
@@ -48,7 +48,7 @@ def check_known(name: str, names: Collection[str]) -> None:
         raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(names)}")
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def vjp(
     image: NDArray[Any],
     settings: Settings,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import SETTINGS, checked_as
 from vkbloom._settings.registry import METHODS, Reference
 
 from . import _custom as custom
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["apply", "blur", "gain", "passes"]
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def apply(
     image: NDArray[Any],
     settings: Settings,
@@ -165,7 +165,7 @@ def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def passes(
     glow: NDArray[Any],
     settings: Settings,
@@ -232,7 +232,7 @@ def passes(
     return _with_alphas(framebuffers)
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def blur(
     glow: NDArray[Any],
     settings: Settings,
@@ -266,7 +266,7 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
@@ -73,7 +73,7 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     )
 
 
-@checked
+@checked_as(glow=FUNCTION)
 def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
@@ -157,7 +157,7 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         )
 
 
-@checked
+@checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
     probe: Probe = _DEFAULT,
