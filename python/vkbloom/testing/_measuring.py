@@ -222,7 +222,7 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     for name, array in expected.items():
         wanted, got = np.atleast_3d(array)[..., :3], np.atleast_3d(frames[name])[..., :3]
         if wanted.shape != got.shape:
-            raise ValueError(f"the twin's {name} has the shape {wanted.shape}, not {got.shape}")
+            raise ValueError(f"reference: the shape of {name}, {wanted.shape}, is not {got.shape}")
         largest = float(np.abs(wanted).max()) or 1.0
         found[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
     return found
