@@ -494,18 +494,18 @@
 #define FUSED_VEC4S                   5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
-// FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
+// FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
 // butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
 // clamped, since their sums would overflow.
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
-#define FFT_MAX_RADIX  64
+#define FFT_MOST_RADIX  64
 #define FFT_SMALL_RADIX 16
 #define FFT_SMALL_PIXELS 131072
 // With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups run
 // at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
-// FFT_MAX_GROUP_RADIX.
-#define FFT_MAX_GROUP_RADIX  16
+// FFT_MOST_GROUP_RADIX.
+#define FFT_MOST_GROUP_RADIX  16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 

@@ -90,7 +90,7 @@ void transform_held(bool inverse)
 }
 
 // exp(-2 pi i k q / n), or its inverse, for q of 0 to RADIX - 1.
-vec2 turns[FFT_MAX_RADIX];
+vec2 turns[FFT_MOST_RADIX];
 
 void compute_turns(int k, int n, bool inverse)
 {
@@ -119,7 +119,7 @@ void store_line(int first, int across)
 
 void multiply_grey(int first, int across)
 {
-    vec4 values[FFT_MAX_RADIX];
+    vec4 values[FFT_MOST_RADIX];
     [[unroll]] for (int i = 0; i < RADIX; ++i)
         values[i] = rotated(held[place_of(i)], load_factor(texel_at(first + i, across)).xy);
     [[unroll]] for (int i = 0; i < RADIX; ++i)
@@ -181,7 +181,7 @@ void multiply_colours(int number, int index)
     int other_number = mirrored(number, blocks, params.count);
     int frequency = frequency_at(across, rows), other = (params.row_length - frequency) % params.row_length;
     bool own = number == 0;
-    vec4 values[FFT_MAX_RADIX], others[FFT_MAX_RADIX];
+    vec4 values[FFT_MOST_RADIX], others[FFT_MOST_RADIX];
 
     if (frequency > other || (frequency == other && number > other_number))
         return;
