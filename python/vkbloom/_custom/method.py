@@ -179,11 +179,6 @@ def load_method(
     OSError
         The file cannot be read.
 
-    See Also
-    --------
-    Settings : The fields of all methods.
-    Renderer.apply : Uses settings.
-
     Notes
     -----
     Passes can bind ``MAIN`` (the frame), ``GLOW`` (what glows), and what they saved. Saved textures

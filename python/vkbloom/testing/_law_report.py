@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,6 +13,8 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._views import markup
+from vkbloom._views.markup import element
 from vkbloom.testing._deviations import measuring
 from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
@@ -148,27 +149,24 @@ class LawReport:
 
     def _repr_html_(self) -> str:
         """Return the same as a table."""
-        heads = "".join(
-            f'<th scope="col" style="text-align:left">{head}</th>'
-            for head in ("law", "held", "off by", "allowed", "why it may be broken")
-        )
-        body = []
+        rows = []
         for row in self.rows:
-            kind = self.kind(row)
-            words = f"<b>{row.words}</b>" if not row.held else row.words
-            words += " (required)" if row.name in self.required else ""
-            why = "" if row.held else f"{html.escape(row.message)}<br><i>{html.escape(row.why)}</i>"
-            body.append(
-                f'<tr class="{kind}"><th scope="row" style="text-align:left;color:{COLOURS[kind]}" '
-                f'title="{html.escape(row.law)}">{row.name}</th>'
-                f'<td style="color:{COLOURS[kind]}">{words}</td>'
-                + "".join(f"<td>{cell}</td>" for cell in _cells(row))
-                + f'<td style="text-align:left">{why}</td></tr>'
+            kind = {"class_": self.kind(row), "style": f"color:{COLOURS[self.kind(row)]}"}
+            words = element("span", row.words if row.held else element("b", row.words), **kind)
+            required = " (required)" * (row.name in self.required)
+            why = ("",) if row.held else (row.message, element("br"), element("i", row.why))
+            rows.append(
+                (
+                    element("span", row.name, title=row.law, **kind),
+                    markup.joined((words, required)),
+                    *_cells(row),
+                    element("span", *why, style="text-align:left"),
+                )
             )
-        return (
-            f'<table style="color:inherit"><caption>{html.escape(str(self).splitlines()[0])}'
-            f"</caption><thead><tr>{heads}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-        )
+        head = ("law", "held", "off by", "allowed", "why it may be broken")
+        caption = str(self).splitlines()[0]
+        name = {"style": "text-align:left"}
+        return markup.table(rows, head, caption=caption, name=name, style="color:inherit")
 
 
 def _cells(row: LawRow) -> tuple[str, str]:
