@@ -113,9 +113,9 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size and of the
-// filtered image; the taps along rows and along columns. If the target is exactly twice as large, `taps`
-// has the same weights on integer texels.
+// A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size
+// and of the filtered image; the taps along rows and along columns. If the target is exactly twice
+// as large, `taps` has the same weights on integer texels.
 #define FILTER_ROWS(B, INPUT, VEC4S) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
@@ -135,9 +135,9 @@
     FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by brightness, and
-// the first pass of a published method, which reads the frame. The steps are the distances of its taps in
-// texels of what it reads.
+// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by
+// brightness, and the first pass of a published method, which reads the frame. The steps are the
+// distances of its taps in texels of what it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -186,8 +186,9 @@
     VEC4S(B, ghosts, MAX_GHOSTS)
 
 // Of an adjoint pass that reads many pixels for the texels of a block, which is `summed_width` x
-// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each texel
-// and each group of rows, in blocks of which `summed_columns` are beside each other (summed.glsl).
+// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each
+// texel and each group of rows, in blocks of which `summed_columns` are beside each other
+// (summed.glsl).
 #define SUMMED_ROWS(B, INPUT) \
     INPUT(B, int, summed_x) \
     INPUT(B, int, summed_y) \
@@ -202,17 +203,17 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its adjoint
-// are equal where they differ by no more than the rounding.
+// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its
+// adjoint are equal where they differ by no more than the rounding.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
     INPUT(B, float, rounding) \
     VEC4S(B, factors, 1)
 
-// Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows from
-// its end at the left or right or at the bottom, or back from its other end. `distance` is that of
-// the pixels that are mixed.
+// Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows
+// from its end at the left or right or at the bottom, or back from its other end. `distance` is
+// that of the pixels that are mixed.
 #define STAR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, step_x) \
     INPUT(B, int, step_y) \
@@ -221,8 +222,8 @@
     INPUT(B, float, fade) \
     INPUT(B, float, limit)
 
-// Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of the
-// sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
+// Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
+// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
@@ -236,9 +237,9 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
-// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels; the
-// factor of the colours of what is added. A filter between levels of exactly half and twice the size is
-// of EXACT_*; `taps` are those of an upsampling, as of FILTER_ROWS.
+// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
+// the factor of the colours of what is added. A filter between levels of exactly half and twice the
+// size is of EXACT_*; `taps` are those of an upsampling, as of FILTER_ROWS.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
@@ -261,11 +262,11 @@
 
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
-// Elements from `kept` on are not stored. The first stage pads the line: its first `extent` elements
-// are texels, and elements from `turn` on are positions before the first texel. The product with a
-// kernel with colours reads the frequency of the opposite sign. To find it, it needs the radices of
-// the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used), the rows' number
-// of elements, and the radices of the columns' stages without the last one.
+// Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
+// elements are texels, and elements from `turn` on are positions before the first texel. The
+// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
+// the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
+// the rows' number of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -289,8 +290,8 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`: all
-// channels are equal.
+// texels, how many of them before and after its centre count, and the period of the line. `grey`:
+// all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -309,7 +310,7 @@
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
 #define OWN_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, OWN_VEC4S)
-#define OWN_VEC4S 64
+#define OWN_VEC4S                         64
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(own, OWN_BLOCK) \
@@ -422,9 +423,9 @@
 // Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
 // the size of their scales, the taps of an iteration of a streak, and how often the size of the
 // bloom buffers is halved.
-#define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MAX_STAGES   (GATHERED_LEVELS - 2)
 #define MAX_GHOSTS   16
-#define GHOST_LIMIT   16.0
+#define GHOST_LIMIT  16.0
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
 
@@ -445,11 +446,11 @@
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
-// On an H100, halving 3840 x 2160 of float32 takes 103 us in strips of 1 x 4 by 32 invocations, 140 in
-// strips of 4 x 16 by 8, and 109 from tiles in shared memory.
-#define HALVE_INVOCATIONS   32
-#define HALVE_COLUMNS       1
-#define HALVE_ROWS          4
+// On an H100, halving 3840 x 2160 of float32 takes 103 us in strips of 1 x 4 by 32 invocations, 140
+// in strips of 4 x 16 by 8, and 109 from tiles in shared memory.
+#define HALVE_INVOCATIONS 32
+#define HALVE_COLUMNS     1
+#define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
@@ -474,41 +475,42 @@
 #define TILE_RUNS                     4
 #define TILE_RADIUS                   16
 // Tiles of levels of exactly twice the size, and of the transposes of both: their pixels, and the
-// invocations along a column. On an H100 with float32, the tile of four rows of the second transpose takes
-// 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16, 256 invocations composite
-// 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one of 32 x 16, 151 in one of 64 x 16.
-#define DOUBLE_TILE_COLUMNS           64
-#define DOUBLE_TILE_ROWS              16
-#define DOUBLE_TILE_RUNS              4
-#define ADJOINT_HALVE_COLUMNS         32
-#define ADJOINT_HALVE_ROWS            16
-#define ADJOINT_HALVE_RUNS            4
-#define ADJOINT_DOUBLE_COLUMNS        61
-#define ADJOINT_DOUBLE_ROWS           4
-#define FUSED_VEC4S                   5
+// invocations along a column. On an H100 with float32, the tile of four rows of the second
+// transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
+// 256 invocations composite 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one
+// of 32 x 16, 151 in one of 64 x 16.
+#define DOUBLE_TILE_COLUMNS    64
+#define DOUBLE_TILE_ROWS       16
+#define DOUBLE_TILE_RUNS       4
+#define ADJOINT_HALVE_COLUMNS  32
+#define ADJOINT_HALVE_ROWS     16
+#define ADJOINT_HALVE_RUNS     4
+#define ADJOINT_DOUBLE_COLUMNS 61
+#define ADJOINT_DOUBLE_ROWS    4
+#define FUSED_VEC4S            5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
 // butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
 // clamped, since their sums would overflow.
-#define FFT_INVOCATIONS 64
-#define FFT_ROW_COLUMNS 8
-#define FFT_MOST_RADIX  64
-#define FFT_SMALL_RADIX 16
+#define FFT_INVOCATIONS  64
+#define FFT_ROW_COLUMNS  8
+#define FFT_MOST_RADIX   64
+#define FFT_SMALL_RADIX  16
 #define FFT_SMALL_PIXELS 131072
-// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups run
-// at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
+// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups
+// run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
 // FFT_MOST_GROUP_RADIX.
 #define FFT_MOST_GROUP_RADIX  16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
-// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels that
-// is added up at once.
+// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels
+// that is added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
-// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of an
-// invocation that writes words.
+// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of
+// an invocation that writes words.
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 
@@ -521,7 +523,7 @@
 #define HDRP_NEAR       0.4
 #define HDRP_KERNEL \
     0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
-#define GODOT_KERNEL    0.2024, 0.1790, 0.1240, 0.0672, 0.0285
+#define GODOT_KERNEL 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
 
 // Of a filter: the most taps along an axis, kernels, and texels of a window.
 #define MAX_FILTER_TAPS 5
@@ -536,16 +538,17 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
-// is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters (lib/filter.glsl). EXACT says
-// that their images are in this ratio, or for strips the widths of these. With FROM_IMAGE, a downsampling to half the size reads
-// the image itself and applies the threshold, and an adjoint pass writes the cotangents of a source's
-// image. BY is what these are of. With ENLARGED the target has more rows than the source. STORED is the format of the target (STORED_*). FIRST
-// marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
-// a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
-// workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a
-// first stage that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp)
-// RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for
-// each of GROUP_WIDTH lines.
+// is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
+// (lib/filter.glsl). EXACT says that their images are in this ratio, or for strips the widths of
+// these. With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
+// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
+// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
+// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
+// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
+// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
+// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
+// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
+// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \

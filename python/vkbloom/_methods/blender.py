@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_floats, check_number
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._methods.blender_kernels import core_kernel_of, kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf

@@ -13,11 +13,11 @@ import inspect
 import math
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Final, Literal, Self
 
 from vkbloom import _core
-from vkbloom._checks import check_above, check_integer, check_number, check_size
+from vkbloom._checks import check_above, check_floats, check_integer, check_number, check_size
 from vkbloom._suggestions import did_you_mean, lacking
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "flag_field",
     "number_field",
     "plain_value",
+    "read_numbers",
     "value_field",
 ]
 
