@@ -98,16 +98,9 @@ struct vkb_settings {
     struct vkb_layer layers[MAX_LAYERS];
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
-<<<<<<< HEAD
-    uint32_t level_weight_count;  // 0: none are given
-    float tint[3];                // of the bloom, and the position of Blender's sun
-    float sun_position[2];        // as shares of the sides from the lower left
-    struct vkb_kernel_data kernel;
-=======
     uint32_t level_weight_count;          // 0: none are given
-    float tint[3];                        // of Blender's glare, and the position of its sun
+    float tint[3];                        // of the bloom, and the position of Blender's sun
     float sun_position[2];                // as shares of the sides from the lower left
->>>>>>> main
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
     // Python packs what is before here.

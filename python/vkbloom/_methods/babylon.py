@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from vkbloom._settings.core_view import core_view
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
@@ -80,13 +80,12 @@ class BabylonBloom(Settings):
         total = sides[0] + 2 * sum(sides[1:])
         return tuple(weight / total for weight in sides)
 
-    @property
-    def core_view(self) -> Any:
-        """The settings with the core's names."""
-        return core_view(
-            self,
-            kernel=None,
-            scale_x=self.scale,
-            weights=self.blur_weights,
-            intensity=self.intensity * self.weight,
-        )
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        values = {
+            "kernel": None,
+            "scale_x": self.scale,
+            "weights": self.blur_weights,
+            "intensity": self.intensity * self.weight,
+        }
+        return settings_block(self.method, vars(self) | values)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from vkbloom._settings.core_view import core_view
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
@@ -53,13 +53,12 @@ class PlayCanvasBloom(Settings):
     format: BloomFormat | None = "rgba16float"
     blur_level: int = number_field(default=16, range=(1, 16))
 
-    @property
-    def core_view(self) -> Any:
-        """The settings with the core's names."""
-        return core_view(
-            self,
-            threshold=self.threshold or None,
-            knee=0.5,
-            clamp_max=65504.0,
-            levels=self.blur_level,
-        )
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        values = {
+            "threshold": self.threshold or None,
+            "knee": 0.5,
+            "clamp_max": 65504.0,
+            "levels": self.blur_level,
+        }
+        return settings_block(self.method, vars(self) | values)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
-from vkbloom._settings.core_view import core_view
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
@@ -77,7 +77,7 @@ class ThreeBloom(Settings):
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
 
-    @property
-    def core_view(self) -> Any:
-        """The settings with the core's names."""
-        return core_view(self, scale_x=self.resolution_scale)
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        values = {"scale_x": self.resolution_scale}
+        return settings_block(self.method, vars(self) | values)

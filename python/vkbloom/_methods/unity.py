@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar, Literal
 
-from vkbloom._settings.core_view import core_view, linear
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -16,6 +16,13 @@ from vkbloom._settings.fields import (
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
 BlurFilter = Literal["gaussian", "kawase", "dual"]
+
+
+def _linear(value: float) -> float:
+    """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
+    if value > 1:
+        return float(value**2.2)
+    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
 
 
 def _read_color(color: Any) -> tuple[float, ...]:
@@ -207,13 +214,12 @@ class PostProcessingBloom(Settings):
     fast: bool = flag_field("fast")
     color: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_color)
 
-    @property
-    def core_view(self) -> Any:
-        """The settings with the core's names."""
-        return core_view(
-            self,
-            threshold=None if self.threshold is None else linear(self.threshold),
-            clamp_max=min(65504.0, linear(self.clamp)),
-            anamorphism=self.anamorphic_ratio,
-            tint=self.color,
-        )
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        values = {
+            "threshold": None if self.threshold is None else _linear(self.threshold),
+            "clamp_max": min(65504.0, _linear(self.clamp)),
+            "anamorphism": self.anamorphic_ratio,
+            "tint": self.color,
+        }
+        return settings_block(self.method, vars(self) | values)

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vkbloom._settings.core_view import linear
-
 from ._image import BlurInput
 from ._levels import halved
 from ._pyramid import downsample
@@ -30,10 +28,10 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     """Return the framebuffers.
 
     down_0 has half the size of the frame, less reduced along one axis by `anamorphic_ratio`; it is
-    clamped, thresholded and coloured. Each further level has half the size of the one above. All read 13
-    taps, with `fast` the mean of four. up_k = down_k + tent(up_k+1) and bloom = tent(up_0), whose
-    radius is a texel times a factor of 0.5 to 1.5 that follows from `diffusion` and the size; with
-    `fast` the tent is the mean of four samples.
+    clamped, thresholded and coloured. Each further level has half the size of the one above. All
+    read 13 taps, with `fast` the mean of four. up_k = down_k + tent(up_k+1) and bloom =
+    tent(up_0), whose radius is a texel times a factor of 0.5 to 1.5 that follows from `diffusion`
+    and the size; with `fast` the tent is the mean of four samples.
     """
     height, width, channels = source.image.shape
     first, count, radius = _plan((width, height), settings)
@@ -77,14 +75,21 @@ def _plan(
 
 
 def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
-    limit = min(65504.0, linear(settings.clamp))
+    limit = min(65504.0, _linear(settings.clamp))
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
     if settings.threshold is None:
         return kept
-    threshold = linear(settings.threshold)
+    threshold = _linear(settings.threshold)
     half_width = threshold * settings.knee + 1e-5
     return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
+
+
+def _linear(value: float) -> float:
+    """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
+    if value > 1:
+        return float(value**2.2)
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
 
 
 def _box(image: Array, size: tuple[int, int], distance: float) -> Array:
