@@ -674,6 +674,7 @@
 #define MODE_NAMES(NAME) \
     NAME(COMPOSITE_OFF, -1, off) \
     NAME(COMPOSITE_ADD_TO_POSITIVE, 5, add_to_positive) \
+    NAME(COMPOSITE_UNCLAMPED_SCREEN, 6, unclamped_screen) \
     NAME(THRESHOLD_NONE, 0, none) \
     NAME(THRESHOLD_HARD, 1, hard) \
     NAME(THRESHOLD_KNEE, 2, knee) \
@@ -698,6 +699,7 @@
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
     NAME(UPSAMPLE_CORNERS, 5, corners) \
+    NAME(UPSAMPLE_INSIDE, 6, inside) \
     NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \

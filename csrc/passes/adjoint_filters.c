@@ -134,9 +134,8 @@ bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass
 
 // What the taps of a row sample, by UPSAMPLE_*.
 static const enum vkb_kind kinds[] = {
-    [UPSAMPLE_LINEAR] = VKB_KIND_LINEAR,
-    [UPSAMPLE_CUBIC] = VKB_KIND_CUBIC,
-    [UPSAMPLE_INSET_LINEAR] = VKB_KIND_INSET_LINEAR,
+    [UPSAMPLE_LINEAR] = VKB_KIND_LINEAR,           [UPSAMPLE_CUBIC] = VKB_KIND_CUBIC,
+    [UPSAMPLE_INSIDE] = VKB_KIND_INSIDE,           [UPSAMPLE_INSET_LINEAR] = VKB_KIND_INSET_LINEAR,
     [UPSAMPLE_INSET_CUBIC] = VKB_KIND_INSET_CUBIC,
 };
 

@@ -15,9 +15,11 @@ static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image
 // them.
 static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
 {
-    return constants->composite == COMPOSITE_SCREEN || constants->composite == COMPOSITE_SOFT_LIGHT
-        || constants->tonemap != TONEMAP_NONE || constants->encoding != ENCODING_NONE
-        || constants->alpha != ALPHA_KEEP || limit < (float)SINGLE_LIMIT;
+    return constants->composite == COMPOSITE_SCREEN
+        || constants->composite == COMPOSITE_UNCLAMPED_SCREEN
+        || constants->composite == COMPOSITE_SOFT_LIGHT || constants->tonemap != TONEMAP_NONE
+        || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
+        || limit < (float)SINGLE_LIMIT;
 }
 
 // Whether the derivatives by the scene are a factor of all colours.

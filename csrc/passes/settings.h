@@ -21,6 +21,7 @@
     METHOD(BLENDER, blender, true) \
     METHOD(PYGFX, pygfx, true) \
     METHOD(POST_PROCESSING, post_processing, true) \
+    METHOD(PMNDRS, pmndrs, true) \
     METHOD(BABYLON, babylon, true) \
     METHOD(PLAYCANVAS, playcanvas, true) \
     METHOD(OWN, own, false)

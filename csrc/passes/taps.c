@@ -133,6 +133,10 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
     switch (axis->kind) {
     case VKB_KIND_CUBIC:
         return cubic_sample(position);
+    case VKB_KIND_INSIDE:
+        if (offset != 0.0 && (position < -0.5001 || position > axis->from - 0.4999))
+            return (struct sample){.count = 0};
+        return linear_sample(position);
     case VKB_KIND_INSET_LINEAR:
         return linear_sample(inset);
     case VKB_KIND_INSET_CUBIC:

@@ -22,7 +22,8 @@ struct vkb_tap {
 // What a tap samples at its position.
 enum vkb_kind {
     VKB_KIND_LINEAR,
-    VKB_KIND_CUBIC,  // a cubic B-spline
+    VKB_KIND_CUBIC,   // a cubic B-spline
+    VKB_KIND_INSIDE,  // linear; nothing where the position is outside of the image
     // HDRP's upsampling: no position is beyond the middle of the last two texels. The cubic
     // B-spline is two linear samples, with the offsets -1 and 1, neither beyond 1 - 1 / size of the
     // target.

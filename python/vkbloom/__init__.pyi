@@ -31,6 +31,7 @@ from ._methods.godot import GodotBloom
 from ._methods.kino import KinoBloom
 from ._methods.mip_chain import DualKawase, Pyramid
 from ._methods.playcanvas import PlayCanvasBloom
+from ._methods.pmndrs import PmndrsBloom
 from ._methods.pygfx import PygfxBloom
 from ._methods.separable import Separable, gaussian_weights
 from ._methods.three import ThreeBloom
@@ -74,6 +75,7 @@ __all__ = [
     "OutOfMemoryError",
     "Plan",
     "PlayCanvasBloom",
+    "PmndrsBloom",
     "PostProcessingBloom",
     "PygfxBloom",
     "Pyramid",

@@ -62,9 +62,19 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     return p;
 }
 
+// What an image loses by a screen of the other one, until their product is 1.
+vec3 screened(vec3 other, vec3 product)
+{
+    return 1.0 - other * (0.5 * (vec3(lessThan(product, vec3(1.0)))
+                                 + vec3(lessThanEqual(product, vec3(1.0)))));
+}
+
 // What one unit of light, i b, brings.
 vec3 by_light(Pixel p)
 {
+    vec3 light = light_of(p.bloom.rgb);
+    if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
+        return p.by_mixed * screened(p.scene.rgb, p.scene.rgb * light);
     if (COMPOSITE != COMPOSITE_SCREEN)
         return p.by_mixed;
     return p.by_mixed * (1.0 - clamp(p.scene.rgb, 0.0, 1.0)) * inside(light_of(p.bloom.rgb), 0.0, 1.0);
@@ -102,6 +112,8 @@ vec4 by_scene(Pixel p)
         colour *= 1.0 - params.intensity * p.share;
     if (COMPOSITE == COMPOSITE_SCREEN)
         colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
+    if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
+        colour *= screened(light_of(p.bloom.rgb), p.scene.rgb * light_of(p.bloom.rgb));
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
         colour *= above(p.scene.rgb, 0.0);
     return vec4(colour, p.brought.a * alpha_slope(p));

@@ -27,6 +27,9 @@ vec3 composite(vec3 s, vec3 b, float share)
         s = clamp(s, 0.0, 1.0);
         return s + (1.0 - s) * clamp(light_of(b), 0.0, 1.0);
     }
+    // Of pmndrs/postprocessing: above 1 it adds, less 1.
+    if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
+        return s + light_of(b) - min(s * light_of(b), vec3(1.0));
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
         return max(s, vec3(0.0)) + light_of(b);
     if (COMPOSITE == COMPOSITE_ADD)

@@ -86,6 +86,14 @@ void add_inset_cubic(inout Window window, int count, int before, Axis axis, vec4
                weight * tap.yzw);
 }
 
+// Whether a tap's position is in the image; the tap in the middle always counts (pmndrs/postprocessing
+// @ 69c61a640078, downsampling of MipmapBlurPass). Positions on the border are exact but for roundings.
+bool is_inside(Axis axis, float offset)
+{
+    float place = float(axis.texel) + axis.part + offset, reach = float(axis.size) - 0.5;
+    return offset == 0.0 || (place > -0.5001 && place < reach + 0.0001);
+}
+
 // `count` texels around a position, with the weights of the taps, which are those along x or along y.
 Window window_of(Axis axis, int count, bool along_x)
 {
@@ -98,7 +106,7 @@ Window window_of(Axis axis, int count, bool along_x)
         vec4 tap = along_x ? FILTER_X(i) : FILTER_Y(i);
         if (UPSAMPLE == UPSAMPLE_INSET_CUBIC)
             add_inset_cubic(window, count, before, axis, tap);
-        else
+        else if (UPSAMPLE != UPSAMPLE_INSIDE || is_inside(axis, tap.x))
             add_sample(window, count, before, axis.part + tap.x, tap.yzw);
     }
     if (UPSAMPLE == UPSAMPLE_CUBIC) {

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vkbloom import (
+    BabylonBloom,
     BevyBloom,
     BlenderGlare,
     Convolution,
@@ -16,6 +17,9 @@ from vkbloom import (
     GodotBloom,
     HdrpBloom,
     KinoBloom,
+    PlayCanvasBloom,
+    PmndrsBloom,
+    PostProcessingBloom,
     PygfxBloom,
     Pyramid,
     Separable,
@@ -82,6 +86,11 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "urp-mask": (UrpBloom(threshold=0.5, clamp_max=3.0, alpha="blur"), MASK),
     "hdrp-mask": (HdrpBloom(composite="mix", alpha="blur"), MASK),
     "unreal-mask": (ThreeBloom(threshold=0.5, alpha="blur"), MASK),
+    "ppv2-mask": (PostProcessingBloom(threshold=0.5, color=(1.0, 0.5, 0.2), alpha="blur"), MASK),
+    "pmndrs-mask": (PmndrsBloom(threshold=0.3, alpha="blur"), MASK),
+    "babylon-mask": (BabylonBloom(threshold=0.3, alpha="blur"), MASK),
+    "playcanvas-mask": (PlayCanvasBloom(threshold=0.5, alpha="blur"), MASK),
+    "playcanvas-emission": (PlayCanvasBloom(), EMISSION),
     "godot-mask": (
         GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),
         MASK,
@@ -153,6 +162,14 @@ OTHERS: dict[str, Settings] = {
     "hdrp-across": HdrpBloom(anamorphism=-1.0),
     "unreal-wide": ThreeBloom(radius=1.0, threshold=0.85, smooth_width=0.5),
     "unreal-no-threshold": ThreeBloom(radius=0.4, threshold=None, intensity=1.5),
+    "r187": ThreeBloom(variant="r187", radius=0.3, threshold=0.2, smooth_width=0.3),
+    "node-small": ThreeBloom(variant="node", resolution_scale=0.3, intensity=1.0),
+    "ppv2-fast": PostProcessingBloom(fast=True, anamorphic_ratio=-0.6, threshold=0.4, diffusion=9),
+    "ppv2-wide": PostProcessingBloom(threshold=None, anamorphic_ratio=1.0, clamp=1.5, diffusion=10),
+    "pmndrs-one-level": PmndrsBloom(levels=1, threshold=None, composite="add"),
+    "pmndrs-screen": PmndrsBloom(levels=3, threshold=0.2, smoothing=0.5, intensity=3.0),
+    "babylon-narrow": BabylonBloom(kernel=3, scale=1.0, weight=0.7, threshold=None),
+    "playcanvas-two": PlayCanvasBloom(blur_level=2, intensity=0.3),
     "node": ThreeBloom(variant="node", intensity=1.0, threshold=0.4),
     **{
         f"godot-{composite}-{tonemap}": GodotBloom(

@@ -124,6 +124,11 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "a sum of levels of what is above 1",
         "Unity-Technologies/PostProcessing @ 32c3155207d3",
     ),
+    "pmndrs": Preset(
+        lambda: METHODS["pmndrs"](),
+        "eight levels of what is above 1, as a screen",
+        "pmndrs/postprocessing @ 69c61a640078 (6.39.0)",
+    ),
     "babylon": Preset(
         lambda: METHODS["babylon"](),
         "one Gaussian of what is above a hard threshold",

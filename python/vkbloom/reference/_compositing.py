@@ -18,7 +18,7 @@ from ._tone_map import ENCODINGS, TONE_MAPS
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["composite", "composite_checked"]
+__all__ = ["composite", "composite_checked", "strength_of"]
 
 
 @checked_as(bloom=ANY, settings=SETTINGS)
@@ -89,12 +89,17 @@ def composite(
         return composite_checked(image, None, settings, stored)
     if bloom is None:
         raise TypeError("bloom: None is not an array; settings.bloom is True")
-    light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
+    light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else strength_of(settings))
     if light.shape[:2] != image.shape[:2]:
         raise ValueError(
             f"bloom: height and width {light.shape[:2]} are not the scene's {image.shape[:2]}"
         )
     return composite_checked(image, light, settings, stored, share)
+
+
+def strength_of(settings: Settings) -> float:
+    """Return the factor of the bloom; Babylon's weight is a field of its own."""
+    return settings.intensity * float(getattr(settings, "weight", 1.0))
 
 
 def composite_checked(
@@ -118,6 +123,8 @@ def composite_checked(
         elif settings.method == "blender":
             # max(0, s), whose derivative at black is the mean of both sides.
             rgb = curve(((rgb + np.abs(rgb)) / 2 + glow) * scale)
+        elif settings.method == "pmndrs" and settings.composite == "screen":
+            rgb = curve((rgb + glow - np.minimum(rgb * glow, 1)) * scale)
         else:
             rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
         alpha = _blend_alpha(alpha, light, settings.alpha)

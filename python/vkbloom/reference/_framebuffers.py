@@ -13,7 +13,7 @@ from vkbloom._settings.registry import METHODS, Reference
 
 from . import _custom as custom
 from . import _glare as glare
-from ._compositing import composite_checked
+from ._compositing import composite_checked, strength_of
 from ._image import BlurInput, as_array, as_float, as_mask, finite, format_of, storage
 from ._sampling import Array, sample
 from ._threshold import apply_threshold, masked
@@ -149,7 +149,7 @@ def framebuffers(
     blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
     stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
     found = _with_alphas({"glow": glow, **stages, **blurred})
-    strength = settings.intensity * getattr(settings, "weight", 1.0)
+    strength = strength_of(settings)
     if settings.glare:
         images = [found[name] for name in stages]
         light = glare.light(found["bloom"], strength, images, settings.glare)

@@ -1,0 +1,67 @@
+"""Bloom of the library postprocessing for three.js."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vkbloom._settings.blocks import settings_block
+from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PmndrsBloom(Settings):
+    """BloomEffect of pmndrs/postprocessing with its blur of a mip chain.
+
+    Parameters
+    ----------
+    radius : float
+        Share of the larger blurs, 0 to 1.
+    levels : int
+        Number of levels, 1 to 16.
+    smoothing : float
+        Luminance over which the threshold fades in, 0 to 65504; less than 0.0001 counts as that.
+    threshold : float or None
+        Luminance at which the fade begins. Where threshold and smoothing are 0, there is none.
+    composite : {"screen", "add"}
+        With b the bloom times the intensity, the screen is s + b - min(s b, 1), without clamps.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``bright`` is the frame times smoothstep(threshold, threshold + smoothing, luminance). Each
+    level has half the size of the image above it, rounded, at least 1, by 13 taps: 0.125 at
+    (+-1, +-1), 0.05556 at (0, 0), (+-2, 0), (0, +-2) and (+-2, +-2), in texels of that image. A tap
+    whose position is outside of 0..1 counts as 0, so that borders darken; the one in the middle
+    always counts. up_k = lerp(down_k, tent(up_k+1), radius), whose taps are a texel apart; a single
+    level is mixed with its own tent. ``bloom`` is one bilinear sample of up_0.
+
+    Source: pmndrs/postprocessing @ 69c61a640078 (6.39.0), BloomEffect.js, LuminancePass.js,
+    MipmapBlurPass.js and their shaders.
+
+    Examples
+    --------
+    >>> vkbloom.PmndrsBloom().composite
+    'screen'
+    """
+
+    method: ClassVar[str] = "pmndrs"
+    published: ClassVar[bool] = True
+
+    threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
+    knee: float = no_knee("pmndrs")
+    composite: Composite = choice_field("composite", ("screen", "add"))
+    format: BloomFormat | None = "rgba16float"
+    radius: float = number_field("radius", default=0.85, range=(0, 1))
+    levels: int = number_field("levels", default=8)
+    smoothing: float = number_field(default=0.03, range=(0, 65504), slider=(0, 1))
+
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        values = {
+            "smooth_width": max(self.smoothing, 1e-4),
+            "threshold": None if self.threshold == self.smoothing == 0 else self.threshold,
+        }
+        return settings_block(self.method, vars(self) | values)

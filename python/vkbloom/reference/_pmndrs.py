@@ -1,0 +1,98 @@
+"""Bloom of the library postprocessing for three.js, with its blur of a mip chain.
+
+From pmndrs/postprocessing @ 69c61a640078 (6.39.0): BloomEffect.js, LuminancePass.js,
+MipmapBlurPass.js and their shaders.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._image import BlurInput
+from ._sampling import Array, sample
+from ._threshold import luminance, masked, smooth_step
+from ._upsampling import combine, linear, tent
+
+if TYPE_CHECKING:
+    from vkbloom._methods.pmndrs import PmndrsBloom
+
+__all__ = ["gain", "passes"]
+
+# (weight, offsets along both axes) of two grids of taps, in texels of the image that is read. The
+# weights are rounded in the source, so that they add up to 1.00004.
+_DOWN = ((0.125, (-1, 1)), (0.05556, (-2, 0, 2)))
+
+
+def passes(source: BlurInput, settings: PmndrsBloom) -> dict[str, Array]:
+    """Return the framebuffers.
+
+    "bright" is the frame, times a smooth step of its luminance. Each level has half the size of the
+    image above it, rounded, and is the sum of 13 taps; those outside of the image are 0. up_k mixes
+    down_k with the tent of up_k+1 by the radius; a single level is mixed with its own tent. The
+    bloom is up_0, bilinear.
+    """
+    height, width, _ = source.image.shape
+    bright = source.store(masked(_prefilter(source.image, settings), source.mask))
+    image, downs = bright, []
+    for _ in range(settings.levels):
+        width, height = max(1, (width + 1) // 2), max(1, (height + 1) // 2)
+        image = source.store(_down(image, (width, height)))
+        downs.append(image)
+    share = settings.radius
+    if settings.levels == 1:
+        # The second level is the first one again.
+        downs.append(downs[0])
+    count = len(downs)
+    found = combine(
+        downs,
+        source,
+        own=[1 - share] * count,
+        coarse=[share] * count,
+        upsample=tent,
+        last=linear,
+    )
+    if settings.levels == 1:
+        del found["down_1"]
+    return {"bright": bright, **found}
+
+
+def gain(settings: PmndrsBloom, size: tuple[int, int]) -> float:
+    """Return the bloom of a flat image of 1, far from its borders: the weights of the levels."""
+    level = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    downs = []
+    for _ in range(settings.levels):
+        level *= sum(weight * len(offsets) ** 2 for weight, offsets in _DOWN)
+        downs.append(level)
+    value = downs[-1]
+    for level in downs[:-1][::-1]:
+        value = (1 - settings.radius) * level + settings.radius * value
+    return value
+
+
+def _prefilter(rgb: Array, settings: PmndrsBloom) -> Array:
+    threshold, smoothing = settings.threshold, settings.smoothing
+    if threshold is None or threshold == smoothing == 0:
+        return rgb
+    return rgb * smooth_step((luminance(rgb) - threshold) / max(smoothing, 1e-4))
+
+
+def _down(image: Array, size: tuple[int, int]) -> Array:
+    """Return the sum of the taps; one whose position is beyond 0..1 is 0, except the centre."""
+    total = np.zeros((size[1], size[0], image.shape[2]))
+    for weight, offsets in _DOWN:
+        for y in offsets:
+            rows = _inside(image.shape[0], size[1], y)[:, np.newaxis, np.newaxis]
+            for x in offsets:
+                columns = _inside(image.shape[1], size[0], x)[:, np.newaxis]
+                part = sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)])
+                total = total + weight * rows * columns * part
+    return total
+
+
+def _inside(length: int, count: int, offset: int) -> Array:
+    """Return 1 for each pixel whose tap is inside of the image, else 0."""
+    # (i + 1/2) / count + offset / length, in units of 1 / (2 length count).
+    at = (2 * np.arange(count) + 1) * length + 2 * count * offset
+    return ((at >= 0) & (at <= 2 * length * count)).astype(np.float64)
