@@ -15,18 +15,12 @@ from typing import Any
 
 import pytest
 
-from tests.core.builds import ROOT, compiler, require_header
+from tests.core.builds import ROOT, build_layer, layer_variables
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import python
 from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("lesser_device.c")
-
-# The folder of the validation layer, which must come first to be above the layer of these tests.
-EXPLICIT_LAYERS = tuple(
-    str(folder / "vulkan/explicit_layer.d")
-    for folder in (Path("/usr/share"), Path("/usr/local/share"), Path("/etc"))
-)
 
 pytestmark = [
     pytest.mark.skipif(
@@ -49,27 +43,7 @@ def too_large(most: int) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the layer; return the folder of its manifest."""
-    require_header("vulkan/vk_layer.h")
-    folder = tmp_path_factory.mktemp("layer")
-    library = folder / "lesser_device.so"
-    subprocess.run(
-        [
-            *(*compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"),
-            *("-fvisibility=hidden", str(SOURCE), "-o", str(library)),
-        ],
-        check=True,
-    )
-    about = {
-        "name": "VK_LAYER_VKBLOOM_lesser_device",
-        "type": "GLOBAL",
-        "library_path": str(library),
-        "api_version": "1.3.0",
-        "implementation_version": "1",
-        "description": "The device below with less than it has",
-    }
-    manifest = {"file_format_version": "1.2.0", "layer": about}
-    (folder / "lesser_device.json").write_text(json.dumps(manifest))
-    return folder
+    return build_layer(SOURCE, tmp_path_factory.mktemp("layer"))
 
 
 @pytest.fixture(scope="module")
@@ -84,12 +58,8 @@ WORK = ("-m", "tests.core.lesser_work")
 def run(
     layer: Path, name: str, lesser: str, program: tuple[str, ...] = WORK, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
     variables = {
-        "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
-        "VK_INSTANCE_LAYERS": os.pathsep.join(
-            ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
-        ),
+        **layer_variables(layer, "VK_LAYER_VKBLOOM_lesser_device"),
         "VKBLOOM_LESSER": lesser,
         "VKBLOOM_TEST_NAME": name,
         "VKBLOOM_CACHE_DIR": "",
