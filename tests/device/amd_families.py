@@ -59,13 +59,12 @@ def requests(renderer: Renderer, words: list[str]) -> Iterator[tuple[str, Callab
             if "few" in words and number % 17:
                 continue
             changed = method.replace(format=format)
-            for size in ((96, 135), (720, 1280)):
-                dtype = DTYPES[number % 3]
-                image = np.ones((*size, 3 + number % 2), dtype)
-                yield f"{name} {format} {dtype} {size}", lambda: renderer.apply(image, changed)  # noqa: B023
+            dtype, size = DTYPES[number % 3], ((96, 135), (720, 1280))[number // 3 % 2]
+            image = np.ones((*size, 3 + number % 2), dtype)
+            for framebuffers in ("all", "final"):
                 yield (
-                    f"{name} {format} {dtype} {size} final",
-                    lambda: renderer.apply(image, changed, framebuffers="final"),  # noqa: B023
+                    f"{name} {format} {dtype} {size} {framebuffers}",
+                    lambda: renderer.apply(image, changed, framebuffers=framebuffers),  # noqa: B023
                 )
         if "few" not in words or number % 4 == 0:
             image = np.ones((40, 50, 3), np.float32)
