@@ -45,7 +45,7 @@ PIP_INSTALL = $(PYTHON) -m pip install --quiet --no-compile
 # The tests that a change of the core or of a method breaks first. They reach every layer, and have no
 # other process, browser or large image.
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
-	tests/core/test_errors.py tests/core/test_frames.py tests/core/test_out_of_date.py \
+	tests/core/test_refusals.py tests/core/test_frames.py tests/core/test_out_of_date.py \
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 

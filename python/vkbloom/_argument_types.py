@@ -78,6 +78,7 @@ _KINDS: dict[str, tuple[str, _Test]] = {
     "Callable": ("callable", callable),
     "Bloom": ("callable", callable),
     "MovingBloom": ("callable", callable),
+    "Twin": ("callable", callable),
     "Loss": ("a loss", lambda value: _is_str(value) or callable(value)),
     "DTypeLike": ("a dtype", _raises_nothing(np.dtype)),
     "type": ("a class", lambda value: isinstance(value, type)),

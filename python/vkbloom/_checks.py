@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import math
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from types import ModuleType
 from typing import Any
 
@@ -37,6 +37,9 @@ __all__ = [
 
 #: The largest 32-bit float; the device computes in 32-bit floats.
 FLT_MAX = (2 - 2**-23) * 2.0**127
+
+# What has items, but no first one.
+_UNORDERED = (Mapping, Set)
 
 # Fast path for native byte order.
 _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
@@ -93,7 +96,7 @@ def check_number(name: str, value: float, low: float, high: float) -> float:
 def check_floats(name: str, values: Iterable[float]) -> tuple[float, ...]:
     """Return the values as floats within the 32-bit range, or raise TypeError or ValueError."""
     try:
-        if isinstance(values, str):
+        if isinstance(values, (*_UNORDERED, str, bytes)):
             raise TypeError
         numbers = tuple(as_float(name, value) for value in values)
     except TypeError:
@@ -124,6 +127,8 @@ def check_above(name: str, value: Any, low: float = 0.0) -> float:
 def check_size(name: str, size: Any) -> tuple[int, int]:
     """Return (width, height) as two ints of at least 1, or raise TypeError or ValueError."""
     try:
+        if isinstance(size, _UNORDERED):
+            raise TypeError
         width, height = size
         integers = (int(width), int(height))
     except (TypeError, ValueError, OverflowError):

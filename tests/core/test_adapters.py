@@ -103,15 +103,6 @@ def test_an_unknown_adapter_lists_what_was_found() -> None:
     assert isinstance(caught.value, vkbloom.Error)
 
 
-def test_a_name_is_text_and_no_format() -> None:
-    with pytest.raises(AdapterNotFoundError, match="%s%n%d"):
-        Renderer("%s%n%d")
-    with pytest.raises(AdapterNotFoundError):
-        Renderer("x" * 100_000)
-    with pytest.raises(ValueError, match="null"):
-        Renderer("lav\0apipe")
-
-
 @pytest.mark.parametrize("start", ["", "x"])
 def test_a_message_is_cut_between_or_in_characters(
     monkeypatch: pytest.MonkeyPatch, start: str
@@ -123,17 +114,6 @@ def test_a_message_is_cut_between_or_in_characters(
     with pytest.raises(ValueError, match=r"VKBLOOM_VARIANT: .*\xe9\xe9") as caught:
         Renderer(ADAPTER)
     assert type(caught.value) is ValueError
-
-
-def test_an_empty_name_is_none() -> None:
-    with pytest.raises(ValueError, match=r'^adapter: "" '):
-        Renderer("")
-
-
-@pytest.mark.parametrize("adapter", [None, 0, b"software", ["software"]])
-def test_an_adapter_is_a_name(adapter: Any) -> None:
-    with pytest.raises(TypeError, match=r"^adapter: "):
-        Renderer(adapter)
 
 
 def test_the_environment_replaces_auto(

@@ -53,6 +53,8 @@ TEXTS = (
     r"Literal|Shading|\w*Colour|\w*Encoding|PyramidLoss|Composite|Alpha|ToneMap|\w*Mode|\w*Format"
 )
 CONTAINERS = r"Sequence|Iterable|Mapping|tuple|NDArray|type|Bounds|os\.PathLike|Path|Twin|ArrayLike"
+#: Sequences of any items.
+SEQUENCES = {"list", "array"}
 CLASSES = r"Settings|Renderer|Scene|Camera|Image|PSF|PSFLike|Probe|(xarray\.)?Dataset"
 
 IMAGE = np.zeros((8, 8, 3), np.float32)
@@ -105,6 +107,7 @@ OTHERS: dict[str, dict[str, Any]] = {
     "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),
     "response": {"bloom": lambda image, intensity: image},
     "samples": {"values": np.ones((3, 3))},
+    "sweep": {"settings": [SEPARABLE]},
 }
 FUNCTIONS: tuple[Callable[..., Any], ...] = (
     vkbloom.apply,
@@ -161,7 +164,9 @@ def accepted(annotation: str) -> set[str] | None:
         if re.fullmatch(TEXTS, name):
             found.add("str")
         elif re.fullmatch(CONTAINERS, name):
-            found |= {"class"} if name == "type" else {"function"} if name == "Twin" else set()
+            found |= {"class"} if name == "type" else set()
+            found |= {"function", "class"} if name == "Twin" else set()
+            found |= SEQUENCES if part == "Sequence[Any]" else set()
         elif name in ACCEPTED:
             found |= ACCEPTED[name]
         elif not re.fullmatch(CLASSES, name):
@@ -184,18 +189,27 @@ def wrong_arguments(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
 
 
 def check(function: Callable[..., Any], arguments: dict[str, Any], name: str, value: Any) -> None:
-    """Call a function with one argument of a wrong type, which it may accept."""
+    """Call a function with one argument of a wrong type, which it must refuse.
+
+    A class may convert a value to an equal one of the field's type, such as 1 to True.
+    """
     try:
-        function(**arguments | {name: value})
+        result = function(**arguments | {name: value})
+        if isinstance(result, Iterator):
+            list(result)
     except (TypeError, ValueError) as error:
         if not re.search(rf"\b{name}\b", str(error)):
             pytest.fail(f"{name}: {value!r}: {error}")
+    else:
+        kept = getattr(result, name, object())
+        if not (isinstance(function, type) and type(kept) is not type(value) and kept == value):
+            pytest.fail(f"{name}: {value!r} is accepted")
 
 
 def needed(function: Callable[..., Any]) -> dict[str, Any]:
     """Return valid values of the parameters without a default."""
     parameters = inspect.signature(function).parameters.items()
-    values = NEEDED | OTHERS.get(function.__name__, {})
+    values: dict[str, Any] = NEEDED | OTHERS.get(function.__name__, {})
     return {
         name: values[name]
         for name, parameter in parameters

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -161,24 +160,6 @@ def test_lack_of_memory_is_an_error(own: Renderer) -> None:
         new_array(own._core, (1 << 61,), "uint8")
     with pytest.raises(TypeError):
         new_array(own._core, (1 << 20,), "no dtype")
-
-
-def test_threads_free_what_others_render(own: Renderer) -> None:
-    image = picture(511, 512, dtype="float32")
-    exposures = [0.5, 1.0, 2.0, 4.0]
-    expected = {exposure: final(own, image, exposure).copy() for exposure in exposures}
-
-    def work(seed: int) -> None:
-        kept = []
-        for exposure in np.random.default_rng(seed).permutation(exposures * 3):
-            kept.append((exposure, final(own, image, float(exposure))))
-            if len(kept) > 2:
-                kept.pop(0)
-            for of, array in kept:
-                np.testing.assert_array_equal(array, expected[of])
-
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(work, range(4)))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="nothing forks there")

@@ -4,7 +4,6 @@ errors."""
 from __future__ import annotations
 
 import gc
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -148,12 +147,6 @@ def test_specials_are_counted_in_every_frame(renderer: Renderer) -> None:
     assert [(one.info["nan"], one.info["inf"]) for one in frames] == [(1, 2)] * 3
 
 
-def test_settings_that_are_not_a_sequence_are_refused(renderer: Renderer) -> None:
-    wrong: Any = Separable()
-    with pytest.raises(TypeError, match=r"^settings: "):
-        list(renderer.sweep(picture(4, 4, 3, seed=5), wrong))
-
-
 def test_no_settings(renderer: Renderer, scene: Scene) -> None:
     assert list(renderer.sweep(picture(4, 4, 3, seed=5), [])) == []
     assert list(renderer.sweep(scene, [], size=SIZE)) == []
@@ -217,53 +210,6 @@ def test_other_calls_between_two_frames(renderer: Renderer, scene: Scene) -> Non
         calls[index % len(calls)]()
 
 
-def test_two_sequences_in_turn(renderer: Renderer, scene: Scene) -> None:
-    image = picture(40, 30, 3, seed=9)
-    settings = [Separable(exposure=exposure / 8, loops=1 + exposure % 2) for exposure in range(24)]
-    expected = [(renderer.apply(image, s), renderer.render(scene, s, SIZE)) for s in settings]
-    both = zip(
-        renderer.sweep(image, settings),
-        renderer.sweep(scene, settings, size=SIZE),
-        strict=True,
-    )
-    for (of_image, of_scene), (right_image, right_scene) in zip(both, expected, strict=True):
-        assert_same(of_image, right_image)
-        assert_same(of_scene, right_scene)
-
-
-def test_threads(renderer: Renderer, scene: Scene) -> None:
-    images = [picture(30, 20, 3, seed=10), picture(30, 20, 4, seed=11), picture(17, 40, 4, seed=12)]
-    settings = [Separable(blur_strength=strength / 8) for strength in range(20)]
-    many = [[renderer.apply(image, s) for s in settings] for image in images]
-    single = renderer.render(scene, None, SIZE)
-    start = threading.Barrier(5)
-
-    def sequences(which: int) -> None:
-        start.wait()
-        for _ in range(3):
-            got = renderer.sweep(images[which], settings)
-            for frames, right in zip(got, many[which], strict=True):
-                assert_same(frames, right)
-
-    def abandoned() -> None:
-        start.wait()
-        for step in range(12):
-            got = renderer.sweep(images[step % 3], settings)
-            for index in range(step % 5):
-                assert_same(next(got), many[step % 3][index])
-
-    def singles() -> None:
-        start.wait()
-        for _ in range(30):
-            assert_same(renderer.render(scene, None, SIZE), single)
-
-    with ThreadPoolExecutor(5) as pool:
-        work = [pool.submit(sequences, which) for which in range(3)]
-        work += [pool.submit(abandoned), pool.submit(singles)]
-        for result in work:
-            result.result()
-
-
 def test_a_sequence_that_goes_from_thread_to_thread(renderer: Renderer) -> None:
     image = picture(30, 20, 3, seed=13)
     settings = [Separable(blur_strength=strength / 8) for strength in range(12)]
@@ -292,15 +238,6 @@ def test_unread_frames_of_a_sequence_are_dropped(renderer: Renderer, taken: int,
         del frames
         gc.collect()
         assert_same(renderer.apply(image, LOW), right)
-
-
-def test_a_sequence_forgotten_with_its_renderer() -> None:
-    renderer = Renderer(validation=True)
-    frames = renderer.sweep(picture(40, 30, 3, seed=15), SEQUENCE)
-    for _ in range(4):
-        next(frames)
-    del renderer, frames
-    gc.collect()
 
 
 def test_a_renderer_that_is_closed_in_the_middle(new_renderer: Callable[[], Renderer]) -> None:
@@ -360,18 +297,6 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
         next(frames)
     with pytest.raises(KeyError, match="mine"):
         next(frames)
-
-
-def test_arguments_are_checked_once_and_first(renderer: Renderer, scene: Scene) -> None:
-    wrong: Any = [[0.0]]
-    with pytest.raises(TypeError, match="source"):
-        renderer.sweep(wrong, [Separable()])
-    with pytest.raises(TypeError, match="framebuffers"):
-        renderer.sweep(picture(4, 4, 3, seed=19), [Separable()], framebuffers=wrong)
-    with pytest.raises(ValueError, match="shading"):
-        renderer.sweep(scene, [Separable()], shading=wrong)
-    with pytest.raises(TypeError):
-        renderer.sweep(picture(4, 4, 3, seed=19), Separable())  # type: ignore[arg-type]
 
 
 # The core's errors: from a device that fails where it is told to
@@ -462,13 +387,6 @@ def test_of_two_errors_the_first_is_raised() -> None:
     assert len(results) == 4
 
 
-def test_nothing_fails() -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
-    results, error = run_failing(settings, {})
-    assert error is None
-    assert [point for point, _ in results] == settings
-
-
 # The core's own types
 
 
@@ -479,15 +397,6 @@ def submitted(
     plans = tuple(core.plan(source, one, None) for one in settings)
     arrays = tuple(new_arrays(core, plan) for plan in plans)
     return core.run(source, plans, arrays), arrays
-
-
-def test_a_submission_is_waited_for_once(renderer: Renderer) -> None:
-    source = _core.image_source(picture(8, 8, 4, seed=20))
-    both = [Separable(), Separable(blur_strength=1.0)]
-    submission, _ = submitted(renderer, source, both)
-    assert len(submission.wait()[0]) == 2
-    with pytest.raises(RuntimeError, match="already waited for"):
-        submission.wait()
 
 
 def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:

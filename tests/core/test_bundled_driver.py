@@ -146,15 +146,6 @@ def test_file_that_is_not_a_driver_is_named(
         Renderer("software")
 
 
-def test_hardware_is_looked_for_in_the_system(driver: str) -> None:
-    if any(adapter.type != "cpu" for adapter in adapters()):
-        with Renderer("hardware") as renderer:
-            assert not renderer.info.bundled
-    else:
-        with pytest.raises(AdapterNotFoundError, match="bundled"):
-            Renderer("hardware")
-
-
 ALONE = """
 import json, vkbloom
 found = vkbloom.adapters()

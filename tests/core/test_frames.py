@@ -95,26 +95,6 @@ class TestMapping:
         assert other.timings == frames.timings
         assert (other.settings, other.info) == (frames.settings, frames.info)
 
-    @pytest.mark.parametrize(
-        ("name", "array", "error"),
-        [
-            ("final", [[1.0]], TypeError),
-            (3, np.zeros((1, 1, 3), np.uint8), TypeError),
-            ("../final", np.zeros((1, 1, 3), np.uint8), ValueError),
-            ("final", np.zeros((2, 2, 3)), ValueError),
-            ("final", np.zeros((2, 2, 2), np.uint8), ValueError),
-            ("final", np.zeros((2, 2, 1), np.float32), ValueError),
-            ("final", np.zeros((0, 2, 3), np.uint8), ValueError),
-            ("depth", np.zeros((2, 2), np.uint8), ValueError),
-            ("depth", np.zeros((2, 2), np.float16), ValueError),
-        ],
-    )
-    def test_value_that_is_not_a_framebuffer_is_refused(
-        self, name: Any, array: Any, error: type[Exception]
-    ) -> None:
-        with pytest.raises(error, match="arrays"):
-            make({name: array})
-
 
 class TestXarray:
     def test_variables_dimensions_and_coordinates(self, frames: Frames) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import gc
 import os
-import pickle
 import sys
 import weakref
 from collections.abc import Callable, Iterator
@@ -158,46 +156,6 @@ def test_rows_of_an_image(renderer: Renderer) -> None:
     for rows, first in ((image[:8], 14), (image[:8, :30], 0), (image[:8].astype(np.float16), 0)):
         with pytest.raises(ValueError, match="the rows do not fit into the image"):
             core.fill(source, _core.image_source(rows), first)
-
-
-def test_a_handle_belongs_to_its_renderer(new_renderer: Callable[[], Renderer]) -> None:
-    mine, other = new_renderer(), new_renderer()
-    handle = mine.upload(picture(16, 16))
-    for call in (other.apply, other.plan):
-        with pytest.raises(ValueError, match="another renderer"):
-            call(handle, Separable())
-    with pytest.raises(ValueError, match="another renderer"):
-        next(other.map([handle]))
-    mine.close()
-    for call in (mine.apply, mine.plan):
-        with pytest.raises(ValueError, match="the renderer is closed"):
-            call(handle, Separable())
-    with pytest.raises(ValueError, match="another renderer, or to one that is closed"):
-        other.apply(handle, Separable())
-    with pytest.raises(ValueError, match="the renderer is closed"):
-        mine.upload(picture(16, 16))
-    assert "16 x 16" in repr(handle)
-
-
-def test_a_handle_is_not_copied(renderer: Renderer) -> None:
-    handle = renderer.upload(picture(16, 16))
-    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
-        with pytest.raises(TypeError, match="cannot be copied"):
-            copied(handle)
-    with pytest.raises(TypeError, match="uploaded already"):
-        renderer.upload(handle)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("image", [np.zeros((4, 4), np.uint8), np.zeros((4, 4, 3), np.uint16)])
-def test_upload_refuses_what_apply_refuses(renderer: Renderer, image: NDArray[Any]) -> None:
-    kind = ValueError if image.ndim == 2 else TypeError
-    with pytest.raises(kind, match="image: "):
-        renderer.upload(image)
-
-
-def test_an_image_beyond_the_adapters_limit_is_refused(renderer: Renderer) -> None:
-    with pytest.raises(ValueError, match="image"):
-        renderer.upload(np.zeros((1, 1 << 20, 3), np.uint8))
 
 
 @pytest.mark.parametrize("first", ["renderer", "handle"])
@@ -362,35 +320,6 @@ def test_an_error_comes_at_its_images_turn(
     with pytest.raises(error, match=text):
         next(results)
     with pytest.raises(StopIteration):
-        next(results)
-
-
-def test_arguments_are_checked_at_the_call(new_renderer: Callable[[], Renderer]) -> None:
-    renderer = new_renderer()
-    image = picture(16, 16)
-    for images_, settings, error, text in [
-        (image, None, TypeError, "an iterable of images"),
-        (7, None, TypeError, "an iterable of images"),
-        ([image], [Separable()] * 2, ValueError, "2 Settings do not match the 1"),
-        ([image], 3, TypeError, "settings"),
-        ([image], [Separable(), 3], TypeError, "settings"),
-    ]:
-        with pytest.raises(error, match=text):
-            renderer.map(images_, settings)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="framebuffers"):
-        renderer.map([image], framebuffers=3)  # type: ignore[arg-type]
-    assert list(renderer.map([])) == []
-    renderer.close()
-    with pytest.raises(ValueError, match="closed"):
-        renderer.map([image])
-
-
-@pytest.mark.parametrize("count", [1, 3])
-def test_lengths_that_are_known_at_the_end_only(renderer: Renderer, count: int) -> None:
-    results = renderer.map((picture(16, 16) for _ in range(2)), [Separable()] * count)
-    for _ in range(min(count, 2)):
-        next(results)
-    with pytest.raises(ValueError, match="settings: "):
         next(results)
 
 

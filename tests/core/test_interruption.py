@@ -230,22 +230,6 @@ class Stopper:
 
 
 @UNIX
-def test_a_grid_is_interrupted(case: Case) -> None:
-    stopper = Stopper(case.alarm)
-    with pytest.raises(Alarm):
-        vkbloom.grid(
-            case.long.half,
-            case.long.settings,
-            STRENGTHS,
-            reduce={"mean": stopper},
-            progress=False,
-            renderer=case.renderer,
-        )
-    assert stopper.points < POINTS
-    case.check()
-
-
-@UNIX
 def test_an_interrupted_store_is_completed(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

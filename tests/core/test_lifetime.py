@@ -6,10 +6,7 @@ import gc
 import json
 import os
 import sys
-import threading
 import weakref
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +14,8 @@ import pytest
 
 from tests.core.descriptors import open_descriptors
 from tests.exhaustive import EXHAUSTIVE
-from tests.framebuffers import assert_same
 from tests.processes import output
-from tests.screens import noise, screen
-from vkbloom import Frames, Renderer, Scene, Separable, adapters, gaussian_weights
+from vkbloom import Renderer, Scene, Separable, adapters
 
 SIZE = (64, 36)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -87,14 +82,6 @@ def test_a_renderer_that_is_not_closed_is_collected(scene: Scene) -> None:
     assert reference() is None
     assert in_use() == before
     np.testing.assert_array_equal(frames["final"], kept)
-
-
-def test_two_renderers_do_not_know_each_other(scene: Scene) -> None:
-    with Renderer(validation=True) as one, Renderer() as other:
-        right = one.render(scene, None, SIZE)
-        other.render(scene, Separable(loops=2), SIZE, time=0.3)
-        other.close()
-        assert_same(one.render(scene, None, SIZE), right)
 
 
 # Prints the exception of a renderer if there is a validation message.
@@ -174,123 +161,4 @@ def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
         assert in_use() == before
 
 
-def test_many_frames_of_changing_size(renderer: Renderer, scene: Scene) -> None:
-    # Under validation, which at the close of the renderer reports any object that is left.
-    for step in range(30):
-        size = (1 + 7 * step % 50, 1 + 11 * step % 40)
-        settings = Separable(
-            bloom_size=(1 + step % 17, 1 + step % 23),
-            loops=1 + step % 3,
-            format="rgba16float" if step % 2 else "rgba8unorm",
-            direct=step % 5 == 0,
-        )
-        frames = renderer.render(scene, settings, size, time=step / 30)
-        assert frames["final"].shape == (size[1], size[0], 4)
-
-
 # Threads
-
-VARIANTS = [
-    Separable(),
-    Separable(blur_strength=0.4, bloom_size=(100, 60)),
-    Separable(layers=((1.0, 1.0), (2.0, 0.5)), format="rgba16float"),
-    Separable(direct=True, tonemap="aces"),
-]
-
-
-def test_four_threads_and_one_renderer(renderer: Renderer, scene: Scene) -> None:
-    other_scene = screen(noise((16, 9)), SIZE)
-    requests = [
-        (which, settings, index / 4)
-        for which in (scene, other_scene)
-        for index, settings in enumerate(VARIANTS)
-    ]
-    right = [renderer.render(which, settings, SIZE, time=t) for which, settings, t in requests]
-    start = threading.Barrier(4)
-
-    def work(thread: int) -> None:
-        start.wait()
-        for step in range(3 * len(requests)):
-            # Each thread goes through all requests in an order of its own.
-            number = (thread + (2 * thread + 1) * step) % len(requests)
-            which, settings, t = requests[number]
-            assert_same(renderer.render(which, settings, SIZE, time=t), right[number])
-
-    with ThreadPoolExecutor(4) as pool:
-        for result in [pool.submit(work, thread) for thread in range(4)]:
-            result.result()
-
-
-def test_a_renderer_for_each_of_four_threads(scene: Scene) -> None:
-    def work(settings: Separable) -> Frames:
-        with Renderer(validation=True) as renderer:
-            return renderer.render(scene, settings, SIZE)
-
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(work, VARIANTS))
-    for settings, frames in zip(VARIANTS, together, strict=True):
-        assert_same(frames, work(settings))
-
-
-def test_close_while_other_threads_render(scene: Scene) -> None:
-    renderer = Renderer(validation=True)
-    right = renderer.render(scene, None, SIZE)
-    started = threading.Semaphore(0)
-
-    def work() -> int:
-        for done in range(10_000):
-            try:
-                frames = renderer.render(scene, None, SIZE)
-            except ValueError:
-                assert renderer.closed
-                return done
-            assert_same(frames, right)
-            started.release()
-        return -1
-
-    with ThreadPoolExecutor(3) as pool:
-        results = [pool.submit(work) for _ in range(3)]
-        for _ in range(6):
-            assert started.acquire(timeout=120)
-        renderer.close()
-        counts = [result.result() for result in results]
-    assert min(counts) >= 0
-    assert sum(counts) >= 6
-
-
-def ticks_during(work: Callable[[], object]) -> int:
-    """Return how often another Python thread ran during the work; it sleeps for a millisecond."""
-    stop = threading.Event()
-    ticking = threading.Event()
-    ticks = 0
-
-    def tick() -> None:
-        nonlocal ticks
-        while not stop.wait(0.001):
-            ticks += 1
-            ticking.set()
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    ticking.wait()
-    before = ticks
-    work()
-    during = ticks - before
-    stop.set()
-    thread.join()
-    return during
-
-
-def test_python_goes_on_while_the_device_works(scene: Scene) -> None:
-    # 25 x 25 taps a pixel, filtered by hand: half a second of one core. With the lock held the
-    # other thread would come round once before the work takes it, and once after.
-    settings = Separable(
-        weights=gaussian_weights(10.0, 12),
-        blur_scale=0.5,
-        direct=True,
-        format="rgba32float",
-        bloom_size=(200, 200),
-    )
-    with Renderer() as renderer:
-        renderer.render(scene, settings, (4, 4))
-        assert ticks_during(lambda: renderer.render(scene, settings, (300, 200))) > 10

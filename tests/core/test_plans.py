@@ -189,40 +189,6 @@ def test_defaults(renderer: Renderer, scene: Scene, plain: Any) -> None:
     assert renderer.plan(scene).size == (1280, 720)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"size": (16, 9)}, "size: the source is not a scene"),
-        ({"shading": "deferred"}, "shading: the source is not a scene"),
-        ({"framebuffers": ("glare",)}, "framebuffers: unknown framebuffer 'glare'"),
-        ({"settings": Separable(bloom_size=(100_000, 1))}, "100000 x 1"),
-    ],
-)
-def test_wrong_arguments_of_an_image(
-    renderer: Renderer, plain: Any, changes: Any, message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        renderer.plan(plain, **changes)
-
-
-def test_wrong_arguments(
-    renderer: Renderer, new_renderer: Callable[[], Renderer], scene: Scene, plain: Any
-) -> None:
-    with pytest.raises(ValueError, match="shading: 'toon'"):
-        renderer.plan(scene, shading="toon")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="size: "):
-        renderer.plan(scene, size=(0, 9))
-    for source in (None, [plain], "image"):
-        with pytest.raises(TypeError, match="source: a Scene is needed"):
-            renderer.plan(source)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="dtype int64"):
-        renderer.plan(plain.astype(np.int64))
-    closed = new_renderer()
-    closed.close()
-    with pytest.raises(ValueError, match="closed"):
-        closed.plan(plain)
-
-
 def test_planning_waits_for_no_other_call(new_renderer: Callable[[], Renderer]) -> None:
     renderer = new_renderer()
     image = picture(64, 64)

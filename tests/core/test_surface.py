@@ -9,7 +9,6 @@ import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.images import picture
 from tests.processes import output
+from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._renderer.surface import Surface
 
@@ -133,29 +133,10 @@ def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:
         surface.present(scene)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"framebuffer": "depth"}, "framebuffer: 'depth' has no colours to show"),
-        ({"framebuffer": "all"}, "framebuffers: "),
-        ({"framebuffer": "blur"}, "blur"),
-        ({"size": (0, 5)}, r"size: \(0, 5\) is out of range"),
-    ],
-)
-def test_surface_refuses_wrong_arguments(
-    arguments: dict[str, Any], message: str, surface: Surface, scene: Scene
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        surface.present(scene, **arguments)
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "surfaces"))
+def test_a_wrong_value_is_refused(surface: Surface, scene: Scene, call: str, error: str) -> None:
+    assert_refused(call, error, {"surface": surface, "scene": scene})
     assert surface.present(scene)
-
-
-def test_wrong_window_or_size_of_a_surface_is_refused(renderer: Renderer) -> None:
-    pytest.importorskip("glfw")
-    with pytest.raises(TypeError, match="window: 'x' is not a glfw window or None"):
-        Surface(renderer, "x")
-    with pytest.raises(ValueError, match="size"):
-        Surface(renderer, size=(0, 1))
 
 
 def test_without_the_extension_an_error_says_so(renderer: Renderer) -> None:

@@ -123,6 +123,18 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [path] * bool(path) + [p for key in keys for p in places(value[key], (*path, key))]
 
 
+def at(document: dict[str, Any], path: str, value: Any) -> None:
+    """Put a value at a place of a document; "+" is the end of a list."""
+    *parents, last = path.split(".")
+    place: Any = document
+    for key in parents:
+        place = place[int(key)] if isinstance(place, list) else place[key]
+    if last == "+":
+        place.append(value)
+    else:
+        place[int(last) if isinstance(place, list) else last] = value
+
+
 def load_or_refuse(path: Path, content: bytes) -> Mesh | None:
     """Load; None if it is refused as it should be. Numeric warnings count as failures."""
     path.write_bytes(content)

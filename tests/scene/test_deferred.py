@@ -386,11 +386,6 @@ def test_bloom_and_final_are_the_references(
     assert np.abs(shown["final"] - np.round(255 * final)).max() <= 1
 
 
-def test_bloom_is_the_blurred_brightness(frames: Frames) -> None:
-    expected = reference.blur(frames["brightness"], Separable())
-    assert_close("bloom", frames["bloom"], expected, tolerance("float16", expected))
-
-
 @pytest.mark.parametrize(
     ("tonemap", "encoding", "composite"),
     by_turns(

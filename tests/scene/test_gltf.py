@@ -18,6 +18,7 @@ import pytest
 from hypothesis import given
 
 from tests.exhaustive import EXHAUSTIVE
+from tests.refusals import assert_refused, rows
 from tests.scene.changed_bytes import CHANGES, many
 from tests.scene.gltf_documents import (
     BYTE,
@@ -28,6 +29,7 @@ from tests.scene.gltf_documents import (
     POSITIONS,
     SHORT,
     Document,
+    at,
     load_or_refuse,
     nested,
     places,
@@ -419,20 +421,6 @@ def test_everything_left_out_is_named_in_one_warning(tmp_path: Path) -> None:
         assert part in message
 
 
-def test_an_unknown_required_extension_is_refused(tmp_path: Path) -> None:
-    document = triangle()
-    document.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
-    with pytest.raises(ValueError, match=r"mesh\.gltf.*KHR_draco_mesh_compression"):
-        document.load(tmp_path)
-
-
-def test_only_lines_is_no_mesh(tmp_path: Path) -> None:
-    document = Document()
-    document.primitive(mode=1)
-    with pytest.raises(ValueError, match=r"mesh\.gltf: has no triangles"):
-        document.load(tmp_path)
-
-
 def test_without_pygltflib_the_message_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -533,74 +521,17 @@ def test_missing_files_are_os_errors_that_name_them(tmp_path: Path) -> None:
 # Damaged files
 
 
-def at(document: dict[str, Any], path: str, value: Any) -> None:
-    *parents, last = path.split(".")
-    place: Any = document
-    for key in parents:
-        place = place[int(key)] if isinstance(place, list) else place[key]
-    if last == "+":
-        place.append(value)
-    else:
-        place[int(last) if isinstance(place, list) else last] = value
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "message"),
-    [
-        ("asset.version", "1.0", r"asset.version\) is '1.0'; 2.0 is needed"),
-        ("asset.version", 1.0, r"asset.version\) is 1; 2.0 is needed"),
-        ("asset", {}, r"asset.version\) is missing; 2.0 is needed"),
-        ("asset.minVersion", "2.1", "at least glTF"),
-        ("scene", 1, "index into scenes is 1"),
-        ("scenes.0.nodes", [9], "is 9"),
-        ("scenes.0.nodes", [0, 0], "twice"),
-        ("scenes.0.nodes", [1], "has a parent"),
-        ("nodes.1.children", [0], "cycle"),
-        ("nodes.1.children", [1], "child of both"),
-        ("nodes.1.mesh", 4, "index into meshes is 4"),
-        ("nodes.0.translation", [1, 2], "3 numbers"),
-        ("nodes.0.scale", [1, math.nan, 1], "out of range"),
-        ("nodes.0.scale", [1, 10**400, 1], "too large"),
-        ("nodes.1.rotation", [0, 0, 0, 0], "no length"),
-        ("nodes.0.matrix", [1.0] * 16, "both a matrix"),
-        ("nodes.0", {"matrix": [1.0] * 16}, "not affine"),
-        ("nodes.0", {"matrix": [*([0.0] * 15), 1.001]}, "not affine"),
-        ("scenes", [], "index into scenes is 0; there are none"),
-        ("nodes.0.scale", [2e38, 2e38, 2e38], "not finite"),
-        ("meshes.0.primitives", [], "no triangles"),
-        ("meshes.0.primitives.0.mode", 7, "mode is 7"),
-        ("meshes.0.primitives.0.mode", True, "an integer is needed"),
-        ("meshes.0.primitives.0.indices", 99, "index into accessors is 99"),
-        ("meshes.0.primitives.0.indices", 1, "SCALAR"),
-        ("meshes.0.primitives.0.material", -1, "index into materials is -1"),
-        ("accessors.0.count", 2, "complete triangles"),
-        ("accessors.0.count", 4, "ends at byte 4"),
-        ("accessors.0.count", 10**12, "count is"),
-        ("accessors.0.count", 0, "count is 0"),
-        ("accessors.0.byteOffset", -1, "byteOffset is -1"),
-        ("accessors.0.componentType", 5120, "component type 5120"),
-        ("accessors.1.type", "VEC2", "'VEC2'"),
-        ("accessors.2.count", 2, "2 entries for 3 vertices"),
-        ("bufferViews.1.buffer", 1, "index into buffers is 1"),
-        ("bufferViews.1.byteLength", 10**9, "byteLength is"),
-        ("bufferViews.1.byteOffset", 10**9, "byteOffset is"),
-        ("bufferViews.1.byteStride", 8, "byteStride is 8"),
-        ("bufferViews.1.byteStride", 16, "ends at byte 44"),
-        ("buffers.0.byteLength", 10**9, r"bytes of 1000000000"),
-        ("buffers.0.uri", "data:application/octet-stream;base64,AAAA", "has 3 bytes"),
-        ("buffers.0.uri", "data:application/octet-stream;base64,A*A=", "base64"),
-        ("buffers.0.uri", "data:application/octet-stream,AAAA", "not base64"),
-        ("buffers.0.uri", None, "binary chunk"),
-        ("materials.0.pbrMetallicRoughness.baseColorFactor", [1, 1, -1, 1], "out of range"),
-    ],
-)
-def test_damage_is_named(tmp_path: Path, path: str, value: Any, message: str) -> None:
-    text = json.loads(nested().as_gltf())
-    at(text, path, value)
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "damaged glTF"))
+def test_damage_is_named(tmp_path: Path, call: str, error: str) -> None:
     file = tmp_path / "mesh.gltf"
-    file.write_text(json.dumps(text))
-    with pytest.raises(ValueError, match=rf"mesh\.gltf: .*{message}"):
-        load_mesh(file)
+
+    def damaged(path: str, value: Any) -> Mesh:
+        text = json.loads(nested().as_gltf())
+        at(text, path, value)
+        file.write_text(json.dumps(text))
+        return load_mesh(file)
+
+    assert_refused(call, error, {"damaged": damaged, "math": math})
 
 
 @pytest.mark.parametrize("attribute", ["POSITION", "NORMAL", "COLOR_0"])

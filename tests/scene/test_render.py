@@ -328,38 +328,6 @@ def test_final_is_scene_plus_bloom(
     assert (frames["final"][..., 3] == 255).all()
 
 
-@pytest.mark.parametrize(
-    ("tonemap", "encoding", "composite"),
-    by_turns(
-        ["none", "reinhard", "aces", "exponential"],
-        ["none", "gamma22", "srgb", "pq", "hlg"],
-        turns=["add", "mix", "screen"],
-    ),
-)
-def test_final_is_the_references(
-    renderer: Renderer, scene: Scene, composite: Any, tonemap: Any, encoding: Any
-) -> None:
-    settings = Separable(
-        composite=composite,
-        tonemap=tonemap,
-        encoding=encoding,
-        intensity=0.6,
-        exposure=-0.5,
-        bloom_size=(80, 80),
-    )
-    frames = renderer.render(scene, settings, SIZE)
-    expected = reference.composite(frames["scene"], frames["bloom"], settings)
-    assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
-
-
-@pytest.mark.parametrize("tonemap", ["khronos_neutral", "agx"])
-def test_the_longer_tone_maps(renderer: Renderer, scene: Scene, tonemap: Any) -> None:
-    settings = Separable(tonemap=tonemap, exposure=1.0, intensity=2.0, format="rgba16float")
-    frames = renderer.render(scene, settings, SIZE)
-    expected = reference.composite(frames["scene"], frames["bloom"], settings)
-    assert levels_apart(frames["final"], np.round(255 * expected)) <= 1
-
-
 def test_tone_maps_without_bloom(renderer: Renderer, scene: Scene) -> None:
     settings = Separable(bloom=False, tonemap="reinhard", encoding="gamma22", exposure=1.0)
     frames = renderer.render(scene, settings, SIZE)
@@ -398,14 +366,6 @@ def test_arrays_that_are_not_given_are_allocated(renderer: Renderer, scene: Scen
     np.testing.assert_array_equal(large[1], renderer.render(scene, None, SIZE)["final"])
     assert not large[0].any()
     assert not large[2].any()
-
-
-def test_frames_do_not_change_with_later_ones(renderer: Renderer, scene: Scene) -> None:
-    first = renderer.render(scene, None, SIZE)
-    kept = {name: array.copy() for name, array in first.items()}
-    renderer.render(scene, Separable(blur_strength=0.1), SIZE, time=0.5)
-    for name, array in first.items():
-        np.testing.assert_array_equal(array, kept[name])
 
 
 def test_timings_are_times_of_the_device(renderer: Renderer, scene: Scene) -> None:

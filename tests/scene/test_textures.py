@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.refusals import assert_refused, rows
 from tests.scene.deferred_frames import rgb
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
@@ -404,59 +405,6 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
 GOOD = half_colours(4, 4)
 
 
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"levels": ()}, ValueError, "levels is empty"),
-        ({"levels": ([[1.0]],)}, TypeError, "levels"),
-        ({"levels": (GOOD.astype(np.float32),)}, TypeError, "float16"),
-        ({"levels": (GOOD[..., :3],)}, ValueError, "(4, 4, 3)"),
-        ({"levels": (GOOD[:0],)}, ValueError, "(0, 4, 4)"),
-        ({"levels": (GOOD, GOOD)}, ValueError, "2 x 2"),
-        ({"levels": (*mip_levels(GOOD), GOOD[:1, :1])}, ValueError, "4 entries"),
-        ({"levels": (np.zeros((1, 16385, 4), np.float16),)}, ValueError, "16384"),
-        ({"levels": (np.full((1, 1, 4), np.inf, np.float16),)}, ValueError, "infinity"),
-        ({"address_mode": ("repeat",)}, ValueError, "address_mode"),
-        ({"address_mode": ("repeat", "border")}, ValueError, "'border'"),
-        ({"mag_filter": "cubic"}, ValueError, "mag_filter"),
-        ({"min_filter": "cubic"}, ValueError, "min_filter"),
-        ({"mipmap_filter": None}, ValueError, "mipmap_filter"),
-    ],
-)
-def test_textures_that_are_refused(
-    changes: dict[str, Any], error: type[Exception], message: str
-) -> None:
-    with pytest.raises(error) as caught:
-        Texture(**{"levels": (GOOD,), **changes})
-    assert message in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"texcoords": None}, ValueError, "texcoords is None"),
-        ({"texcoords": np.zeros((3, 4), np.float32)}, ValueError, "texcoords has 3 rows"),
-        ({"texcoords": np.zeros((4, 2), np.float32)}, ValueError, "texcoords"),
-        ({"texcoords": np.full((4, 4), np.nan, np.float32)}, ValueError, "texcoords"),
-        ({"surfaces": (5,)}, TypeError, "surfaces"),
-        ({"surfaces": (Surface(9), Surface(6))}, ValueError, "take 15 indices; there are 12"),
-    ],
-)
-def test_meshes_that_are_refused(
-    changes: dict[str, Any], error: type[Exception], message: str
-) -> None:
-    with pytest.raises(error, match=message):
-        dataclasses.replace(panel((4, 4)), **changes)
-
-
-@pytest.mark.parametrize("count", [0, -3, 4])
-def test_surfaces_that_are_refused(count: int) -> None:
-    with pytest.raises(ValueError, match=f"index_count is {count}"):
-        Surface(count)
-    with pytest.raises(TypeError, match="base"):
-        Surface(3, base=GOOD)  # type: ignore[arg-type]
-
-
 def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
     """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
     source = _core.scene_source(
@@ -476,30 +424,13 @@ RAW_BODY = (BODY.vertices, BODY.indices, None, BODY.texcoords, ((12, 0, 0),))
 RAW_WHITE = (WHITE.levels, "repeat", "repeat", "linear", "linear", "linear")
 
 
-@pytest.mark.parametrize(
-    ("mesh", "texture", "message"),
-    [
-        ((*RAW_BODY[:4], ((12, 1, 0),)), RAW_WHITE, "surface 0"),
-        ((*RAW_BODY[:4], ((12, 0, 1),)), RAW_WHITE, "surface 0"),
-        ((*RAW_BODY[:4], ((9, 0, 0), (6, 0, 0))), RAW_WHITE, "surface 1"),
-        ((*RAW_BODY[:3], None, RAW_BODY[4]), RAW_WHITE, "texcoords"),
-        ((*RAW_BODY[:3], np.zeros((3, 4), np.float32), RAW_BODY[4]), RAW_WHITE, "texcoords"),
-        (RAW_BODY, (*RAW_WHITE[:1], "edge", *RAW_WHITE[2:]), "edge"),
-        (RAW_BODY, (*RAW_WHITE[:5], "cubic"), "cubic"),
-        (RAW_BODY, ((), *RAW_WHITE[1:]), "no levels"),
-        (RAW_BODY, ((GOOD, GOOD), *RAW_WHITE[1:]), "level 1"),
-        (RAW_BODY, ((GOOD,) * 17, *RAW_WHITE[1:]), "17 mip levels"),
-        (RAW_BODY, ((GOOD[0],), *RAW_WHITE[1:]), "level 0"),
-        (
-            RAW_BODY,
-            ((np.ones((1, 2**17, 4), np.float16),), *RAW_WHITE[1:]),
-            "texture: a side of 131072 pixels is beyond this adapter's limit",
-        ),
-    ],
-)
-def test_the_core_checks_what_it_is_given(
-    renderer: Renderer, mesh: Any, texture: Any, message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        draw_raw(renderer, 2**60, mesh, (texture,))
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "textures"))
+def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> None:
+    names = {
+        "Surface": Surface,
+        "made": lambda **changes: Texture(**{"levels": (GOOD,), **changes}),
+        "remade": lambda **changes: dataclasses.replace(panel((4, 4)), **changes),
+        "draw": lambda mesh, texture: draw_raw(renderer, 2**60, mesh, (texture,)),
+    }
+    assert_refused(call, error, globals() | names)
     draw_raw(renderer, 2**61, RAW_BODY, (RAW_WHITE,))

@@ -74,7 +74,7 @@ def push(stack: Stack, token: str, values: Values, finite: bool) -> None:
     if ending:
         name = token.removesuffix(ending)
         if name not in values.sizes:
-            known = ", ".join(values.sizes)
+            known = ", ".join(sorted(values.sizes))
             raise ExpressionError(f"texture: {name!r} is not one of {known}")
         stack.append(np.float32(values.sizes[name][SIZES[ending]]))
     elif token[0] in OPERATORS:

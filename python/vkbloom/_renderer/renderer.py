@@ -897,7 +897,7 @@ class Renderer:
     ) -> Iterator[Frames]:
         place = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
-        if not isinstance(settings, abc.Iterable) or isinstance(settings, str):
+        if not isinstance(settings, abc.Iterable) or isinstance(settings, str | bytes):
             raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
         if self.closed:
             raise ValueError("the renderer is closed")

@@ -102,13 +102,11 @@ class GlareLight(Glare):
 def check_glare(glare: object) -> tuple[Glare, ...]:
     """Return the stages of settings.
 
-    `glare`: A mapping is the result of `Glare.to_dict`. None: no stages.
+    `glare`: A mapping is the result of `Glare.to_dict`.
     """
-    if glare is None:
-        return ()
     if isinstance(glare, Glare | Mapping):
         glare = (glare,)
-    if isinstance(glare, str) or not isinstance(glare, Iterable):
+    if isinstance(glare, str | bytes) or not isinstance(glare, Iterable):
         raise TypeError(f"glare: {glare!r} is not a sequence of stages")
     found = []
     for one in glare:

@@ -97,8 +97,10 @@ class Tolerances:
             ("flip", 0.0, 1.0),
         ):
             value = getattr(self, name)
-            if value is not None:
+            if value is not None or name == "fail_percent":
                 check_number(name, value, low, high)
+        if not isinstance(self.allow_nan, bool | np.bool_):
+            raise TypeError(f"allow_nan: {self.allow_nan!r} is not a bool")
 
     def of(self, dtype: np.dtype[Any]) -> tuple[float, float]:
         """Return atol and rtol for images of a dtype.

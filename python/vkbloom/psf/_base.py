@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vkbloom._argument_types import checked
 from vkbloom._checks import check_size
 from vkbloom._settings.fields import Record
 
@@ -49,6 +50,11 @@ class PSF(Record, abc.ABC):
     _class_key: ClassVar[str] = "psf"
     _subject: ClassVar[str] = "psf"
     unit: ClassVar[Literal["degree", "pixel"]]
+
+    def __init_subclass__(cls) -> None:
+        # A class that is defined in pixels has no other use for `pixels_per_degree`.
+        if "array" in vars(cls):
+            cls.array = checked(cls.array)  # type: ignore[method-assign]
 
     @abc.abstractmethod
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:

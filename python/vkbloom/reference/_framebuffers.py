@@ -241,10 +241,9 @@ def passes(
     colours = values[..., :3] if has_alpha else values
     colours = store.first(colours) if settings.published else store(colours)
     size = size or (width, height)
-    weights = as_mask(mask, size) if mask is not None and settings.published else None
-    framebuffers: dict[str, Array] = method.passes(
-        BlurInput(colours, size, store, weights), settings
-    )
+    weights = None if mask is None else as_mask(mask, size)
+    given = BlurInput(colours, size, store, weights if settings.published else None)
+    framebuffers: dict[str, Array] = method.passes(given, settings)
     if not has_alpha:
         return framebuffers
     return _with_alphas(framebuffers)

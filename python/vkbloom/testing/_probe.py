@@ -95,6 +95,7 @@ class Probe:
         for name in ("atol", "rtol"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), 0.0, math.inf)
+        check_index("seed", self.seed, 0, 2**63 - 1)
 
     @property
     def centre(self) -> tuple[int, int]:
