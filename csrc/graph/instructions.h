@@ -13,10 +13,12 @@ enum {
     SPV_MAX_BOUND = 0x3fffff,
     SPV_SPEC_ID = 1,  // decorations
     SPV_BUILT_IN = 11,
+    SPV_LOCAL_SIZE = 17,  // an execution mode
     // Storage classes.
     SPV_UNIFORM_CONSTANT = 0,
     SPV_INPUT = 1,
     SPV_UNIFORM = 2,
+    SPV_WORKGROUP = 4,
     SPV_PUSH_CONSTANT = 9,
 };
 
@@ -25,13 +27,16 @@ enum vkb_opcode {
     SPV_LINE = 8,
     SPV_EXT_INST = 12,
     SPV_ENTRY_POINT = 15,
+    SPV_EXECUTION_MODE,
     SPV_TYPE_VOID = 19,
     SPV_TYPE_BOOL,
     SPV_TYPE_INT,
     SPV_TYPE_FLOAT,
     SPV_TYPE_VECTOR,
+    SPV_TYPE_MATRIX,
     SPV_TYPE_IMAGE = 25,
     SPV_TYPE_ARRAY = 28,
+    SPV_TYPE_STRUCT = 30,
     SPV_TYPE_POINTER = 32,
     SPV_TYPE_FORWARD_POINTER = 39,
     SPV_CONSTANT_TRUE = 41,

@@ -18,6 +18,7 @@ static const struct layout layouts[] = {
     {SPV_TYPE_INT, SPV_TYPE_INT, 4, 0, 0},
     {SPV_TYPE_FLOAT, SPV_TYPE_FLOAT, 3, 0, 0},
     {SPV_TYPE_VECTOR, SPV_TYPE_VECTOR, 4, W(2), 0},
+    {SPV_TYPE_MATRIX, SPV_TYPE_MATRIX, 4, W(2), 0},
     {SPV_TYPE_IMAGE, SPV_TYPE_IMAGE, 9, W(2), 0},
     {SPV_TYPE_ARRAY, SPV_TYPE_ARRAY, 4, W(2) | W(3), 0},
     {SPV_TYPE_POINTER, SPV_TYPE_POINTER, 4, W(3), 0},
