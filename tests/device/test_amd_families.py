@@ -22,4 +22,4 @@ def test_a_family_compiles_and_records(tmp_path: Path) -> None:
     assert "RADV NAVI21" in found["adapter"]
     assert found["count"] > 80
     assert found["shaders"] > 200
-    assert found["spilled"] == 0
+    assert found["vgprs_spilled"] == 0
