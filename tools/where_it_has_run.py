@@ -1,7 +1,7 @@
 """Write docs/drivers_table.md, where vkbloom has run, from the kept reports of docs/devices.
 
-``python tools/where_it_has_run.py [--out docs]``. Reports are written by ``vkbloom doctor --self-test
---json FILE`` and by ``python -m tests.device.amd_families --json FILE``.
+``python tools/where_it_has_run.py [--out docs]``. Two programs write the reports:
+``vkbloom doctor --self-test --json FILE`` and ``python -m tests.device.amd_families --json FILE``.
 """
 
 from __future__ import annotations
