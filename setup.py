@@ -79,7 +79,24 @@ class Module(NamedTuple):
 
 
 def modules(shader: Path) -> list[Module]:
-    """Return the modules that a shader is compiled to.
+    """Return the modules that a shader is compiled to, with those for the images of a batch.
+
+    Adjoints and Fourier transforms run for one image.
+    """
+    plain = list(plain_modules(shader))
+    if shader.stem.startswith(("adjoint", "fft")):
+        return plain
+    layered = [
+        Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))
+        for module in plain
+        if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
+        and "-DWORDS" not in module.options
+    ]
+    return plain + layered
+
+
+def plain_modules(shader: Path) -> list[Module]:
+    """Return the modules of a shader for one image.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for images as words, of each format. Lines of it say more: with `#pragma compile
@@ -178,17 +195,26 @@ def optimize(module: Module, target: Path, passes: list[str]) -> None:
     run_tool(module.shader, optimizer(), *options, str(target), "-o", str(target))
 
 
-def build_module(module: Module, target: Path) -> None:
-    """Write a module to a file, as the package contains it."""
-    compile_shader(module, target)
-    decorate(target)
-    optimize(module, target, ONE_FUNCTION)
-    rolled = target.read_bytes()
-    optimize(module, target, ["--loop-unroll"])
-    if target.stat().st_size > MAX_UNROLLED:
-        target.write_bytes(rolled)
-    decorate(target)
-    optimize(module, target, SIMPLER)
+def build_module(module: Module, target: Path, recipe: str) -> None:
+    """Write a module to a file, as the package contains it.
+
+    A file stays if the digest beside it is that of what glslang has compiled, and of the recipe.
+    """
+    part, note = target.with_suffix(".part"), target.with_suffix(".sha256")
+    compile_shader(module, part)
+    digest = hashlib.sha256(recipe.encode() + part.read_bytes()).hexdigest()
+    if not (target.exists() and note.exists() and note.read_text() == digest):
+        decorate(part)
+        optimize(module, part, ONE_FUNCTION)
+        rolled = part.read_bytes()
+        optimize(module, part, ["--loop-unroll"])
+        if part.stat().st_size > MAX_UNROLLED:
+            part.write_bytes(rolled)
+        decorate(part)
+        optimize(module, part, SIMPLER)
+        part.replace(target)
+        note.write_text(digest)
+    part.unlink(missing_ok=True)
 
 
 def sources() -> list[Path]:
@@ -214,23 +240,22 @@ def compile_modules(built: list[Module], jobs: int) -> Path:
         there = all((folder / f"{module.name}.spv").exists() for module in built)
         if there and wanted.items() <= made_with(folder).items():
             return folder
-    for program, name in ((compiler(), "glslang"), (optimizer(), "spirv-opt")):
-        wanted[name] = run_tool(name, program, "--version").splitlines()[0]
+    programs = {"glslang": compiler(), "spirv-opt": optimizer()}
+    versions = {
+        name: run_tool(name, program, "--version").splitlines()[0]
+        for name, program in programs.items()
+    }
+    # How modules are made: by these programs, as the first two files say.
+    recipe = "\n".join([*versions.values(), *(path.read_text() for path in sources()[:2])])
     SPIRV.mkdir(parents=True, exist_ok=True)
-    # A build that was stopped goes on.
-    if made_with(SPIRV) != wanted:
-        for old in SPIRV.glob("*.spv"):
-            old.unlink()
-        (SPIRV / MADE).write_text(f"{json.dumps(wanted, indent=1)}\n")
+    (SPIRV / MADE).unlink(missing_ok=True)
 
-    def build_missing(module: Module) -> None:
-        target = SPIRV / f"{module.name}.spv"
-        if not target.exists():
-            build_module(module, target.with_suffix(".part"))
-            target.with_suffix(".part").replace(target)
+    def build(module: Module) -> None:
+        build_module(module, SPIRV / f"{module.name}.spv", recipe)
 
     with ThreadPoolExecutor(jobs) as threads:
-        list(threads.map(build_missing, built))
+        list(threads.map(build, built))
+    (SPIRV / MADE).write_text(f"{json.dumps(wanted | versions, indent=1)}\n")
     return SPIRV
 
 
@@ -257,6 +282,7 @@ def write_spirv(jobs: int) -> None:
             f"{module.shader.stem}_dispatch",
             module.name.replace("_words_", "_packed_"),
             module.name.replace("_words_", "_words_rgb_"),
+            f"{module.name}_layers",
         )
         pointers = ", ".join(
             f"&vkb_shader_{twin}" if twin in names - {module.name} else "NULL" for twin in twins

@@ -44,7 +44,7 @@ def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None
     default="bench.md",
     show_default=True,
     type=click.Path(dir_okay=False),
-    help="The table. FILE.json and, with matplotlib, the curves are written beside it.",
+    help="The table. FILE.json is written beside it.",
 )
 @click.option(
     "--beside",

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks.inputs import pictures
 from benchmarks.plan import Plan
-from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
-from benchmarks.timing import alternate_seconds
+from benchmarks.results import Goal, Section, Table, agreement, side_by_side
+from benchmarks.timing import alternate_seconds, wall_clock
 from vkbloom import _core
 from vkbloom._renderer import requests
 
@@ -161,7 +161,10 @@ def _beside_torch(
     with plan.renderer() as renderer:
         expected, _ = _pulled(renderer, PYRAMID, images[0], cotangents[0])
     found = pulled(0)[0].movedim(0, -1).cpu().numpy()
-    section.agreements.append(_agreement(expected, found))
+    most = 1e-5 * float(np.abs(expected).max())
+    reason = "a hundred-thousandth of the largest derivative"
+    what = "Pyramid: derivatives of PyTorch"
+    section.agreements.append(agreement(what, expected, found, most, reason))
     both = alternate_seconds({"PyTorch": _timed(torch, device, pulled)}, plan.times(ROUNDS))
     seconds = ours["forward"].median + ours["backward"].median
     theirs = both["PyTorch"].median
@@ -189,22 +192,10 @@ def _beside_torch(
     )
 
 
-def _agreement(expected: NDArray[Any], found: NDArray[Any]) -> Agreement:
-    most = 1e-5 * float(np.abs(expected).max())
-    reason = "a hundred-thousandth of the largest derivative"
-    return agreement("Pyramid: derivatives of PyTorch", expected, found, most, reason)
-
-
 def _timed(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int], float]:
     """Return a call that returns its seconds on the device."""
     if device == "cpu":
-
-        def on_host(turn: int) -> float:
-            start = time.perf_counter()
-            call(turn)
-            return time.perf_counter() - start
-
-        return on_host
+        return wall_clock(call)
 
     def on_device(turn: int) -> float:
         start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import OURS
+from benchmarks.ours import OURS, applied, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, agreement, side_by_side
-from benchmarks.timing import Contender, alternate
+from benchmarks.results import Section
+from benchmarks.timing import Contender
 
 __all__ = ["ALLOWED", "kernel_sizes", "placed", "run", "settings_of"]
 
@@ -109,27 +109,15 @@ def _time_one(
         section.missing,
     )
     with plan.renderer() as renderer:
-
-        def bloom(image: NDArray[Any]) -> NDArray[Any]:
-            return renderer.apply(image, settings, framebuffers=("final",))["final"]
-
-        blooms: dict[str, peers.ImageBloom] = {OURS: bloom}
-        for name, other in theirs.items():
-            found = agreement(
-                f"{group}: {name}", bloom(images[0]), other(images[0]), *ALLOWED["float32"]
-            )
-            section.agreements.append(found)
-            if found.agrees:
-                blooms[name] = other
-        times = alternate(
-            [
-                Contender(name, lambda turn, each=each: each(images[turn % COUNT]))  # type: ignore[misc]
-                for name, each in blooms.items()
-            ],
-            plan.times(ROUNDS),
+        bloom = applied(renderer, images, settings)
+        picture = bloom(0)["final"]
+        contenders = [Contender(OURS, bloom)]
+        contenders += [
+            Contender(name, lambda turn, each=each: each(images[turn % COUNT]))  # type: ignore[misc]
+            for name, each in theirs.items()
+        ]
+        made = [(name, picture, each(images[0])) for name, each in theirs.items()]
+        times = contest(
+            plan, section, group, contenders, ROUNDS, pictures=made, allowed=ALLOWED["float32"]
         )
-    section.times[group] = times
-    section.tables.append(side_by_side(group, times, OURS))
-    if SCIPY in times:
-        ratio = times[OURS].over(times[SCIPY]).value
-        section.goals.append(Goal(f"{group}: {OURS} / {SCIPY}", ratio, 2.0, at_most=True))
+    ratios(section, group, times, (OURS, SCIPY, 2.0, True))

@@ -8,9 +8,8 @@ torch stay on the device.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,10 @@ import vkbloom
 from benchmarks import peers
 from benchmarks.convolution import ALLOWED, kernel_sizes, placed, settings_of
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import OURS
+from benchmarks.ours import OURS, applied, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, Table, agreement, side_by_side
-from benchmarks.timing import Contender, alternate, device_clock
+from benchmarks.results import Section, Table
+from benchmarks.timing import Contender, device_clock
 
 __all__ = ["run"]
 
@@ -40,8 +39,7 @@ def run(plan: Plan, section: Section) -> None:
     section.title = "Convolution on the GPU, float16 RGBA"
     with ExitStack() as stack:
         ours = stack.enter_context(plan.renderer())
-        clock = device_clock(ours.info)
-        if clock is None:
+        if device_clock(ours.info) is None:
             section.missing.append(f"all of it: {ours.info.name} is no GPU")
             return
         stages = stack.enter_context(plan.renderer("fragment"))
@@ -51,97 +49,66 @@ def run(plan: Plan, section: Section) -> None:
             for name, kernel_size in kernels.items():
                 group = f"{size[0]} x {size[1]}, {name}"
                 plan.tell(f"convolution-gpu: {group}")
-                work = _Work(group, settings_of(kernel_size), images)
-                _time_one(plan, section, work, (ours, stages))
-
-
-class _Work(NamedTuple):
-    """What all do."""
-
-    group: str
-    settings: vkbloom.Convolution
-    images: list[NDArray[Any]]
+                settings = settings_of(kernel_size)
+                _time_one(plan, section, (group, settings), images, (ours, stages))
 
 
 def _time_one(
     plan: Plan,
     section: Section,
-    work: _Work,
+    work: tuple[str, vkbloom.Convolution],
+    images: list[NDArray[Any]],
     renderers: tuple[vkbloom.Renderer, vkbloom.Renderer],
 ) -> None:
-    group, settings, images = work
-    height, width = images[0].shape[:2]
-
-    def make(peer: Any) -> dict[str, Any]:
-        found: dict[str, Any] = peer.gpu_convolution(
-            images[0], *placed(settings, (width, height)), THRESHOLD
-        )
-        return found
-
-    theirs = peers.gather(("PyTorch",), make, section.missing)
-
-    # Each call of a renderer has another image than the call before, or no pass would run.
-    def apply(
-        renderer: vkbloom.Renderer, name: str, first: int = 0
-    ) -> Callable[[int], vkbloom.Frames]:
-        return lambda turn: renderer.apply(
-            images[(2 * turn + first) % COUNT], settings, framebuffers=(name,)
-        )
-
+    (group, settings), (height, width) = work, images[0].shape[:2]
+    theirs: dict[str, peers.GpuWork] = peers.gather(
+        ("PyTorch",),
+        lambda peer: peer.gpu_convolution(images[0], *placed(settings, (width, height)), THRESHOLD),
+        section.missing,
+    )
     ours, stages = renderers
-    calls = {
-        OURS: (apply(ours, "final"), device_clock(ours.info)),
-        OURS_ALONE: (
-            apply(ours, "bloom", 1),
+    clock = device_clock(ours.info)
+    # Each call of a renderer has another image than the call before, or no pass would run.
+    final, staged = (
+        applied(one, [*images[::2], *images[1::2]], settings) for one in (ours, stages)
+    )
+    alone = applied(ours, images, settings, "bloom", 1)
+    contenders = [
+        Contender(OURS, final, clock),
+        Contender(
+            OURS_ALONE,
+            alone,
             lambda frames: sum(frames.timings.get(name, 0.0) for name in PASSES),
         ),
-        STAGES: (apply(stages, "final"), device_clock(stages.info)),
-    }
-    pictures_made = {STAGES: (apply(ours, "final")(0)["final"], apply(stages, "final")(0)["final"])}
-    alone = apply(ours, "bloom")(0)["bloom"]
-    for name, (call, seconds, fetch) in theirs.items():
-        calls[name] = call, seconds
-        if name != peers.COPY:
-            expected = alone if name == TORCH_ALONE else pictures_made[STAGES][0]
-            pictures_made[name] = expected, fetch(call(0))
-    for name, (expected, made) in pictures_made.items():
-        found = agreement(f"{group}: {name}", expected, made, *ALLOWED["float16"])
-        section.agreements.append(found)
-        if not found.agrees:
-            del calls[name]
-    times = alternate(
-        [Contender(name, call, seconds) for name, (call, seconds) in calls.items()],
-        plan.times(ROUNDS),
+        Contender(STAGES, staged, clock),
+    ]
+    contenders += [Contender(name, call, seconds) for name, (call, seconds, _) in theirs.items()]
+    expected = {"final": final(0)["final"], "bloom": alone(COUNT - 1)["bloom"]}
+    made = [(STAGES, expected["final"], staged(0)["final"])]
+    made += [
+        (name, expected["bloom" if name == TORCH_ALONE else "final"], fetch(call(0)))
+        for name, (call, _, fetch) in theirs.items()
+        if name != peers.COPY
+    ]
+    times = contest(
+        plan,
+        section,
+        group,
+        contenders,
+        ROUNDS,
+        pictures=made,
+        allowed=ALLOWED["float16"],
         warm_up=5,
     )
-    section.times[group] = times
-    section.tables.append(side_by_side(group, times, OURS))
     ours.apply(images[1], settings, framebuffers=("final",))
-    passes = apply(ours, "final")(0).timings
-    section.tables.append(
-        Table(
-            f"{group}: passes",
-            ("", "ms"),
-            tuple((name, f"{1e3 * seconds:.3f}") for name, seconds in passes.items()),
-        )
+    rows = [(name, f"{1e3 * seconds:.3f}") for name, seconds in final(0).timings.items()]
+    section.tables.append(Table(f"{group}: passes", ("", "ms"), tuple(rows)))
+    ratios(
+        section,
+        group,
+        times,
+        (OURS, TORCH, 1.0, True),
+        (OURS_ALONE, TORCH_ALONE, 1.0, True),
     )
-    for mine, other in ((OURS, TORCH), (OURS_ALONE, TORCH_ALONE)):
-        if other in times:
-            ratio = times[mine].over(times[other]).value
-            section.goals.append(Goal(f"{group}: {mine} / {other}", ratio, 1.0, at_most=True))
-    if peers.COPY in times:
-        section.tables.append(
-            Table(
-                f"{group}: image read once and written once",
-                ("", "GB/s", "share of the copy"),
-                tuple(
-                    (
-                        name,
-                        f"{2 * images[0].nbytes / times[name].median / 1e9:.0f}",
-                        f"{times[peers.COPY].median / times[name].median:.3f}",
-                    )
-                    for name in (peers.COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE)
-                    if name in times
-                ),
-            )
-        )
+    names = (peers.COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE)
+    section.tables += peers.bandwidths(group, times, images[0].nbytes, names)

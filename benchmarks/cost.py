@@ -22,7 +22,7 @@ from benchmarks.image import SETTINGS, full_kernel
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
 from benchmarks.ours import contender
 from benchmarks.plan import Plan
-from benchmarks.results import Curve, Section, Table
+from benchmarks.results import Section, Table
 from benchmarks.timing import Contender, Times, alternate
 
 __all__ = ["Line", "run"]
@@ -192,5 +192,3 @@ def _add(section: Section, axis: Axis, name: str, measured: list[Times]) -> None
     )
     header = (axis.chart, "median, ms", "least, ms", f"{axis.unit}, start included", "off the line")
     section.tables.append(Table(caption, header, tuple(rows)))
-    milliseconds = tuple(1e3 * median for median in medians)
-    section.curves.append(Curve(axis.chart, name, axis.x, milliseconds))

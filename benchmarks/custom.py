@@ -15,8 +15,6 @@ import itertools
 import os
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -24,9 +22,10 @@ import numpy as np
 
 import vkbloom
 from benchmarks.inputs import pictures
+from benchmarks.ours import contender, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, Table, side_by_side
-from benchmarks.timing import Contender, alternate, alternate_seconds
+from benchmarks.results import Section, Table
+from benchmarks.timing import Contender, alternate
 from vkbloom._custom.compiler import find_compiler
 from vkbloom._settings.registry import METHODS
 
@@ -52,13 +51,9 @@ def run(plan: Plan, section: Section) -> None:
     _loading(plan, section)
 
 
-def _seconds(passes: tuple[str, ...]) -> Callable[[vkbloom.Frames], float]:
-    """Return the time of some passes of a call."""
-    return lambda frames: sum(frames.timings[name] for name in passes)
-
-
 def _passes(plan: Plan, section: Section, kind: type[vkbloom.Settings]) -> None:
     size = plan.size(*SIZE)
+    # All calls of the renderer share them, so that each has another image than the one before.
     images = itertools.cycle(pictures(size, np.float16))
     weights = vkbloom.gaussian_weights(2.5, 12)
     both = {
@@ -69,50 +64,40 @@ def _passes(plan: Plan, section: Section, kind: type[vkbloom.Settings]) -> None:
         ),
     }
     with plan.renderer("fragment") as renderer:
-        times = alternate(
-            [
-                Contender(
-                    name,
-                    lambda _, settings=settings: renderer.apply(  # type: ignore[misc]
-                        next(images), settings, framebuffers=("final",)
-                    ),
-                    _seconds(passes),
-                )
-                for name, (settings, passes) in both.items()
-            ],
-            plan.times(ROUNDS),
-        )
-    section.times["passes"] = times
-    section.tables.append(side_by_side(f"Three passes, {size[0]} x {size[1]}", times, BUILT_IN))
-    ratio = times[OWN].over(times[BUILT_IN]).value
-    section.goals.append(Goal("three passes: custom method / built in", ratio, 1.1, at_most=True))
+        contenders = [
+            Contender(
+                name,
+                contender(name, renderer, images, settings).call,
+                lambda frames, passes=passes: sum(frames.timings[one] for one in passes),  # type: ignore[misc]
+            )
+            for name, (settings, passes) in both.items()
+        ]
+        caption = f"Three passes, {size[0]} x {size[1]}"
+        times = contest(plan, section, "passes", contenders, ROUNDS, caption=caption, ours=BUILT_IN)
+    ratios(section, "three passes", times, (OWN, BUILT_IN, 1.1, True))
 
 
 def _loading(plan: Plan, section: Section) -> None:
     kept = os.environ.get("VKBLOOM_CACHE_DIR")
     with tempfile.TemporaryDirectory() as folder:
 
-        def loaded(cache: str) -> float:
+        def loaded(cache: str) -> None:
             os.environ["VKBLOOM_CACHE_DIR"] = f"{folder}/{cache}"
             METHODS.unregister(FILE.stem)
-            start = time.perf_counter()
             vkbloom.load_method(FILE)
-            return time.perf_counter() - start
 
-        def started(_: int) -> float:
-            start = time.perf_counter()
+        def started(_: int) -> None:
             command = [find_compiler(), "--stdin", "-S", "frag"]
             shader = b"#version 450\nvoid main() {}\n"
             subprocess.run(command, input=shader, stdout=subprocess.DEVNULL, check=True)
-            return time.perf_counter() - start
 
         try:
-            times = alternate_seconds(
-                {
-                    "first load": lambda turn: loaded(f"round{turn}"),
-                    "load from the cache": lambda _: loaded("round0"),
-                    "glslang, an empty shader": started,
-                },
+            times = alternate(
+                [
+                    Contender("first load", lambda turn: loaded(f"round{turn}")),
+                    Contender("load from the cache", lambda _: loaded("round0")),
+                    Contender("glslang, an empty shader", started),
+                ],
                 plan.times(LOADS),
                 warm_up=1,
             )

@@ -11,9 +11,10 @@ from contextlib import ExitStack
 from typing import Final
 
 import vkbloom
+from benchmarks.ours import contest
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, Table, agreement, side_by_side
-from benchmarks.timing import Contender, alternate
+from benchmarks.results import Goal, Section, Table
+from benchmarks.timing import Contender
 
 __all__ = ["run"]
 
@@ -45,10 +46,14 @@ def run(plan: Plan, section: Section) -> None:
                 framebuffers=("final",),
             )
 
-        for turn in (0, 20, 50):
-            ours, source = (frame(variant, turn, bloom=True)["final"] for variant in NAMES)
-            what = f"both variants at time {0.013 * turn:g}"
-            section.agreements.append(agreement(what, ours, source, 1.0, "one level of 8 bits"))
+        made = [
+            (
+                f"both variants at time {0.013 * turn:g}",
+                frame("auto", turn, bloom=True)["final"],
+                frame("fragment", turn, bloom=True)["final"],
+            )
+            for turn in (0, 20, 50)
+        ]
         contenders = [
             Contender(
                 f"{name}, bloom {'on' if bloom else 'off'}",
@@ -57,9 +62,16 @@ def run(plan: Plan, section: Section) -> None:
             for variant, name in NAMES.items()
             for bloom in (True, False)
         ]
-        times = alternate(contenders, plan.times(ROUNDS))
-    section.times["frames"] = times
-    section.tables.append(side_by_side("Frames", times, f"{NAMES['auto']}, bloom on"))
+        times = contest(
+            plan,
+            section,
+            "frames",
+            contenders,
+            ROUNDS,
+            pictures=made,
+            allowed=(1.0, "one level of 8 bits"),
+            ours=f"{NAMES['auto']}, bloom on",
+        )
     extra = {
         name: times[f"{name}, bloom on"].minus(times[f"{name}, bloom off"])
         for name in NAMES.values()

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import FRAGMENT, OURS
+from benchmarks.ours import FRAGMENT, OURS, applied, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, agreement, side_by_side
-from benchmarks.timing import Contender, Times, alternate
+from benchmarks.results import Section
+from benchmarks.timing import Contender
 
 __all__ = ["ALLOWED", "SETTINGS", "full_kernel", "run"]
 
@@ -92,35 +92,31 @@ def _time_one(
             stack.enter_context(plan.renderer(variant))
             for variant in ("auto", "fragment", "auto", "auto")
         )
-        blooms: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
-            OURS: _bloom(ours),
-            FRAGMENT: _bloom(source),
-            **theirs,
+        calls = {
+            name: applied(renderer, images, SETTINGS)
+            for name, renderer in ((OURS, ours), (FRAGMENT, source))
         }
-        picture = blooms[OURS](images[0])
-        allowed, reason = ALLOWED[dtype.name]
-        for name in list(blooms)[1:]:
-            found = agreement(f"{group}: {name}", picture, blooms[name](images[0]), allowed, reason)
-            section.agreements.append(found)
-            if not found.agrees:
-                del blooms[name]
-        contenders = [
+        picture = calls[OURS](0)["final"]
+        made = [(FRAGMENT, picture, calls[FRAGMENT](0)["final"])]
+        made += [(name, picture, bloom(images[0])) for name, bloom in theirs.items()]
+        contenders = [Contender(name, call) for name, call in calls.items()]
+        contenders += [
             Contender(name, lambda turn, bloom=bloom: bloom(images[turn % COUNT]))  # type: ignore[misc]
-            for name, bloom in blooms.items()
+            for name, bloom in theirs.items()
         ]
         # Ours follow work of one thread. Directly after another renderer, the system often leaves
         # both threads of a driver on one core for a complete call.
         contenders.insert(len(contenders) - 1, Contender(INTO, _into(filling, images)))
         contenders.append(Contender(UNCHANGED, _other_strength(unchanged, images[0])))
         contenders.append(Contender(COPY, _copy(images)))
-        times = alternate(contenders, plan.times(ROUNDS))
-    section.times[group] = times
-    section.tables.append(side_by_side(group, times, OURS))
-    section.goals += _goals(group, dtype.name, channels, times)
-
-
-def _bloom(renderer: vkbloom.Renderer) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    return lambda image: renderer.apply(image, SETTINGS, framebuffers=("final",))["final"]
+        times = contest(
+            plan, section, group, contenders, ROUNDS, pictures=made, allowed=ALLOWED[dtype.name]
+        )
+    new, into, rgb = _OF_OPENCV[dtype.name]
+    ratios(section, group, times, (OURS, "OpenCV", new if channels == 4 else rgb, True))
+    if channels == 4:
+        least = [(name, OURS, least, False) for name, least in _OF_OURS[dtype.name]]
+        ratios(section, group, times, (INTO, "OpenCV", into, True), *least)
 
 
 def _other_strength(
@@ -145,16 +141,3 @@ def _into(
 def _copy(images: list[NDArray[Any]]) -> Callable[[int], None]:
     target = np.zeros_like(images[0])
     return lambda turn: np.copyto(target, images[turn % COUNT])
-
-
-def _goals(group: str, dtype: str, channels: int, times: dict[str, Times]) -> list[Goal]:
-    new, into, rgb = _OF_OPENCV[dtype]
-    wanted = [(OURS, "OpenCV", new if channels == 4 else rgb, True)]
-    if channels == 4:
-        wanted.append((INTO, "OpenCV", into, True))
-        wanted += [(name, OURS, least, False) for name, least in _OF_OURS[dtype]]
-    return [
-        Goal(f"{group}: {one} / {other}", times[one].over(times[other]).value, ratio, at_most)
-        for one, other, ratio, at_most in wanted
-        if one in times and other in times
-    ]

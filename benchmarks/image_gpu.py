@@ -12,8 +12,6 @@ another image or, for the same image, compare it with the image on the device.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any, Final
 
@@ -23,11 +21,11 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.image import ALLOWED, SETTINGS, full_kernel
-from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import FRAGMENT, OURS
+from benchmarks.inputs import THRESHOLD, pictures
+from benchmarks.ours import FRAGMENT, OURS, applied, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, Table, agreement, side_by_side
-from benchmarks.timing import Contender, Times, alternate, alternate_seconds, device_clock
+from benchmarks.results import Goal, Section, side_by_side
+from benchmarks.timing import Contender, Times, alternate_seconds, device_clock, wall_clock
 
 __all__ = ["run"]
 
@@ -81,50 +79,39 @@ def _on_device(
             found |= peer.gpu_copy(images[0])
         return found
 
-    theirs = peers.gather(("CuPy", "PyTorch"), make, section.missing)
-    picture = _bloom(ours, images[0])["final"]
-    allowed, reason = ALLOWED["float16"]
-    blurred = {FRAGMENT: _bloom(source, images[0])["final"]}
-    for name, (call, _, fetch) in theirs.items():
-        if not name.endswith("alone") and name != peers.COPY:
-            blurred[name] = fetch(call(0))
-    for name, other in blurred.items():
-        section.agreements.append(agreement(name, picture, other, allowed, reason))
-    wrong = {found.what for found in section.agreements if not found.agrees}
-    contenders = [
-        Contender(
-            name,
-            lambda turn, renderer=renderer: _bloom(renderer, images[turn % COUNT]),  # type: ignore[misc]
-            device_clock(ours.info),
-        )
+    theirs: dict[str, peers.GpuWork] = peers.gather(("CuPy", "PyTorch"), make, section.missing)
+    calls = {
+        name: applied(renderer, images, SETTINGS)
         for name, renderer in ((OURS, ours), (FRAGMENT, source))
+    }
+    picture = calls[OURS](0)["final"]
+    made = [(FRAGMENT, picture, calls[FRAGMENT](0)["final"])]
+    made += [
+        (name, picture, fetch(call(0)))
+        for name, (call, _, fetch) in theirs.items()
+        if not name.endswith("alone") and name != peers.COPY
     ]
+    clock = device_clock(ours.info)
+    contenders = [Contender(name, call, clock) for name, call in calls.items()]
     contenders += [Contender(name, call, seconds) for name, (call, seconds, _) in theirs.items()]
-    contenders = [each for each in contenders if each.name not in wrong]
-    times = alternate(contenders, plan.times(ROUNDS), warm_up=5)
-    section.times["on the device"] = times
-    section.tables.append(side_by_side("On the device", times, OURS))
-    for name, wanted, at_most in _GOALS:
-        if name in times:
-            pair = (OURS, name) if at_most else (name, OURS)
-            ratio = times[pair[0]].over(times[pair[1]]).value
-            section.goals.append(
-                Goal(f"4K on the GPU: {pair[0]} / {pair[1]}", ratio, wanted, at_most)
-            )
-    if peers.COPY in times:
-        # The bloom reads and writes as many bytes as the copy.
-        share = times[peers.COPY].over(times[OURS]).value
-        section.goals.append(Goal("4K on the GPU: share of the copy's bandwidth", share, 0.3))
-        rows = tuple(
-            (name, f"{2 * images[0].nbytes / measured.median / 1e9:.0f}")
-            for name, measured in times.items()
-            if name in (peers.COPY, OURS, FUSED)
-        )
-        section.tables.append(Table("Image read once and written once", ("", "GB/s"), rows))
-
-
-def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> vkbloom.Frames:
-    return renderer.apply(image, SETTINGS, framebuffers=("final",))
+    times = contest(
+        plan,
+        section,
+        "4K on the GPU",
+        contenders,
+        ROUNDS,
+        pictures=made,
+        allowed=ALLOWED["float16"],
+        warm_up=5,
+    )
+    goals = [
+        (OURS, name, wanted, True) if at_most else (name, OURS, wanted, False)
+        for name, wanted, at_most in _GOALS
+    ]
+    # The bloom reads and writes as many bytes as the copy.
+    ratios(section, "4K on the GPU", times, *goals, (peers.COPY, OURS, 0.3, False))
+    names = (peers.COPY, OURS, FUSED)
+    section.tables += peers.bandwidths("4K on the GPU", times, images[0].nbytes, names)
 
 
 def _in_hands(
@@ -135,16 +122,6 @@ def _in_hands(
     theirs = peers.gather(("CuPy",), lambda peer: peer.transfers(images[0]), section.missing)
     scene = vkbloom.Scene.ufo()
     handle = ours.upload(images[0])
-
-    def wall(work: Callable[[int], Any]) -> Callable[[int], float]:
-        def once(turn: int) -> float:
-            start = time.perf_counter()
-            result = work(turn)
-            duration = time.perf_counter() - start
-            del result
-            return duration
-
-        return once
 
     # Made before the calls, so that only these are timed.
     strengths = [
@@ -161,9 +138,9 @@ def _in_hands(
         )
 
     calls = {
-        IN_HANDS: wall(frame),
-        RESIDENT: wall(lambda turn: strength(handle, turn)),
-        "apply, the same array, other strength": wall(lambda turn: strength(images[0], turn)),
+        IN_HANDS: wall_clock(frame),
+        RESIDENT: wall_clock(lambda turn: strength(handle, turn)),
+        "apply, the same array, other strength": wall_clock(lambda turn: strength(images[0], turn)),
     }
     # Its own loop: a call with the same array would otherwise find another image on the device.
     times = alternate_seconds(
@@ -172,7 +149,7 @@ def _in_hands(
         warm_up=WARM_UP,
     )
     times |= alternate_seconds(
-        {NEW: wall(lambda turn: _bloom(ours, images[turn % COUNT]))},
+        {NEW: wall_clock(applied(ours, images, SETTINGS))},
         plan.times(ROUNDS),
         warm_up=WARM_UP,
     )

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, pictures
-from benchmarks.ours import OURS
+from benchmarks.ours import OURS, applied, contest, ratios
 from benchmarks.plan import Plan
-from benchmarks.results import Agreement, Goal, Section, Table, agreement, side_by_side
+from benchmarks.results import Agreement, Section, Table
 from benchmarks.spread import spread
-from benchmarks.timing import Contender, alternate
+from benchmarks.timing import Contender
 
 __all__ = ["run"]
 
@@ -47,44 +47,29 @@ def run(plan: Plan, section: Section) -> None:
         ours, source = (
             stack.enter_context(plan.renderer(variant)) for variant in ("auto", "fragment")
         )
-        sigma, gain = spread(lambda image: _bloom_alone(ours, image), size)
-        spreads = {OURS: (sigma, gain)}
-        contenders = [
-            Contender(OURS, lambda turn: _bloom(ours, images[turn % COUNT])),
-            Contender(FRAGMENT, lambda turn: _bloom(source, images[turn % COUNT])),
-        ]
-        section.agreements.append(
-            agreement(
-                FRAGMENT,
-                _bloom(ours, images[0]),
-                _bloom(source, images[0]),
-                8e-3,
-                "nine roundings to half of values up to 2",
-            )
+        sigma, gain = spread(
+            lambda image: ours.apply(image, SETTINGS, framebuffers=("bloom",))["bloom"], size
         )
+        spreads = {OURS: (sigma, gain)}
+        whole, fragments = (applied(one, images, SETTINGS) for one in (ours, source))
+        contenders = [Contender(OURS, whole), Contender(FRAGMENT, fragments)]
         contenders += _pygfx(section, images, size, ours.info.name, spreads)
         contenders += _gaussian(plan, section, images, spreads)
         wrong = {found.what.partition(":")[0] for found in section.agreements if not found.agrees}
-        contenders = [each for each in contenders if each.name not in wrong]
-        times = alternate(contenders, plan.times(ROUNDS))
-    section.times["float16, RGBA"] = times
-    section.tables.append(side_by_side("float16, RGBA", times, OURS))
+        times = contest(
+            plan,
+            section,
+            "float16, RGBA",
+            [each for each in contenders if each.name not in wrong],
+            ROUNDS,
+            pictures=[(FRAGMENT, whole(0)["final"], fragments(0)["final"])],
+            allowed=(8e-3, "nine roundings to half of values up to 2"),
+        )
     rows = tuple((name, f"{sigma:.2f}", f"{gain:.4f}") for name, (sigma, gain) in spreads.items())
     section.tables.append(
         Table("Spread: standard deviation of the blur alone", ("", "pixels", "gain"), rows)
     )
-    for name, wanted in ((PYGFX, 3.8), (GAUSSIAN, 7.0)):
-        if name in times:
-            ratio = times[name].over(times[OURS]).value
-            section.goals.append(Goal(f"pyramid: {name} / {OURS}", ratio, wanted))
-
-
-def _bloom(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
-    return renderer.apply(image, SETTINGS, framebuffers=("final",))["final"]
-
-
-def _bloom_alone(renderer: vkbloom.Renderer, image: NDArray[Any]) -> NDArray[Any]:
-    return renderer.apply(image, SETTINGS, framebuffers=("bloom",))["bloom"]
+    ratios(section, "pyramid", times, (PYGFX, OURS, 3.8, False), (GAUSSIAN, OURS, 7.0, False))
 
 
 def _pygfx(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.timing import Times
 
-__all__ = ["Agreement", "Curve", "Goal", "Report", "Section", "Table", "agreement", "side_by_side"]
+__all__ = ["Agreement", "Goal", "Report", "Section", "Table", "agreement", "side_by_side"]
 
 
 @dataclass(frozen=True)
@@ -90,16 +90,6 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A cost curve: milliseconds over the values of the x axis."""
-
-    chart: str
-    label: str
-    x: tuple[float, ...]
-    milliseconds: tuple[float, ...]
-
-
 @dataclass
 class Section:
     """The result of one benchmark.
@@ -109,7 +99,7 @@ class Section:
     id, title : str
     about : list of str
         Paragraphs about what was timed, and what the figures do not show.
-    tables, goals, agreements, curves : list
+    tables, goals, agreements : list
     missing : list of str
         Peers that did not take part, each with the reason.
     times : dict
@@ -123,7 +113,6 @@ class Section:
     goals: list[Goal] = field(default_factory=list)
     agreements: list[Agreement] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
-    curves: list[Curve] = field(default_factory=list)
     times: dict[str, dict[str, Times]] = field(default_factory=dict)
 
 

@@ -12,14 +12,12 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks import peers
 from benchmarks.plan import Plan
 from benchmarks.results import Section, Table
-from benchmarks.timing import Times, alternate_seconds
+from benchmarks.timing import Contender, Times, alternate
 
 __all__ = ["run"]
 
@@ -54,9 +52,6 @@ _CACHES: Final = (
     "vkbloom's and the driver's caches",
 )
 
-#: Imports for packages that load their modules lazily.
-_IMPORTS: Final = {"scikit-image": "from skimage.filters import correlate_sparse"}
-
 
 def run(plan: Plan, section: Section) -> None:
     """Time the imports and the first frame of fresh processes."""
@@ -82,31 +77,18 @@ def _child(arguments: list[str], environment: dict[str, str] | None = None) -> A
 
 
 def _imports(plan: Plan, section: Section, rounds: int) -> None:
-    """Add the times of imports as complete processes, and the split of our own import."""
+    """Add the times of imports as complete processes."""
     plan.tell("startup: imports")
     statements = {
         "Python alone": "pass",
         "import numpy": "import numpy",
         "import vkbloom": "import vkbloom",
     }
-    versions = peers.versions()
-    for name in ("OpenCV", "scikit-image", "PyTorch", "pygfx"):
-        if versions[name] is None:
-            section.missing.append(f"{name} is not installed")
-        else:
-            statement = _IMPORTS.get(name, f"import {peers.PEERS[name]}")
-            statements[statement] = statement
-
-    def process(statement: str) -> Any:
-        def once(_: int) -> float:
-            start = time.perf_counter()
-            _child(["-c", statement])
-            return time.perf_counter() - start
-
-        return once
-
-    times = alternate_seconds(
-        {name: process(statement) for name, statement in statements.items()},
+    times = alternate(
+        [
+            Contender(name, lambda _, code=statement: _child(["-c", code]))  # type: ignore[misc]
+            for name, statement in statements.items()
+        ],
         rounds,
         warm_up=0 if plan.quick else 1,
     )
@@ -123,31 +105,6 @@ def _imports(plan: Plan, section: Section, rounds: int) -> None:
     )
     header = ("process", "median, ms", "least, ms", "minus Python alone, ms")
     section.tables.append(Table("Imports, from start to exit of a process", header, rows))
-    section.tables.append(_import_table())
-
-
-def _import_table() -> Table:
-    """Return the slowest modules of ``import vkbloom`` except numpy's, by ``-X importtime``."""
-    lines = _child(["-X", "importtime", "-c", "import vkbloom"]).stderr.splitlines()
-    own: dict[str, int] = {}
-    total: dict[str, int] = {}
-    for line in lines:
-        columns = line.removeprefix("import time:").split("|")
-        if len(columns) == 3 and columns[0].strip().isdigit():
-            name = columns[2].strip()
-            own[name], total[name] = int(columns[0]), int(columns[1])
-    # Modules before `site` are Python's own.
-    names = list(own)
-    later = names[names.index("site") + 1 :] if "site" in names else names
-    others = (name for name in later if name.split(".")[0] != "numpy")
-    slowest = sorted(others, key=lambda name: -own[name])[:8]
-    rows = [("vkbloom, with all it imports", f"{total['vkbloom'] / 1e3:.1f}", "")]
-    rows.append(("numpy, as a part of it", f"{total.get('numpy', 0) / 1e3:.1f}", ""))
-    rows += [(name, f"{total[name] / 1e3:.1f}", f"{own[name] / 1e3:.1f}") for name in slowest]
-    header = ("module", "with its imports, ms", "itself, ms")
-    return Table(
-        "One run of `python -X importtime`, which itself slows imports down", header, tuple(rows)
-    )
 
 
 def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) -> None:

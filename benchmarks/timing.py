@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vkbloom import AdapterInfo, Frames
 
-__all__ = ["Contender", "Ratio", "Times", "alternate", "alternate_seconds", "device_clock"]
+__all__ = [
+    "Contender",
+    "Ratio",
+    "Times",
+    "alternate",
+    "alternate_seconds",
+    "device_clock",
+    "wall_clock",
+]
 
 
 @dataclass(frozen=True)
@@ -95,38 +103,34 @@ def _quartiles(values: Sequence[float]) -> tuple[float, float]:
 def alternate(
     contenders: Sequence[Contender], rounds: int, *, warm_up: int = 2
 ) -> dict[str, Times]:
-    """Time contenders in turn, A B C A B C and so on.
+    """Time contenders with different names in turn: A B C A B C and so on.
 
-    So a disturbance, such as another clock rate or program, affects all of them.
-
-    Parameters
-    ----------
-    contenders : sequence of Contender
-        Contenders with different names.
-    rounds : int
-        How often each is timed.
-    warm_up : int
-        Rounds before these that do not count: compilation, first use of memory.
-
-    Returns
-    -------
-    dict of str to Times
-        By name, in the order given.
+    So a disturbance, such as another clock rate or program, affects all of them. `warm_up`: rounds
+    before that do not count: compilation, first use of memory.
     """
     names = [contender.name for contender in contenders]
     if len(set(names)) != len(names):
         raise ValueError(f"contenders: {names!r} has a name twice")
     return alternate_seconds(
-        {contender.name: _timed(contender) for contender in contenders}, rounds, warm_up=warm_up
+        {one.name: wall_clock(one.call, one.seconds) for one in contenders},
+        rounds,
+        warm_up=warm_up,
     )
 
 
-def _timed(contender: Contender) -> Callable[[int], float]:
+def wall_clock(
+    call: Callable[[int], Any], seconds: Callable[[Any], float] | None = None
+) -> Callable[[int], float]:
+    """Return a call that does the work once, and returns its seconds by the wall clock or another.
+
+    The result is freed after the clock has stopped.
+    """
+
     def once(turn: int) -> float:
         start = time.perf_counter()
-        result = contender.call(turn)
+        result = call(turn)
         wall = time.perf_counter() - start
-        return wall if contender.seconds is None else contender.seconds(result)
+        return wall if seconds is None else seconds(result)
 
     return once
 

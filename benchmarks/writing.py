@@ -1,22 +1,17 @@
-"""Reports as Markdown, JSON and curves."""
+"""Reports as Markdown and JSON."""
 
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 import math
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
-from benchmarks.results import Curve, Report, Section, Table
+from benchmarks.results import Report, Section, Table
 
 __all__ = ["Earlier", "as_json", "as_markdown", "read_earlier", "write"]
-
-# An axis is logarithmic above this ratio of the largest to the smallest value.
-_WIDE: Final = 16
 
 
 class Earlier(NamedTuple):
@@ -27,13 +22,7 @@ class Earlier(NamedTuple):
 
 
 def read_earlier(path: Path) -> Earlier:
-    """Read the JSON file of a report.
-
-    Raises
-    ------
-    ValueError
-        It is no such file.
-    """
+    """Read the JSON file of a report; ValueError: it is no such file."""
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
         goals = [goal for section in report["sections"] for goal in section["goals"]]
@@ -47,28 +36,15 @@ def read_earlier(path: Path) -> Earlier:
 
 
 def write(report: Report, path: Path, beside: Sequence[Earlier] = ()) -> list[Path]:
-    """Write a report as Markdown, and beside it as JSON and, with matplotlib, its curves.
+    """Write a report as Markdown, and beside it as JSON, and return both files.
 
-    Parameters
-    ----------
-    report : Report
-    path : Path
-        The Markdown file. Its folder is created if it is missing. The other files have the same
-        name with another suffix.
-    beside : sequence of Earlier
-        Their ratios stand beside those of this report.
-
-    Returns
-    -------
-    list of Path
-        The files written.
+    `beside`: Reports whose ratios stand beside those of this one.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    charts = _draw_curves(report, path)
     as_text = path.with_suffix(".json")
-    path.write_text(as_markdown(report, charts, beside), encoding="utf-8")
+    path.write_text(as_markdown(report, beside), encoding="utf-8")
     as_text.write_text(json.dumps(as_json(report), indent=1) + "\n", encoding="utf-8")
-    return [path, as_text, *charts]
+    return [path, as_text]
 
 
 def as_json(report: Report) -> dict[str, Any]:
@@ -108,10 +84,8 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def as_markdown(
-    report: Report, charts: list[Path] | None = None, beside: Sequence[Earlier] = ()
-) -> str:
-    """Return a report as a page of Markdown, with the pictures of its curves."""
+def as_markdown(report: Report, beside: Sequence[Earlier] = ()) -> str:
+    """Return a report as a page of Markdown."""
     machine = report.machine
     lines = [f"# Benchmarks on {machine['adapter']}", ""]
     lines += [f"Written by `{machine['command']}`, {machine['date']}.", ""]
@@ -140,9 +114,6 @@ def as_markdown(
         lines += ["## Goals", "", *_table(Table("", header, rows))]
     for section in report.sections:
         lines += _section(section)
-    for chart in charts or []:
-        title = chart.stem.rpartition("-")[2]
-        lines += [f"![Cost against {title}]({chart.name})", ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -191,34 +162,3 @@ def _table(table: Table) -> list[str]:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-def _draw_curves(report: Report, path: Path) -> list[Path]:
-    """Write a chart for each kind of curve; none without curves or without matplotlib."""
-    by_chart: dict[str, list[Curve]] = {}
-    for section in report.sections:
-        for curve in section.curves:
-            by_chart.setdefault(curve.chart, []).append(curve)
-    if not by_chart or find_spec("matplotlib") is None:
-        return []
-    # Not pyplot, which looks for a display.
-    figures = importlib.import_module("matplotlib.figure")
-    written = []
-    for chart, curves in by_chart.items():
-        figure = figures.Figure(figsize=(6, 4), layout="constrained")
-        axes = figure.add_subplot()
-        for curve in curves:
-            axes.plot(curve.x, curve.milliseconds, marker="o", label=curve.label)
-        if max(curves[0].x) > _WIDE * min(curves[0].x):
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-        else:
-            axes.set_ylim(bottom=0)
-        axes.set_xlabel(chart)
-        axes.set_ylabel("median, ms")
-        axes.grid(visible=True, which="both", alpha=0.25)
-        axes.legend()
-        target = path.with_name(f"{path.stem}-{chart.replace(' ', '_')}.png")
-        figure.savefig(target, dpi=120)
-        written.append(target)
-    return written

@@ -79,6 +79,21 @@ def read(file: Path) -> dict[str, Part]:
     return parts
 
 
+def write_image(path: Path, pixels: NDArray[Any], kind: str = "", **attributes: Any) -> Path:
+    """Write pixels (h, w, C) as they are; without the first attribute PNG divides by alpha."""
+    spec = oiio.ImageSpec(
+        pixels.shape[1], pixels.shape[0], pixels.shape[2], kind or pixels.dtype.name
+    )
+    for name, value in {"oiio:UnassociatedAlpha": 1, **attributes}.items():
+        spec.attribute(name, value)
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None, oiio.geterror()
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
+    writer.close()
+    return path
+
+
 def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:
     assert data is not None
     (folder / "decoded.png").write_bytes(data)

@@ -7,21 +7,20 @@ set -eu
 cd "$(dirname "$0")/.."
 # A method, format or variant reaches no other code with a larger image, or where its values are
 # compared with the reference: tests of these, of Python alone and of other processes are left out.
-# Each preset is in test_variants.py.
+# Each preset is in test_matrix.py.
 if [ $# = 0 ]; then
     for name in adapters array_memory batches bundled_driver core_arguments errors eviction graph \
         interruption lifetime pipeline_cache plans readback settings threads; do
         set -- "$@" "tests/core/test_$name.py"
     done
-    for name in apply_input dither level_weights rg11b10 variants; do
+    for name in apply_input dither level_weights matrix rg11b10 variants; do
         set -- "$@" "tests/methods/test_$name.py"
     done
     set -- "$@" tests/methods/test_custom_passes.py tests/custom/test_rendering.py
     for name in deferred deferred_passes render textures; do
         set -- "$@" "tests/scene/test_$name.py"
     done
-    for name in apply_input.py::test_largest_side apply_input.py::test_long_odd_side \
-        rg11b10.py::test_every_method variants.py::test_every_variant variants.py::test_final_alone \
+    for name in apply_input.py::test_longest_sides rg11b10.py::test_every_method \
         variants.py::test_large variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
     done

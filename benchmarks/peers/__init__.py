@@ -15,7 +15,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COPY", "PEERS", "GpuWork", "ImageBloom", "gather", "versions"]
+from benchmarks.results import Table
+from benchmarks.timing import Times
+
+__all__ = ["COPY", "PEERS", "GpuWork", "ImageBloom", "bandwidths", "gather", "versions"]
 
 #: Import name of each peer, by its name in tables.
 PEERS: Final = MappingProxyType(
@@ -97,6 +100,23 @@ def gather(
             # A peer with a broken installation or without a device must not stop the others.
             missing.append(f"{name} does not run here: {' '.join(str(error).split())[:200]}")
     return found
+
+
+def bandwidths(group: str, times: dict[str, Times], size: int, names: Iterable[str]) -> list[Table]:
+    """Return a table of an image of `size` bytes that is read and written once, beside COPY."""
+    if COPY not in times:
+        return []
+    rows = tuple(
+        (
+            name,
+            f"{2 * size / times[name].median / 1e9:.0f}",
+            f"{times[COPY].median / times[name].median:.3f}",
+        )
+        for name in names
+        if name in times
+    )
+    header = ("", "GB/s", "share of the copy")
+    return [Table(f"{group}: image read once and written once", header, rows)]
 
 
 def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -8,9 +8,6 @@ void vkb_graph_destroy(struct vkb_graph *graph)
     vkb_free(graph->passes);
     vkb_free(graph->owned[0]);
     vkb_free(graph->owned[1]);
-    for (uint32_t i = 0; i < graph->layered_count; ++i)
-        vkb_free((void *)graph->layered[i].shader.code);
-    vkb_free(graph->layered);
     *graph = (struct vkb_graph){0};
 }
 
@@ -372,5 +369,30 @@ bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vk
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (!check_pass(graph, i, error))
             return false;
+    return true;
+}
+
+static bool can_layer(const struct vkb_graph *graph)
+{
+    bool can = true;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        can = can && !graph->images[i].serial && graph->images[i].input <= VKB_INPUT_IMAGE;
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        can = can && pass->geometry == VKB_GEOMETRY_DISPATCH && pass->reading != VKB_READING_WORDS
+           && pass->resource_count == 0 && pass->shader->layers;
+    }
+    return can;
+}
+
+bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error)
+{
+    if (!can_layer(graph))
+        return vkb_fail(error, VKB_ERROR_VALUE, "batch: its images have to be taken one by one");
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        graph->passes[i].shader = graph->passes[i].shader->layers;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        graph->images[i].layers = graph->layers;
     return true;
 }

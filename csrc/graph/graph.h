@@ -48,7 +48,7 @@ struct vkb_image_row {
     char name[VKB_NAME_SIZE];
     enum vkb_format format;
     uint32_t width, height;
-    uint32_t layers;    // of a batch (layers.h); 0: it is no array
+    uint32_t layers;    // of a batch; 0: it is no array
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
@@ -137,12 +137,6 @@ struct vkb_pass_row {
     union vkb_params params;
 };
 
-// A shader for images with layers, and the one from which it was made.
-struct vkb_layered {
-    const struct vkb_shader *from;
-    struct vkb_shader shader;
-};
-
 struct vkb_graph {
     struct vkb_image_row *images;
     struct vkb_pass_row *passes;
@@ -151,9 +145,7 @@ struct vkb_graph {
     void *owned[2];  // pixels of images, freed with the graph
     // Of levels whose width follows from the aspect of the frame: the adapter's limit; 0: none.
     uint32_t max_width;
-    // Of a batch; 0 and NULL: of one image.
-    uint32_t layers, layered_count;
-    struct vkb_layered *layered;
+    uint32_t layers;  // of a batch; 0: of one image
 };
 
 void vkb_graph_destroy(struct vkb_graph *graph);
@@ -174,6 +166,11 @@ bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vk
 // Checks that both sides are 1 to max_side; `name` is used in the message.
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
                     struct vkb_error *error);
+
+// Makes the graph that of a batch: all images get as many layers as it has, and one dispatch writes
+// all layers of its target. A VALUE error where this cannot be done: of draws, of words, of shaders
+// without layers, and of images that the host fills for all frames.
+bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error);
 
 // Bytes of all images that passes use, without layers.
 uint64_t vkb_graph_size(const struct vkb_graph *graph);

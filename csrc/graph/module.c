@@ -17,9 +17,7 @@ static const struct layout layouts[] = {
     {SPV_TYPE_VOID, SPV_TYPE_BOOL, 2, 0, 0},
     {SPV_TYPE_INT, SPV_TYPE_INT, 4, 0, 0},
     {SPV_TYPE_FLOAT, SPV_TYPE_FLOAT, 3, 0, 0},
-    {SPV_TYPE_VECTOR, SPV_TYPE_VECTOR, 4, W(2), 0},
-    {SPV_TYPE_MATRIX, SPV_TYPE_MATRIX, 4, W(2), 0},
-    {SPV_TYPE_IMAGE, SPV_TYPE_IMAGE, 9, W(2), 0},
+    {SPV_TYPE_VECTOR, SPV_TYPE_MATRIX, 4, W(2), 0},
     {SPV_TYPE_ARRAY, SPV_TYPE_ARRAY, 4, W(2) | W(3), 0},
     {SPV_TYPE_POINTER, SPV_TYPE_POINTER, 4, W(3), 0},
     {SPV_TYPE_VOID, SPV_TYPE_FORWARD_POINTER, 2, 0, 0},
@@ -28,15 +26,7 @@ static const struct layout layouts[] = {
     {SPV_SPEC_CONSTANT_OP, SPV_SPEC_CONSTANT_OP, 4, 0, 0},
     {SPV_FUNCTION, SPV_FUNCTION, 5, 0, 0},
     {SPV_FUNCTION_CALL, SPV_FUNCTION_CALL, 4, W(3), 0},
-    {SPV_VARIABLE, SPV_VARIABLE, 4, 0, 0},
-    {SPV_LOAD, SPV_LOAD, 4, W(3), 0},
-    {SPV_STORE, SPV_STORE, 3, W(1) | W(2), 0},
-    {SPV_ACCESS_CHAIN, SPV_IN_BOUNDS_ACCESS_CHAIN, 4, W(3), 0},
     {SPV_DECORATE, SPV_DECORATE, 3, W(1), 0},
-    {SPV_SAMPLE_IMPLICIT, SPV_IMAGE_READ, 5, W(3) | W(4), 0},
-    {SPV_IMAGE_WRITE, SPV_IMAGE_WRITE, 4, W(1) | W(2) | W(3), 0},
-    {SPV_IMAGE, SPV_IMAGE_QUERY_SAMPLES, 4, W(3), 0},
-    {SPV_SELECT, SPV_SELECT, 6, W(3) | W(4) | W(5), 0},
     {SPV_PHI, SPV_PHI, 5, W(3), W(4)},
     {SPV_LOOP_MERGE, SPV_LOOP_MERGE, 4, 0, W(1) | W(2)},
     {SPV_SELECTION_MERGE, SPV_SELECTION_MERGE, 3, 0, W(1)},
@@ -62,7 +52,7 @@ static bool has_words(const uint32_t *at)
 
     if (layout && count < layout->words)
         return false;
-    if (code == SPV_DECORATE && (at[2] == SPV_SPEC_ID || at[2] == SPV_BUILT_IN))
+    if (code == SPV_DECORATE && at[2] == SPV_SPEC_ID)
         return count >= 4;
     // An operation without operands that has no row is still one with a type and a result.
     return count >= 3 || (layout && layout->words < 3) || !vkb_has_result(code);
@@ -156,15 +146,6 @@ bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
     }
     return (has_header && read_definitions(module))
         || vkb_fail(error, VKB_ERROR_SHADER, "%s is not SPIR-V", shader->name);
-}
-
-const uint32_t *vkb_type_of(const struct vkb_module *module, uint32_t id, uint32_t opcode)
-{
-    const uint32_t *at = id < module->bound ? module->at[id] : NULL;
-    const uint32_t *type =
-        at && vkb_has_result(vkb_opcode(at)) && vkb_result(at) == at[2] ? module->at[at[1]] : NULL;
-
-    return type && vkb_opcode(type) == opcode ? type : NULL;
 }
 
 bool vkb_is_word(const struct vkb_module *module, uint32_t type)

@@ -19,9 +19,6 @@ struct vkb_module {
 bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
                      struct vkb_error *error);
 
-// The type of what defines an id, if that is known and has this opcode, or NULL.
-const uint32_t *vkb_type_of(const struct vkb_module *module, uint32_t id, uint32_t opcode);
-
 // Whether a type is that of a bool or a 32-bit integer.
 bool vkb_is_word(const struct vkb_module *module, uint32_t type);
 

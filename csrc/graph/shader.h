@@ -17,8 +17,8 @@ struct vkb_shader {
     size_t size;           // in bytes
     struct vkb_hash hash;
     // The same pass as a compute shader; with a target of three channels; with a first image of
-    // three. NULL: there is none.
-    const struct vkb_shader *dispatch, *packed, *rgb;
+    // three; for images with layers. NULL: there is none.
+    const struct vkb_shader *dispatch, *packed, *rgb, *layers;
 };
 
 // That of NULL is zero.

@@ -53,9 +53,11 @@ static void read_blocks(struct module *module)
 static bool evaluate(const struct module *module, uint32_t code, const uint32_t *operands,
                      size_t count, uint32_t *value)
 {
+    const bool either = code == SPV_LOGICAL_AND || code == SPV_LOGICAL_OR;
+    const size_t needed = code == SPV_SELECT ? 3 : either ? 2 : 1;
     const struct id *of[3] = {0};
 
-    if (count == 0 || count > 3)
+    if (count < needed || count > 3)
         return false;
     for (size_t i = 0; i < count; ++i) {
         if (operands[i] >= module->read.bound)
@@ -63,7 +65,7 @@ static bool evaluate(const struct module *module, uint32_t code, const uint32_t 
         of[i] = &module->ids[operands[i]];
     }
     // One operand decides.
-    for (size_t i = 0; i < 2 && (code == SPV_LOGICAL_AND || code == SPV_LOGICAL_OR); ++i)
+    for (size_t i = 0; i < 2 && either; ++i)
         if (of[i]->known && of[i]->value == (code == SPV_LOGICAL_OR)) {
             *value = code == SPV_LOGICAL_OR;
             return true;

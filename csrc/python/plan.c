@@ -4,7 +4,6 @@
 #include "python/values.h"
 
 #include "graph/dry_run.h"
-#include "graph/layers.h"
 #include "methods/adjoint.h"
 
 #include <string.h>

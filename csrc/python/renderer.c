@@ -234,6 +234,12 @@ static PyObject *get_closed(PyObject *object, void *unused)
     return PyBool_FromLong(!((struct vkb_renderer *)object)->open);
 }
 
+static PyObject *get_lost(PyObject *object, void *unused)
+{
+    (void)unused;
+    return PyBool_FromLong(((const struct vkb_renderer *)object)->device.lost);
+}
+
 static PyObject *get_info(PyObject *object, void *unused)
 {
     (void)unused;
@@ -331,6 +337,7 @@ static PyMethodDef methods[] = {
 
 static PyGetSetDef attributes[] = {
     {"closed", get_closed, NULL, "Whether close() was called.", NULL},
+    {"lost", get_lost, NULL, "Whether the device was lost.", NULL},
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
     {"instance", get_instance, NULL, "The VkInstance, if it is open.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},

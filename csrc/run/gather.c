@@ -21,9 +21,9 @@ static const struct kind {
                              {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
     [VKB_GATHER_FROM_IMAGE] = {&vkb_shader_gather_from_image_comp,
                                {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
-    [VKB_GATHER_TO_LAYERS] = {&vkb_shader_gather_to_layers_comp,
+    [VKB_GATHER_TO_LAYERS] = {&vkb_shader_gather_to_image_comp_layers,
                               {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
-    [VKB_GATHER_FROM_LAYERS] = {&vkb_shader_gather_from_layers_comp,
+    [VKB_GATHER_FROM_LAYERS] = {&vkb_shader_gather_from_image_comp_layers,
                                 {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
 };
 

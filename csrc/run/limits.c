@@ -111,9 +111,12 @@ static bool check_workgroup(const struct vkb_device *device, const struct vkb_pa
         if (vkb_opcode(at) == SPV_EXECUTION_MODE && vkb_word_count(at) == 6
             && at[2] == SPV_LOCAL_SIZE)
             memcpy(threads, at + 3, sizeof threads);
-        else if (vkb_opcode(at) == SPV_VARIABLE && at[3] == SPV_WORKGROUP) {
-            const uint32_t *pointer = vkb_type_of(&module, at[2], SPV_TYPE_POINTER);
-            shared += pointer ? type_bytes(&module, pointer[3], 0) : 0;
+        else if (vkb_opcode(at) == SPV_VARIABLE && vkb_word_count(at) >= 4
+                 && at[3] == SPV_WORKGROUP) {
+            const uint32_t *pointer = at[1] < module.bound ? module.at[at[1]] : NULL;
+            shared += pointer && vkb_opcode(pointer) == SPV_TYPE_POINTER
+                        ? type_bytes(&module, pointer[3], 0)
+                        : 0;
         }
     vkb_free(module.at);
     return done

@@ -23,14 +23,12 @@ import lazy_loader
 
 # These supply the registries of methods, stages of glare and presets.
 from vkbloom import _glare, _methods, _presets  # noqa: F401
+from vkbloom._version import installed_version
 
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        # The metadata of the installed package takes time to read.
-        from vkbloom._version import installed_version  # noqa: PLC0415
-
         return installed_version()
     return _attribute(name)

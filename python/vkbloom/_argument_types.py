@@ -1,4 +1,4 @@
-"""Check the arguments of public functions against the annotations of their signatures."""
+"""Check the types of the arguments of public functions, by the names of their parameters."""
 
 from __future__ import annotations
 
@@ -6,26 +6,41 @@ import functools
 import inspect
 import operator
 import os
-import re
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from vkbloom._checks import as_float
 
-__all__ = ["HINTS", "checked"]
+__all__ = [
+    "ANY",
+    "FLAG",
+    "FUNCTION",
+    "INTEGER",
+    "MANY_SETTINGS",
+    "MAPPING",
+    "NAMES",
+    "NUMBER",
+    "PATH",
+    "SETTINGS",
+    "checked",
+    "checked_as",
+]
 
-_Parameters = ParamSpec("_Parameters")
-_Result = TypeVar("_Result")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _Test = Callable[[Any], bool]
 
-# Unions are split at bars outside of brackets.
-_BAR = re.compile(r"\s*\|\s*(?![^\[]*\])")
+
+class Kind(NamedTuple):
+    """What messages call a kind of argument, and its test."""
+
+    what: str
+    test: _Test
 
 
-def _raises_nothing(convert: Callable[[Any], Any]) -> _Test:
+def _converts(convert: Callable[[Any], Any]) -> _Test:
     """Return a test that holds for what `convert` takes."""
 
     def test(value: Any) -> bool:
@@ -39,125 +54,125 @@ def _raises_nothing(convert: Callable[[Any], Any]) -> _Test:
     return test
 
 
-def _is_number(value: Any) -> bool:
-    try:
-        as_float("", value)
-    except TypeError:
-        return False
-    return True
+def _items(test: _Test, length: int | None = None) -> _Test:
+    """Return a test of a sequence and of its items; iterators are not consumed."""
 
-
-def _is_text_path(value: Any) -> bool:
-    return isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
-
-
-def _is_sequence(value: Any) -> bool:
-    return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set)
-
-
-def _is_str(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-#: A part of an annotation, what messages call it, and its test.
-_KINDS: dict[str, tuple[str, _Test]] = {
-    "None": ("None", lambda value: value is None),
-    "bool": ("a bool", lambda value: isinstance(value, bool | np.bool_)),
-    "int": (
-        "an integer",
-        lambda value: not isinstance(value, bool) and _raises_nothing(operator.index)(value),
-    ),
-    "float": ("a number", _is_number),
-    "str": ("a str", _is_str),
-    "os.PathLike": ("a path", _is_text_path),
-    "Path": ("a path", _is_text_path),
-    "Sequence": ("a sequence", _is_sequence),
-    "tuple": ("a sequence", _is_sequence),
-    "Mapping": ("a mapping", lambda value: isinstance(value, Mapping)),
-    "Bounds": ("a mapping", lambda value: isinstance(value, Mapping) and all(map(_is_str, value))),
-    "Callable": ("callable", callable),
-    "Bloom": ("callable", callable),
-    "MovingBloom": ("callable", callable),
-    "Twin": ("callable", callable),
-    "Loss": ("a loss", lambda value: _is_str(value) or callable(value)),
-    "DTypeLike": ("a dtype", _raises_nothing(np.dtype)),
-    "type": ("a class", lambda value: isinstance(value, type)),
-    **dict.fromkeys(
-        ("Literal", "Destination", "Colour", "SavedColour", "FileEncoding", "PyramidLoss"),
-        ("a str", _is_str),
-    ),
-}
-#: What to give instead of a value, by what messages call its type. The type's module adds it.
-HINTS: dict[str, Callable[[object], str]] = {}
-#: Classes, found by name so that this module imports none of them.
-_CLASSES = ("Renderer", "Settings", "Probe", "Camera", "PSF", "Dataset", "Tolerances")
-# The type of the items of a sequence, or of the keys of a mapping.
-_ITEM = re.compile(r"(?:Sequence|tuple|Mapping)\[(\w+)")
-
-
-def _is_a(name: str) -> _Test:
-    return lambda value: any(base.__name__ == name for base in type(value).__mro__)
-
-
-def _test_of_items(part: str, test: _Test) -> _Test:
-    """Return a test of a container and of its items; iterators are not consumed."""
-    found = _ITEM.match(part)
-    if found is None or found[1] not in _KINDS:
-        return test
-    item = _KINDS[found[1]][1]
-    length = part.count(",") + 1 if part.startswith("tuple[") and "..." not in part else None
-
-    def test_items(value: Any) -> bool:
-        if not test(value):
+    def test_items(values: Any) -> bool:
+        if not isinstance(values, Iterable) or isinstance(values, str | bytes | Mapping | Set):
             return False
-        if not isinstance(value, Sequence | Mapping | np.ndarray):
+        if not isinstance(values, Sequence | np.ndarray):
             return True
-        return all(map(item, value)) and (length is None or len(value) == length)
+        return all(map(test, values)) and length in (None, len(values))
 
     return test_items
 
 
-def _kinds(annotation: str) -> list[tuple[str, _Test]]:
-    """Return what messages call an annotation's parts, with their tests; [] accepts anything."""
-    kinds = []
-    for part in _BAR.split(annotation.strip("\"'")):
-        name = part.partition("[")[0]
-        if (known := _KINDS.get(name)) is not None:
-            shown = f"{known[0]}, {part}" if _ITEM.match(part) else known[0]
-            kinds.append((shown, _test_of_items(part, known[1])))
-        elif (last := name.rpartition(".")[2]) in _CLASSES:
-            kinds.append((f"a {last}", _is_a(last)))
-        else:
-            return []
-    return kinds
+def _is_integer(value: Any) -> bool:
+    return not isinstance(value, bool) and _converts(operator.index)(value)
 
 
-def _message(name: str, value: object, shown: list[str]) -> str:
-    what = " or ".join(dict.fromkeys(one for one in shown if one != "None"))
-    for kind in HINTS.keys() & {*shown}:
-        return f"{name}: {reprlib.repr(value)} is not {kind}{HINTS[kind](value)}"
-    return f"{name}: {reprlib.repr(value)} is not {what}"
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
 
 
-def checked(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-    """Make a function raise TypeError for an argument of another type than its annotation names.
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str)
 
-    The message names the parameter, the value and what is accepted. Annotations of arrays and
-    of other types are left to the function.
+
+def _instance_of(name: str) -> Kind:
+    """Return the kind of the objects of a class, which this module does not import."""
+    return Kind(
+        f"a {name}", lambda value: any(base.__name__ == name for base in type(value).__mro__)
+    )
+
+
+ANY = Kind("anything", lambda _: True)
+FLAG = Kind("a bool", lambda value: isinstance(value, bool | np.bool_))
+INTEGER = Kind("an integer", _is_integer)
+NUMBER = Kind("a number", _converts(functools.partial(as_float, "")))
+TEXT = Kind("a str", _is_text)
+PATH = Kind("a str or a path", _is_path)
+FUNCTION = Kind("callable", callable)
+LOSS = Kind("a str or callable", lambda value: _is_text(value) or callable(value))
+SETTINGS = _instance_of("Settings")
+MANY_SETTINGS = Kind(
+    "a Settings or a sequence of them",
+    lambda value: SETTINGS.test(value) or _is_text(value) or _items(ANY.test)(value),
+)
+DTYPE = Kind("a dtype", _converts(np.dtype))
+TEXTS = Kind("a sequence of str", _items(_is_text))
+NAMES = Kind("a str or a sequence of str", lambda value: _is_text(value) or _items(_is_text)(value))
+NUMBERS = Kind("a sequence of numbers", _items(NUMBER.test))
+PAIR = Kind("a pair of integers", _items(_is_integer, 2))
+MAPPING = Kind(
+    "a mapping by str", lambda value: isinstance(value, Mapping) and all(map(_is_text, value))
+)
+
+#: The kind of a parameter by its name. What is not here is left to the function.
+_KINDS: dict[str, Kind] = {
+    **dict.fromkeys(("direct", "gradient", "is_light", "premultiplied", "progress", "raw"), FLAG),
+    **dict.fromkeys(("half", "resume", "temporal", "validation", "verify"), FLAG),
+    **dict.fromkeys(("bits", "border", "levels", "max_calls", "most", "period"), INTEGER),
+    **dict.fromkeys(("quality", "settle", "subimage", "texel", "width"), INTEGER),
+    **dict.fromkeys(("expand", "flicker", "gain", "glow_intensity", "growth", "radius"), NUMBER),
+    **dict.fromkeys(("intensity", "jitter", "light", "limit", "peak", "ripple", "rtol"), NUMBER),
+    **dict.fromkeys(("pixels_per_degree", "steps", "time", "timeout", "value", "within"), NUMBER),
+    **dict.fromkeys(("adapter", "axis", "columns", "framebuffer", "layer", "lines", "name"), TEXT),
+    **dict.fromkeys(("device", "encoding", "format", "parameter", "primaries", "rows"), TEXT),
+    **dict.fromkeys(("input_colour", "output_colour", "shading", "suffix", "view"), TEXT),
+    **dict.fromkeys(("base", "path"), PATH),
+    **dict.fromkeys(("framebuffers", "laws", "vary"), NAMES),
+    **dict.fromkeys(("argv", "variables"), TEXTS),
+    **dict.fromkeys(("brightness", "scales"), NUMBERS),
+    "values": Kind("a sequence", _items(ANY.test)),
+    **dict.fromkeys(("at", "size"), PAIR),
+    **dict.fromkeys(("bounds", "chunks", "metadata", "out", "reduce"), MAPPING),
+    **dict.fromkeys(("bloom", "on_mended", "reference"), FUNCTION),
+    "dtype": DTYPE,
+    "loss": LOSS,
+    "renderer": _instance_of("Renderer"),
+    "camera": _instance_of("Camera"),
+    "psf": _instance_of("PSF"),
+    "probe": _instance_of("Probe"),
+    "dataset": _instance_of("Dataset"),
+}
+
+
+def checked_as(**kinds: Kind) -> Callable[[_Function], _Function]:
+    """Return `checked` for a function some of whose parameters are of other kinds."""
+
+    def decorate(function: _Function) -> _Function:
+        parameters = inspect.signature(function).parameters
+        known = {**_KINDS, **kinds}
+        found = {
+            name: (known[name], one.default is None)
+            for name, one in parameters.items()
+            if name in known
+        }
+        names = tuple(parameters)
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            # pytest shows the call in the test, and not this function.
+            __tracebackhide__ = True
+            # Too many and unknown arguments are left to Python's own error.
+            for name, value in (*zip(names, args, strict=False), *kwargs.items()):
+                if name not in found or (value is None and found[name][1]):
+                    continue
+                what, test = found[name][0]
+                if not test(value):
+                    raise TypeError(f"{name}: {reprlib.repr(value)} is not {what}")
+            return function(*args, **kwargs)
+
+        return cast("_Function", call)
+
+    return decorate
+
+
+def checked(function: _Function) -> _Function:
+    """Make a function raise TypeError for an argument that is not of its parameter's kind.
+
+    None is accepted where it is the default. The message names the parameter, the value and what is
+    accepted.
     """
-    parameters = inspect.signature(function).parameters
-    kinds = {name: _kinds(str(one.annotation)) for name, one in parameters.items()}
-    names = tuple(parameters)
-
-    @functools.wraps(function)
-    def call(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
-        # pytest shows the call in the test, and not this function.
-        __tracebackhide__ = True
-        # Too many and unknown arguments are left to Python's own error.
-        for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-            accepted = kinds.get(name)
-            if accepted and not any(test(value) for _, test in accepted):
-                raise TypeError(_message(name, value, [shown for shown, _ in accepted]))
-        return function(*args, **kwargs)
-
-    return call
+    return checked_as()(function)

@@ -64,22 +64,11 @@ def capture(
         The file is written when the context ends. If it ends with an exception, no file is
         written.
 
-    Raises
-    ------
-    Error
-        RenderDoc is not loaded, or it captured nothing. The message says how to load it.
-    ValueError
-        The renderer is closed.
-
     Notes
     -----
     The names of `Renderer.plan` are the labels of passes and the names of images and buffers.
     Messages of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
     results are copied through staging memory.
-
-    See Also
-    --------
-    Renderer.plan : Names the passes.
 
     Examples
     --------

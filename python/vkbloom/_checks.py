@@ -44,7 +44,7 @@ _UNORDERED = (Mapping, Set)
 # Fast path for native byte order.
 _DTYPES = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
 
-_DTYPE_CURES = {
+_DTYPE_HINTS = {
     "uint16": "; convert it: (image / 65535).astype(np.float32)",
     "bool": "; convert it: image.astype(np.float32)",
     np.dtype(np.longdouble).name: "; convert it: image.astype(np.float32)",
@@ -52,7 +52,7 @@ _DTYPE_CURES = {
 # The device type kDLCPU of DLPack.
 _DLPACK_CPU = 1
 #: Modes of PIL whose arrays are not red, green and blue, and the mode to convert them to.
-_MODE_CURES = {
+_MODE_HINTS = {
     **dict.fromkeys(("1", "L", "P", "CMYK", "YCbCr", "HSV", "RGBX"), "RGB"),
     **dict.fromkeys(("LA", "La", "PA", "RGBa"), "RGBA"),
 }
@@ -167,10 +167,10 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     becomes float32.
     """
     mode = _pil_mode(image)
-    if mode in _MODE_CURES:
+    if mode in _MODE_HINTS:
         raise ValueError(
             f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
-            f'{name}.convert("{_MODE_CURES[mode]}")'
+            f'{name}.convert("{_MODE_HINTS[mode]}")'
         )
     array = image if isinstance(image, np.ndarray) else _viewed(image, name)
     if type(array) is not np.ndarray and np.ma.is_masked(array):
@@ -181,15 +181,15 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
         if array.dtype.name not in ("uint8", "float16", "float32"):
-            cure = _DTYPE_CURES.get(array.dtype.name, "")
+            hint = _DTYPE_HINTS.get(array.dtype.name, "")
             raise TypeError(
-                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{cure}"
+                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{hint}"
             )
         array = native_order(array)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         raise ValueError(
             f"{name}: shape {array.shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
-            + _shape_cure(array.shape)
+            + _shape_hint(array.shape)
         )
     return array
 
@@ -222,13 +222,13 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     if type(array) is not np.ndarray and np.ma.is_masked(array):
         raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
     if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
-        cure = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
+        hint = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         raise TypeError(
-            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{cure}"
+            f"mask: dtype {array.dtype} is not one of uint8, bool, float16, float32, float64{hint}"
         )
     if array.shape != size:
-        cure = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
-        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{cure}")
+        hint = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
+        raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{hint}")
     values = array.astype(np.float32, copy=False)
     if array.dtype.name == "uint8":
         return values / np.float32(255)
@@ -255,12 +255,12 @@ def _viewed(
         order = [_dimension(dims, one) for one in dimensions]
         if len(dims) != len(order) or None in order:
             others = [dim for dim, one in zip(dims, order, strict=False) if dim not in order]
-            cure = (
+            hint = (
                 f"select one value of the others first, such as {name}.isel({others[0]}=0)"
                 if len(dims) > len(order) and others
                 else f"rename them: {name}.rename(...)"
             )
-            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {cure}")
+            raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {hint}")
         return np.asarray(image.transpose(*order))
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
     try:
@@ -310,7 +310,7 @@ def _dimension(dims: tuple[Any, ...], name: str) -> Any:
     return ending[0] if len(ending) == 1 else None
 
 
-def _shape_cure(shape: tuple[int, ...]) -> str:
+def _shape_hint(shape: tuple[int, ...]) -> str:
     """Return a hint how to convert an array of this shape to an image; "" if there is none."""
     if len(shape) == 2:
         return "; convert grey to RGB: np.repeat(image[..., None], 3, axis=2)"
@@ -327,11 +327,4 @@ def check_framebuffers(framebuffers: str | Sequence[str]) -> tuple[str, ...] | N
     """Return the names of the requested framebuffers; None for all."""
     if isinstance(framebuffers, str):
         return None if framebuffers == "all" else (framebuffers,)
-    try:
-        names = tuple(framebuffers)
-    except TypeError:
-        raise TypeError(f"framebuffers: {framebuffers!r} is not a sequence of names") from None
-    for name in names:
-        if not isinstance(name, str):
-            raise TypeError(f"framebuffers: {name!r} is not a name")
-    return names
+    return tuple(framebuffers)

@@ -8,6 +8,9 @@ import sys
 from pathlib import Path
 from typing import Final
 
+if sys.platform != "win32":
+    import resource
+
 __all__ = ["ADVICE", "address_space_left", "memory_left"]
 
 #: What helps where memory is short.
@@ -21,8 +24,6 @@ def address_space_left() -> int | None:
     """Return the bytes below this process's limit of address space; None without a limit."""
     if sys.platform == "win32":
         return None
-    import resource  # noqa: PLC0415  not on Windows
-
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return None

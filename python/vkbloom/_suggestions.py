@@ -10,9 +10,9 @@ __all__ = ["Named", "did_you_mean", "lacking", "nearest", "unknown"]
 T = TypeVar("T")
 
 
-# More changes than these, or than one for three letters, make another word.
-_MAX_CHANGES = 3
-_LETTERS = 3
+# The least similarity of a name that may be meant, and the least length of a word of a name.
+_MIN_RATIO = 0.7
+_MIN_LETTERS = 3
 
 
 def nearest(name: object, known: Iterable[str]) -> str | None:
@@ -21,28 +21,14 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     A name is like another one if few letters differ, or if one is a complete word of the other.
     Upper case, "-" and "_" make no difference.
     """
+    import difflib  # noqa: PLC0415  costs start-up time
+
     plain = {one.lower().replace("-", "_").strip("_"): one for one in known}
     asked = str(name).lower().replace("-", "_").strip("_")
-    most = min(_MAX_CHANGES, (len(asked) + 1) // _LETTERS)
-    near = {one: _changes(asked, one) for one in plain if abs(len(one) - len(asked)) <= most}
-    found = [one for one in sorted(near, key=near.__getitem__) if near[one] <= most]
-    if not found and len(asked) >= _LETTERS:
-        found = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
-    return plain[found[0]] if found else None
-
-
-def _changes(first: str, second: str) -> int:
-    """Return how many letters are to be changed, added, left out, or exchanged with the next."""
-    before: list[int] = []
-    row = list(range(len(second) + 1))
-    for y, letter in enumerate(first):
-        earlier, before, row = before, row, [y + 1]
-        for x, other in enumerate(second):
-            least = min(before[x] + (letter != other), before[x + 1] + 1, row[x] + 1)
-            if x and y and (letter, other) == (second[x - 1], first[y - 1]):
-                least = min(least, earlier[x - 1] + 1)
-            row.append(least)
-    return row[-1]
+    near = difflib.get_close_matches(asked, plain, 1, _MIN_RATIO)
+    if not near and len(asked) >= _MIN_LETTERS:
+        near = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
+    return plain[near[0]] if near else None
 
 
 def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
@@ -132,16 +118,20 @@ class Named(Mapping[str, T]):
     def __dir__(self) -> Iterable[str]:
         return [*super().__dir__(), *self]
 
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Return the name of each entry, what it is, and whose."""
+        return [(name, one.what, one.whose) for name, one in self._entries.items()]
+
     def __repr__(self) -> str:
         width = max(map(len, self), default=0)
-        return "\n".join(f"{name:<{width}}  {one.what}" for name, one in self._entries.items())
+        return "\n".join(f"{name:<{width}}  {what}" for name, what, *_ in self._rows())
 
     def _repr_html_(self) -> str:
-        from html import escape  # noqa: PLC0415  rarely needed
+        from html import escape  # noqa: PLC0415  costs start-up time
 
-        rows = (
-            "".join(f"<td>{escape(text)}</td>" for text in (name, one.what, one.whose))
-            for name, one in self._entries.items()
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>"
+            for row in self._rows()
         )
         head = f"<tr><th>{escape(self._kind)}</th><th>what</th><th>whose</th></tr>"
-        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
+        return f"<table>{head}{rows}</table>"

@@ -4,20 +4,12 @@
 // moves 16 bytes to a buffer, or a pixel to an image: those of a group are a tile, since drivers
 // keep the pixels of a tile together.
 
+#include "lib/layers.glsl"
+
 layout(local_size_x = 128) in;
 
-#ifdef LAYERS
-#define SAMPLED sampler2DArray
-#define STORED image2DArray
-#define AT(place) ivec3(place, gl_WorkGroupID.z)
-#else
-#define SAMPLED sampler2D
-#define STORED image2D
-#define AT(place) (place)
-#endif
-
 #ifdef FROM_IMAGE
-layout(binding = 0) uniform SAMPLED from_image;
+layout(binding = 0) uniform sampler2D from_image;
 #else
 layout(std430, binding = 0) readonly buffer From
 {
@@ -26,7 +18,7 @@ layout(std430, binding = 0) readonly buffer From
 #endif
 
 #ifdef TO_IMAGE
-layout(binding = 1) uniform writeonly STORED to_image;
+layout(binding = 1) uniform writeonly image2D to_image;
 #else
 layout(std430, binding = 1) writeonly buffer To
 {
@@ -123,7 +115,7 @@ void move()
     for (int channel = 0; channel < 4; ++channel)
         count(raw[channel]);
     if (layout_.stores != 0)
-        imageStore(to_image, AT(at),
+        imageStore(to_image, at,
                    vec4(number(raw.x), number(raw.y), number(raw.z), number(raw.w)));
 }
 #else
@@ -139,7 +131,7 @@ uint pixel_place;
 void enter_pixel()
 {
 #ifdef FROM_IMAGE
-    texel = texelFetch(from_image, AT(at), 0);
+    texel = texelFetch(from_image, at, 0);
 #else
     pixel_place = place_of(at);
 #endif

@@ -1,5 +1,6 @@
 // Expands the rows of params.h into a uniform block, specialization constants and named constants.
 #include "params.h"
+#include "lib/layers.glsl"
 
 #define MEMBER_READS(block, name) float name;
 #define MEMBER_INPUT(block, type, name) type name;

@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.exhaustive import some
+from tests.io.parts import written
 from tests.processes import python
 from vkbloom._cli.program import program
-from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.image_reading import load
 from vkbloom._io.image_writing import save
 from vkbloom._io.images import Picture
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._methods.mip_chain import Pyramid
-from vkbloom._methods.separable import Separable
-from vkbloom._renderer import renderer
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -54,11 +52,7 @@ def png(path: Path, pixels: NDArray[Any]) -> Path:
     spec.attribute("oiio:UnassociatedAlpha", 1)
     if channels == 2:
         spec.channelnames = ("Y", "A")
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(pixels)
-    assert writer.close()
-    return path
+    return written(path, spec, pixels)
 
 
 def run(*arguments: str | Path, adapter: str = "auto") -> Result:
@@ -130,17 +124,6 @@ class TestFormats:
         assert np.abs(written - expected).max() <= ROUNDING
         assert np.abs(expected - image).max() > 20
 
-    def test_16_bits(self, tmp_path: Path) -> None:
-        image = light(20, 30, 4, dtype="uint16")
-        done(png(tmp_path / "a.png", image), tmp_path / "b.png")
-        written = pixels(tmp_path / "b.png")
-        assert written.dtype == np.uint16
-        expected = levels(applied(linear(image)), 65535)
-        # Floats with 24 bits are accurate to 1/256 of a level; the errors of decoding, bloom and
-        # encoding add up.
-        assert np.abs(written - expected).max() <= 0.6
-        assert np.array_equal(written[:, :, 3], image[:, :, 3])
-
     @pytest.mark.parametrize(
         ("dtype", "channels"), [(dtype, n) for dtype in ("uint8", "uint16") for n in (1, 2, 3, 4)]
     )
@@ -151,35 +134,6 @@ class TestFormats:
         path = png(tmp_path / "a.png", image.astype(dtype))
         done(path, tmp_path / "b.png", "--no-bloom")
         assert np.array_equal(pixels(tmp_path / "b.png"), image)
-
-    def test_float_to_png(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3, dtype="float16")
-        done(stored(tmp_path / "a.exr", image), tmp_path / "b.png")
-        final = applied(image)
-        # Colours above 1 keep their hue.
-        final /= np.maximum(final.max(axis=2, keepdims=True), 1)
-        assert np.abs(pixels(tmp_path / "b.png") - levels(final)).max() <= ROUNDING
-
-    def test_png_to_float(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3, dtype="uint8")
-        done(png(tmp_path / "a.png", image), tmp_path / "b.exr")
-        assert pixels(tmp_path / "b.exr").dtype == np.float32
-        assert np.allclose(pixels(tmp_path / "b.exr"), applied(linear(image)), rtol=1e-5, atol=1e-7)
-
-    def test_radiance(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
-        # Rounded to what the format holds.
-        image = pixels(stored(tmp_path / "a.hdr", image))
-        done(tmp_path / "a.hdr", tmp_path / "b.hdr")
-        written, expected = pixels(tmp_path / "b.hdr"), applied(image)
-        assert (np.abs(written - expected).max(axis=2) <= expected.max(axis=2) / 128).all()
-
-    def test_jpeg(self, tmp_path: Path) -> None:
-        image = np.full((20, 30, 3), 60, np.uint8)
-        image[5:15, 10:20] = 200
-        done(png(tmp_path / "a.png", image), tmp_path / "a.jpg", "--no-bloom")
-        done(tmp_path / "a.jpg", tmp_path / "b.jpg", "--no-bloom")
-        assert np.abs(pixels(tmp_path / "b.jpg").astype(int) - image).mean() < 3
 
     @pytest.mark.parametrize("with_alpha", [False, True])
     def test_grey_stays_grey(self, tmp_path: Path, with_alpha: bool) -> None:
@@ -193,15 +147,6 @@ class TestFormats:
         if with_alpha:
             assert np.array_equal(written[:, :, 1], image[:, :, 1])
 
-    @pytest.mark.parametrize("raw", [False, True])
-    def test_alpha_stays(self, tmp_path: Path, raw: bool) -> None:
-        image = light(20, 30, 4, dtype="uint8")
-        image[:, :, 3] = np.arange(30)
-        done(png(tmp_path / "a.png", image), tmp_path / "b.png", *(["--raw"] * raw))
-        written = pixels(tmp_path / "b.png")
-        assert np.array_equal(written[:, :, 3], image[:, :, 3])
-        assert (written[:, :, :3] != image[:, :, :3]).any()
-
     def test_raw(self, tmp_path: Path) -> None:
         image = light(20, 30, 4, dtype="uint8")
         done(png(tmp_path / "a.png", image), tmp_path / "b.png", "--raw", "--threshold", "0.3")
@@ -209,64 +154,8 @@ class TestFormats:
             pixels(tmp_path / "b.png"), applied(image, NATURAL.replace(threshold=0.3))
         )
 
-    def test_windows(self, tmp_path: Path) -> None:
-        image = light(10, 12, 3, dtype="float16")
-        path = tmp_path / "a.exr"
-        spec = oiio.ImageSpec(12, 10, 3, "half")
-        spec.x, spec.y = 4, 3
-        spec.full_width, spec.full_height = 24, 20
-        writer = oiio.ImageOutput.create(str(path))
-        assert writer.open(str(path), spec)
-        assert writer.write_image(image)
-        assert writer.close()
-        done(path, tmp_path / "b.exr")
-        whole = np.zeros((20, 24, 3), np.float16)
-        whole[3:13, 4:16] = image
-        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(whole))
-        # The light reaches beyond the original data window.
-        assert pixels(tmp_path / "b.exr")[3:13, 3].any()
-
-    def test_parts(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
-        with vkbloom.Renderer() as renderer:
-            frames = renderer.apply(image, Separable(threshold=0.5))
-        frames.save(tmp_path / "a.exr")
-        names = list(frames)
-        last = names.index("final")
-        chosen = ("--subimage", str(last))
-        done(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom", *chosen)
-        assert np.array_equal(pixels(tmp_path / "b.exr"), frames["final"])
-        result = run(tmp_path / "a.exr", tmp_path / "b.exr", "--no-bloom")
-        assert "a.exr: read the first of its parts 0 glow, 1 blur_vertical, " in result.stderr
-        assert np.array_equal(pixels(tmp_path / "b.exr"), frames[names[0]])
-
-    def test_in_place(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
-        path = stored(tmp_path / "a.exr", image)
-        done(path, path, "--overwrite")
-        assert np.array_equal(pixels(path), applied(image))
-
 
 class TestColours:
-    def test_linear_integers(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3, dtype="uint8")
-        path = png(tmp_path / "a.png", image)
-        colours = ("--input-colour", "linear", "--output-colour", "linear")
-        done(path, tmp_path / "b.png", *colours)
-        expected = np.clip(applied((image / 255).astype(np.float32)), 0, 1) * 255
-        assert np.abs(pixels(tmp_path / "b.png") - expected).max() <= ROUNDING
-        # The file says so, and is taken as what it says.
-        done(tmp_path / "b.png", tmp_path / "c.png", "--no-bloom", "--output-colour", "linear")
-        assert np.array_equal(pixels(tmp_path / "c.png"), pixels(tmp_path / "b.png"))
-
-    def test_encoded_floats(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
-        path = stored(tmp_path / "a.exr", image)
-        colours = ("--input-colour", "srgb", "--output-colour", "srgb")
-        done(path, tmp_path / "b.exr", *colours)
-        expected = encode_srgb(applied(decode_srgb(image)))
-        assert np.allclose(pixels(tmp_path / "b.exr"), expected, rtol=1e-5, atol=1e-6)
-
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22"])
     def test_an_encoding_is_the_only_one(self, tmp_path: Path, encoding: Any) -> None:
         image = light(20, 30, 3)
@@ -310,21 +199,6 @@ class TestColours:
         assert "b.png has integers: NaN is written as 0, infinity as 1" in result.stderr
         assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
 
-    def test_nan_of_grey_counts_once(self, tmp_path: Path) -> None:
-        path = tmp_path / "a.exr"
-        image = light(20, 30, 3)
-        image[0, 0] = np.nan
-        save(Picture(**{**vars(Picture.of_values(image, "float")), "grey": True}), path)
-        assert "1 NaN" in run(path, tmp_path / "b.exr").stderr
-
-    def test_lost_information_is_noted(self, tmp_path: Path) -> None:
-        image = light(20, 30, 4)
-        path = stored(tmp_path / "a.exr", image)
-        line, clipped = run(path, tmp_path / "b.jpg").stderr.splitlines()
-        assert line.startswith("vkbloom: note: ")
-        assert line.endswith("b.jpg cannot hold alpha, which is not 1 everywhere")
-        assert "values above 1 are clipped" in clipped
-
 
 class TestFramebuffers:
     def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
@@ -342,93 +216,21 @@ class TestFramebuffers:
         written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
         assert len(written) == len(frames)
 
-    def test_floats_beside_a_png_are_exr(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize(
+        ("words", "more"),
+        [
+            ("--framebuffers bloom,final", "b_bloom.exr"),
+            ("--framebuffers glow,final --raw --method separable", "b_glow.png"),
+            ("", "b.png"),
+        ],
+    )
+    def test_files_beside_a_png(self, tmp_path: Path, words: str, more: str) -> None:
         path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
-
-    def test_raw_ones_are_png(self, tmp_path: Path) -> None:
-        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--framebuffers", "glow", "--raw", "--method", "separable")
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_glow.png"}
-
-    def test_only_final_without_the_option(self, tmp_path: Path) -> None:
-        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png")
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png"}
+        done(path, tmp_path / "b.png", *words.split())
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", more}
 
 
 class TestErrors:
-    @pytest.mark.parametrize(
-        ("arguments", "status", "message"),
-        [
-            ("no.png b.png", 1, "no.png: No such file or directory"),
-            (". b.png", 2, "images; name a folder or a pattern"),
-            ("f.%04d.exr b.png", 1, "f.%04d.exr: no file was found"),
-            ("bad.png b.png", 1, "bad.png: is not a readable image"),
-            ("bad.exr b.png", 1, "bad.exr: is not a readable image"),
-            ("cut.exr b.png", 1, "cut.exr: damaged"),
-            ("a.exr b.png --dirt cut.png", 1, "cut.png: damaged"),
-            ("a.exr b.png --method convolution --psf cut.exr", 1, "cut.exr: damaged"),
-            ("xyz.exr b.png", 1, "xyz.exr: the channels X, Y, Z are not R, G, B or a single one"),
-            ("a.exr none/b.png", 1, "none/b.png: there is no folder none"),
-            ("a.exr b.zfile", 1, "b.zfile: zfile cannot hold this picture"),
-            ("a.exr b.png --subimage 1", 1, "a.exr: subimage 1 is not in 0..0"),
-            ("a.exr b.unknown", 2, "b.unknown: '.unknown' is not the extension of a writable"),
-            ("a.exr b", 2, "'' is not the extension of a writable"),
-            ("a.exr", 2, "Missing argument 'OUT'"),
-            ("a.exr b.png c.png", 2, "c.png: one file cannot hold 2 images"),
-            (
-                "a.exr b.png --method separable --blur-scale 17",
-                2,
-                "blur_scale: 17.0 is out of range, 0 to 16",
-            ),
-            (
-                "a.exr b.png --levels 3",
-                2,
-                "the method bevy has no --levels; give --method pyramid or",
-            ),
-            ("a.exr b.png --framebuffers glare", 2, "framebuffers: unknown framebuffer 'glare'"),
-            ("a.exr b.png --input-colour red", 2, "--input-colour: colour: 'red' is not linear"),
-            ("a.exr b.png --subimage -1", 2, "--subimage"),
-            ("a.exr b.png --raw", 2, "a.exr has float, not 8-bit integers"),
-            ("a.exr b.png --raw --input-colour srgb", 2, "--raw does not convert colours"),
-            ("a.exr b.png --encoding srgb --output-colour srgb", 2, "already encodes the output"),
-            ("a.exr b.png --framebuffers bloom --no-bloom", 2, "framebuffers"),
-        ],
-    )
-    def test_are_one_line_and_leave_nothing(
-        self,
-        tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        arguments: str,
-        status: int,
-        message: str,
-    ) -> None:
-        monkeypatch.chdir(tmp_path)
-        content = stored(Path("a.exr"), light(20, 30, 3)).read_bytes()
-        Path("cut.exr").write_bytes(content[: len(content) // 2])
-        content = png(Path("cut.png"), light(20, 30, 3, dtype="uint8")).read_bytes()
-        Path("cut.png").write_bytes(content[: len(content) // 2])
-        for name in ("bad.png", "bad.exr"):
-            Path(name).write_bytes(b"nothing of the kind")
-        spec = oiio.ImageSpec(2, 2, 3, "float")
-        spec.channelnames = ("X", "Y", "Z")
-        writer = oiio.ImageOutput.create("xyz.exr")
-        assert writer.open("xyz.exr", spec)
-        assert writer.write_image(light(20, 30, 3)[:2, :2])
-        assert writer.close()
-        Path("b.png").write_bytes(b"before")
-        result = run(*arguments.split())
-        assert result.exit_code == status
-        assert result.stderr.startswith("vkbloom: ")
-        assert result.stderr.count("\n") == 1
-        assert message in result.stderr
-        assert Path("b.png").read_bytes() == b"before"
-        assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-            ["a.exr", "b.png", "bad.exr", "bad.png", "cut.exr", "cut.png", "xyz.exr"]
-        )
-
     def test_an_array_of_numpy_says_how_to_convert_it(self, tmp_path: Path) -> None:
         file = tmp_path / "a.npy"
         np.save(file, light(20, 30, 3))
@@ -449,71 +251,6 @@ class TestErrors:
         assert ended.stderr.startswith(f"vkbloom: {path}: ")
         assert ended.stderr.count("\n") == 1
         assert not (tmp_path / "b.png").exists()
-
-    def test_no_adapter(self, tmp_path: Path) -> None:
-        path = stored(tmp_path / "a.exr", light(20, 30, 3))
-        result = run(path, tmp_path / "b.exr", adapter="no such")
-        assert result.exit_code == 1
-        assert 'no Vulkan adapter for "no such"' in result.stderr
-        assert not (tmp_path / "b.exr").exists()
-
-    def test_a_failure_on_the_device_leaves_the_output(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        def fail(*_: Any, **__: Any) -> None:
-            raise vkbloom.DeviceLostError("the device is lost")
-
-        path = stored(tmp_path / "a.exr", light(20, 30, 3))
-        before = path.read_bytes()
-        monkeypatch.setattr(renderer.Renderer, "map", fail)
-        result = run(path, path, "--overwrite")
-        assert (result.exit_code, result.stderr) == (1, "vkbloom: the device is lost\n")
-        assert path.read_bytes() == before
-
-    def test_passes_validation(self, tmp_path: Path) -> None:
-        path = stored(tmp_path / "a.exr", light(20, 30, 4) + np.float32(0))
-        result = run(path, tmp_path / "b.exr", "--validation", "--framebuffers", "all")
-        assert (result.exit_code, result.stderr) == (0, "")
-
-    def test_validation_is_handed_on(self, tmp_path: Path) -> None:
-        # In a process without an instance: one that is there keeps its layers.
-        path = stored(tmp_path / "a.exr", light(20, 30, 3))
-        words = ("apply", str(path), str(tmp_path / "b.exr"), "--validation")
-        ended = python("-m", "vkbloom._cli", *words, VK_LAYER_PATH=str(tmp_path))
-        assert ended.returncode == 1
-        assert "validation" in ended.stderr
-
-
-def test_the_help_tells_of_colours() -> None:
-    text = " ".join(CliRunner().invoke(program, ["apply", "--help"]).stdout.split())
-    for sentence in (
-        "Files of 8 or 16 bit integers are decoded to 32-bit floats with Rec. 709 colours",
-        "Files of floats are linear",
-        "Integers are encoded to sRGB and clipped to 0..1",
-        "Floats (as in OpenEXR and Radiance HDR) are written linear",
-        "Alpha does not change",
-        "OUT is replaced when the new file is complete",
-    ):
-        assert sentence in text
-
-
-@pytest.mark.parametrize("name", some(["BrightRings", "Desk"], 1))
-def test_real_hdr_images(shared_data: Path, tmp_path: Path, name: str) -> None:
-    path = shared_data / "hdr" / f"{name}.exr"
-    image = pixels(path)
-    for suffix in ("exr", "png"):
-        done(path, tmp_path / f"b.{suffix}", "--threshold", "1", "--intensity", "0.2")
-    expected = applied(image, NATURAL.replace(threshold=1.0, intensity=0.2))
-    assert np.array_equal(pixels(tmp_path / "b.exr"), expected)
-    shown = levels(scaled_to_1(expected.astype(np.float32)))
-    assert np.abs(pixels(tmp_path / "b.png") - shown).max() <= ROUNDING
-    assert not np.array_equal(expected, image)
-
-
-def test_real_frames_come_back(shared_data: Path, tmp_path: Path) -> None:
-    path = shared_data / "seed_frames" / "final.png"
-    done(path, tmp_path / "b.png", "--no-bloom")
-    assert np.array_equal(pixels(tmp_path / "b.png"), pixels(path))
 
 
 def picture(path: Path) -> Path:

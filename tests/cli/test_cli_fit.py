@@ -86,21 +86,6 @@ def test_json(files: tuple[str, str]) -> None:
     assert found["loss"] <= found["start_loss"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--vary", "scatter"], "vary: the method bevy has no field 'scatter'"),
-        (["--bounds", "threshold"], "--bounds: 'threshold' is not NAME=LOW:HIGH"),
-        (["--bounds", "threshold=1:x"], "--bounds: 'threshold=1:x' is not NAME=LOW:HIGH"),
-        (["--loss", "ssim"], "'ssim' is not one of 'relative'"),
-    ],
-)
-def test_wrong_use(files: tuple[str, str], words: list[str], message: str) -> None:
-    done = CliRunner().invoke(program, ["fit", *files, *words])
-    assert done.exit_code == 2
-    assert message in done.stderr
-
-
 def test_translate(renderer: vkbloom.Renderer) -> None:
     words = ("--preset", "Kino", "--intensity", "0.5", "--size", "64x48", "--max-calls", "12")
     result = CliRunner().invoke(program, ["translate", *words, "--to", "Pyramid", "--json"])
@@ -114,18 +99,3 @@ def test_translate(renderer: vkbloom.Renderer) -> None:
     assert vkbloom.Settings.from_dict(found["settings"]) == expected.settings
     assert found["loss"] == expected.loss < expected.start_loss
     assert (found["loss_name"], found["verdict"]) == ("log", expected.verdict)
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("--to", "kino"), "give what to translate: --preset NAME, --method NAME"),
-        (("--preset", "kino"), "Missing option '--to'"),
-        (("--preset", "kino", "--to", "pyramids"), "'pyramids'; did you mean 'pyramid'?"),
-        (("--preset", "kino", "--to", "pyramid", "--vary", "levls"), "did you mean 'levels'?"),
-    ],
-)
-def test_translate_of_nothing_or_to_nothing(words: tuple[str, ...], told: str) -> None:
-    result = CliRunner().invoke(program, ["translate", *words])
-    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
-    assert told in result.stderr

@@ -14,8 +14,9 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.io import foreign
+from tests.io.parts import written
 from tests.io.profiles import store_png
-from vkbloom._cli import large_files
+from vkbloom._cli import bands
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 from vkbloom._io.rows import opened_rows
@@ -50,7 +51,7 @@ def test_colours_under_alpha_0_are_told(
     tmp_path: Path, under: int, is_large: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if is_large:
-        monkeypatch.setattr(large_files, "LARGE", 1)
+        monkeypatch.setattr(bands, "LARGE", 1)
     pixels = np.full((48, 64, 4), under, np.uint8)
     pixels[..., 3] = 0
     pixels[20:28, 28:36] = (200, 40, 40, 255)
@@ -75,10 +76,7 @@ def test_ultra_hdr_starts_from_photo(tmp_path: Path, renderer: vkbloom.Renderer)
     spec = oiio.ImageSpec(64, 64, 3, "half")
     spec.attribute("jpeg:ultrahdr", 1)
     spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
-    writer = oiio.ImageOutput.create("a.jpg")
-    assert writer.open(str(tmp_path / "a.jpg"), spec)
-    assert writer.write_image(np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
-    assert writer.close()
+    written(tmp_path / "a.jpg", spec, np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
     assert apply(tmp_path / "a.jpg", tmp_path / "b.exr").exit_code == 0
     image = vkbloom.read(tmp_path / "a.jpg")
     expected = renderer.apply(image, vkbloom.presets["photo"])["final"]
@@ -92,7 +90,7 @@ def test_large_files(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatc
     words = (path, tmp_path / "b.png", "--preset", "kino")
     assert apply(*words).exit_code == 0
     at_once = load(tmp_path / "b.png").pixels
-    monkeypatch.setattr(large_files, "LARGE", 1)
+    monkeypatch.setattr(bands, "LARGE", 1)
     result = apply(*words)
     assert result.exit_code == 0, result.output
     assert np.array_equal(load(tmp_path / "b.png").pixels, at_once)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,9 @@ from click.testing import CliRunner, Result
 
 import vkbloom
 from tests.exhaustive import by_turns
-from vkbloom._cli import large_files
-from vkbloom._cli.bands import BloomByBands, ImageByBands
-from vkbloom._cli.large_files import apply_file
+from tests.io.parts import written
+from vkbloom._cli import bands, image_files
+from vkbloom._cli.bands import BloomByBands
 from vkbloom._cli.program import program
 from vkbloom._io import rows
 
@@ -34,11 +35,7 @@ def stored(path: Path, pixels: Any, tile: int = 0) -> Path:
         spec.channelnames = ("Y", "A")[:channels]
     if tile:
         spec.tile_width = spec.tile_height = tile
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(pixels)
-    assert writer.close()
-    return path
+    return written(path, spec, pixels)
 
 
 def light(height: int, width: int, channels: int, dtype: str) -> Any:
@@ -52,16 +49,16 @@ def light(height: int, width: int, channels: int, dtype: str) -> Any:
 @pytest.fixture
 def by_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Read every picture in bands of a few rows; return the number of rows of each band."""
-    monkeypatch.setattr(large_files, "LARGE", 1)
+    monkeypatch.setattr(bands, "LARGE", 1)
     monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 41 * 7)
     counts: list[int] = []
-    result = large_files._Reading.result
+    finished = image_files.finished
 
-    def counted(self: Any, final: Any, settings: Any) -> Any:
+    def counted(picture: Any, final: Any, settings: Any) -> Any:
         counts.append(len(final))
-        return result(self, final, settings)
+        return finished(picture, final, settings)
 
-    monkeypatch.setattr(large_files._Reading, "result", counted)
+    monkeypatch.setattr(bands, "finished", counted)
     return counts
 
 
@@ -93,7 +90,7 @@ def test_the_same_as_a_whole(
     assert run(*words, "-o", target).exit_code == 0
     assert sum(by_rows) == 50
     assert set(by_rows[:-1]) == ({16} if tile else {7})
-    monkeypatch.setattr(large_files, "LARGE", 1 << 40)
+    monkeypatch.setattr(bands, "LARGE", 1 << 40)
     assert run(*words, "-o", f"whole_{target}").exit_code == 0
     assert np.array_equal(vkbloom.read(target), vkbloom.read(f"whole_{target}"))
 
@@ -126,7 +123,7 @@ def same_as_a_whole(
     """Run twice, compare, and return the result."""
     assert run(*words, "-o", target).exit_code == 0
     assert len(by_rows) > 1
-    monkeypatch.setattr(large_files, "LARGE", 1 << 40)
+    monkeypatch.setattr(bands, "LARGE", 1 << 40)
     by_rows.clear()
     whole = target.with_name(f"whole_{target.name}")
     assert run(*words, "-o", whole).exit_code == 0
@@ -134,19 +131,6 @@ def same_as_a_whole(
     result = vkbloom.read(target)
     assert np.array_equal(result, vkbloom.read(whole))
     return result
-
-
-@pytest.mark.parametrize("height", [512, 513])
-@pytest.mark.parametrize("preset", ["bevy_natural", "kino", "jimenez2014", "tutorial"])
-def test_by_bands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, by_rows: list[int], preset: str, height: int
-) -> None:
-    """Of a height that those of all levels divide, and of one that has no divisor with them."""
-    path = stored(tmp_path / "a.png", light(height, 41, 3, "uint8"))
-    held = []
-    monkeypatch.setattr(ImageByBands, "add", lambda *_: held.append(1))
-    same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path, "--preset", preset)
-    assert not held
 
 
 @pytest.mark.parametrize("size", [(1, 161), (161, 1), (20000, 3)])
@@ -172,10 +156,7 @@ def test_turned_pictures(
     path = tmp_path / "a.tif"
     spec = oiio.ImageSpec(41, 50, 3, "uint8")
     spec.attribute("Orientation", orientation)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec)
-    assert writer.write_image(light(50, 41, 3, "uint8"))
-    assert writer.close()
+    written(path, spec, light(50, 41, 3, "uint8"))
     result = same_as_a_whole(monkeypatch, by_rows, tmp_path / "b.png", path)
     assert result.shape == ((41, 50, 3) if orientation == 6 else (50, 41, 3))
 
@@ -220,10 +201,10 @@ def test_layers_and_parts(
     assert writer.close()
     target = tmp_path / "b.exr"
     second = same_as_a_whole(monkeypatch, by_rows, target, path, "--subimage", 1)
-    monkeypatch.setattr(large_files, "LARGE", 1)
+    monkeypatch.setattr(bands, "LARGE", 1)
     layer = same_as_a_whole(monkeypatch, by_rows, target, path, "--layer", "glow")
     assert np.array_equal(second, layer)
-    monkeypatch.setattr(large_files, "LARGE", 1)
+    monkeypatch.setattr(bands, "LARGE", 1)
     first = run(path, "-o", target)
     assert "read the first of its parts 0 first, 1 second" in first.stderr
     assert not np.array_equal(vkbloom.read(target), layer)
@@ -253,15 +234,7 @@ def test_mask_or_emission_of_another_shape_is_refused(
     assert not by_rows
 
 
-def test_missing_bloom_is_noted(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
-    result = run(path, tmp_path / "b.png", "--method", "pyramid", "--threshold", "1")
-    assert result.exit_code == 0
-    assert "no value is above the threshold 1" in result.stderr
-    assert by_rows
-
-
-@pytest.mark.parametrize("where", ["add", "final"])
+@pytest.mark.parametrize("where", ["reduce", "finals"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, vkbloom.DeviceLostError("lost")])
 def test_failure_leaves_no_file(
     tmp_path: Path,
@@ -270,39 +243,12 @@ def test_failure_leaves_no_file(
     where: str,
     error: type[BaseException] | BaseException,
 ) -> None:
-    def fail(*_: Any) -> None:
+    def fail(*_: Any) -> Iterator[Any]:
         raise error
+        yield
 
-    path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
-    monkeypatch.setattr(ImageByBands, where, fail)
-    monkeypatch.setattr(BloomByBands, "reduce" if where == "add" else "finals", fail)
+    path = stored(tmp_path / "a.png", light(512, 41, 3, "uint8"))
+    monkeypatch.setattr(BloomByBands, where, fail)
     result = run(path, tmp_path / "b.png")
     assert result.exit_code == (130 if error is KeyboardInterrupt else 1)
     assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_a_damaged_file(tmp_path: Path, by_rows: list[int]) -> None:
-    path = stored(tmp_path / "a.png", light(50, 41, 3, "uint8"))
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    result = run(path, tmp_path / "b.png")
-    assert result.exit_code == 1
-    assert "a.png: damaged" in result.stderr
-    assert not (tmp_path / "b.png").exists()
-
-
-def test_apply_file_is_the_render_of_the_array(tmp_path: Path, by_rows: list[int]) -> None:
-    image = stored(tmp_path / "a.exr", light(50, 41, 3, "float16"))
-    done: list[tuple[int, int]] = []
-    with vkbloom.Renderer("software") as renderer:
-        apply_file(
-            image,
-            tmp_path / "b.exr",
-            vkbloom.presets["kino"],
-            renderer=renderer,
-            progress=lambda rows, total: done.append((rows, total)),
-        )
-        expected = renderer.apply(vkbloom.read(image), vkbloom.presets["kino"])["final"]
-    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
-    assert len(by_rows) > 1
-    assert done[-1] == (100, 100)

@@ -11,14 +11,12 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
-from tests.io.profiles import DISPLAY_P3, profile, profile_chunk, store_png
-from tests.io.test_array_files import halves, store_exr
+from tests.io.profiles import store_png
 from tests.processes import python
 from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
 
 IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
@@ -48,7 +46,7 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def by_rows_or_not(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Read and write pictures in bands of rows, as large ones are, or not."""
     if request.param:
-        monkeypatch.setattr("vkbloom._cli.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom._cli.bands.LARGE", 1)
 
 
 class TestSequences:
@@ -74,26 +72,6 @@ class TestSequences:
         assert result.exit_code == 0
         assert result.stderr == "vkbloom: note: .: left out what is no image: notes.txt\n"
         assert names(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
-
-    def test_each_is_as_if_alone(self, frames: Path) -> None:
-        assert run("f.%04d.png", "g.%04d.png").exit_code == 0
-        assert run("f.0010.png", "-o", "alone.png").exit_code == 0
-        assert (frames / "g.0010.png").read_bytes() == (frames / "alone.png").read_bytes()
-
-    @pytest.mark.parametrize(
-        ("words", "status", "message"),
-        [
-            (["f.*.png", "g.png"], 2, "g.png: one file cannot hold 4 images"),
-            (["x.%d.png", "g.%d.png"], 1, "x.%d.png: no file was found"),
-            (["f.0008.png", "./f.0008.png", "out"], 2, "two images have the same name"),
-        ],
-    )
-    def test_errors(self, frames: Path, words: list[str], status: int, message: str) -> None:
-        before = names(frames)
-        result = run(*words)
-        assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
-        assert message in result.stderr
-        assert names(frames) == before
 
     @pytest.mark.parametrize("which", [(8,), (9, 10), (11,), (8, 9, 10, 11)])
     def test_the_other_images_are_done(self, frames: Path, which: tuple[int, ...]) -> None:
@@ -293,37 +271,6 @@ def test_pipes(tmp_path: Path) -> None:
         assert np.array_equal(piped, vkbloom.read(tmp_path / f"b.{kind}"))
 
 
-def test_a_pipe_without_an_image() -> None:
-    ended = subprocess.run(
-        [sys.executable, "-m", "vkbloom._cli", "apply", "-", "-"],
-        input=b"dear",
-        capture_output=True,
-        check=False,
-    )
-    assert ended.returncode == 1
-    assert ended.stderr.startswith(b"vkbloom: standard input: is not a readable image")
-
-
-def test_layers(tmp_path: Path) -> None:
-    layers = [halves("ViewLayer.Combined", "RGB"), halves("ViewLayer.Emit", "RGB")]
-    path = store_exr(tmp_path / "a.exr", **layers[0], **layers[1])
-    result = run(path, tmp_path / "b.exr")
-    assert result.exit_code == 1
-    assert "the layers are ViewLayer.Combined, ViewLayer.Emit" in result.stderr
-    words = (path, tmp_path / "b.exr", "--layer", "ViewLayer.Emit", "--no-bloom")
-    assert run(*words).exit_code == 0
-    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), np.stack([*layers[1].values()], -1))
-
-
-def test_quality(tmp_path: Path) -> None:
-    path = store_png(tmp_path / "a.png", IMAGE)
-    for quality in (20, 95):
-        assert run(path, tmp_path / f"{quality}.jpg", "--quality", quality).exit_code == 0
-    assert (tmp_path / "95.jpg").stat().st_size > (tmp_path / "20.jpg").stat().st_size
-    result = run(path, tmp_path / "b.png", "--quality", 90)
-    assert (result.exit_code, "quality: png has no quality" in result.stderr) == (2, True)
-
-
 class TestJpeg:
     """What Pillow, another reader, finds in the files that ``apply`` writes."""
 
@@ -369,14 +316,6 @@ class TestJpeg:
             assert (found[maker], found.get(orientation, 1)) == ("Maker", 1)
             assert found.get_ifd(inner)[taken] == "2020:01:02 03:04:05"
             assert found.get_ifd(inner)[iso] == 400
-
-
-def test_profiles_are_noted(tmp_path: Path) -> None:
-    chunk = profile_chunk(profile("Display P3", DISPLAY_P3))
-    result = run(store_png(tmp_path / "a.png", IMAGE, chunk), tmp_path / "b.png")
-    assert result.exit_code == 0
-    assert "note: " in result.stderr
-    assert "converted to linear Rec. 709 by its ICC profile 'Display P3'" in result.stderr
 
 
 def test_input_colour_is_a_space(tmp_path: Path) -> None:
@@ -436,10 +375,3 @@ def test_glare_without_light_is_noted(tmp_path: Path, glare: str, said: str | No
     else:
         assert f"note: {said}" in result.stderr
         assert result.stderr.count("\n") == 1
-
-
-def test_options_that_the_method_lacks(tmp_path: Path) -> None:
-    path = store_png(tmp_path / "a.png", IMAGE)
-    result = run(path, tmp_path / "b.png", "--blur-strength", 2)
-    assert result.exit_code == 2
-    assert "the method bevy has no --blur-strength; give --method separable" in result.stderr

@@ -18,8 +18,6 @@ from click.testing import CliRunner
 import vkbloom
 from vkbloom._cli.program import program
 
-pytest.importorskip("OpenImageIO")
-
 VKBLOOM = f"'{sys.executable}' -m vkbloom"
 LONGEST = 120  # seconds
 SMALL = "--size 16x16 --bloom-size 8x8"

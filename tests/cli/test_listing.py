@@ -27,8 +27,6 @@ from vkbloom.psf._base import functions
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
-
 
 def run(*words: object) -> Result:
     return CliRunner().invoke(program, [str(word) for word in words])
@@ -156,22 +154,6 @@ def test_sheets_of_floats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, comma
 def test_a_large_picture_is_reduced() -> None:
     image = np.ones((4, 4 * listing._LARGEST_SIDE, 4), np.float16)
     assert listing._reduced(image).shape == (1, listing._LARGEST_SIDE, 3)
-
-
-@pytest.mark.parametrize(
-    ("words", "status", "told"),
-    [
-        (("--sheet", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
-        (("-o", "a.png"), 2, "--sheet IMAGE and --out FILE need each other"),
-        (("--sheet", "a.png", "-o", "b.jpg"), 2, "--out: b.jpg does not end in .png"),
-        (("--sheet", "none.png", "-o", "b.png"), 1, "none.png: No such file"),
-        (("--sheet", "none.png", "-o", "none/b.png"), 1, "none/b.png: there is no folder none"),
-    ],
-)
-def test_wrong_use(words: tuple[str, ...], status: int, told: str) -> None:
-    result = run("glares", *words)
-    assert (result.exit_code, result.stderr.count("\n")) == (status, 1)
-    assert told in result.stderr
 
 
 def test_each_glare_is_seen_on_lamps(tmp_path: Path) -> None:

@@ -15,8 +15,6 @@ import vkbloom
 from tests.exhaustive import some
 from vkbloom._grid import memory
 
-pytest.importorskip("OpenImageIO")
-
 
 def limited(megabytes: int, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a command in a process that can map this much."""

@@ -19,8 +19,6 @@ from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-pytest.importorskip("OpenImageIO")
-
 
 def run(*words: object) -> Result:
     return CliRunner().invoke(program, [str(word) for word in words])

@@ -99,7 +99,6 @@ def view(*arguments: str, env: dict[str, str]) -> subprocess.CompletedProcess[st
 
 
 def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path) -> None:
-    pytest.importorskip("OpenImageIO")
     # (The fourth framebuffer is gone without bloom.)
     keys = "B,B,4,B,UP,1,M,P,SPACE,S,Q"
     out = str(tmp_path / "out")

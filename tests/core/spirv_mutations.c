@@ -1,6 +1,5 @@
 // Changes modules of SPIR-V at random and lets the core read them, in memory of exactly their size.
 // Arguments: a file of modules, each after its number of bytes; how many changes of each; a seed.
-#include "graph/layers.h"
 #include "graph/specialize.h"
 
 #include <stdio.h>
@@ -62,7 +61,6 @@ static int read_module(const uint32_t *words, size_t count)
     uint32_t *exact = malloc(size), *code = NULL;
     struct vkb_error error = {0};
     struct vkb_constants constants;
-    struct vkb_shader made;
     size_t made_size;
 
     if (!exact)
@@ -73,8 +71,6 @@ static int read_module(const uint32_t *words, size_t count)
     const int taken = vkb_specialize(&shader, &constants, &code, &made_size, &error);
     if (taken)
         vkb_free(code);
-    if (vkb_layer_shader(&shader, &made, &error))
-        vkb_free((void *)made.code);
     free(exact);
     return taken;
 }

@@ -131,14 +131,6 @@ def test_the_environment_replaces_auto(
         assert renderer.info in adapters()
 
 
-def test_the_environment_of_a_process() -> None:
-    last = adapters()[-1]
-    result = run(VKBLOOM_ADAPTER=last.name)
-    assert result["type"] == last.type
-    assert result["adapters"] == [adapter.name for adapter in adapters()]
-    assert "nowhere" in run(VKBLOOM_ADAPTER="nowhere")["error"]
-
-
 def test_no_driver_at_all(tmp_path: Path) -> None:
     nothing = str(tmp_path / "nothing.json")
     result = run(VK_ICD_FILENAMES=nothing, VK_DRIVER_FILES=nothing)

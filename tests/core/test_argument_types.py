@@ -109,22 +109,9 @@ OTHERS: dict[str, dict[str, Any]] = {
     "samples": {"values": np.ones((3, 3))},
     "sweep": {"settings": [SEPARABLE]},
 }
+PUBLIC: list[Any] = [getattr(vkbloom, name) for name in vkbloom.__all__]
 FUNCTIONS: tuple[Callable[..., Any], ...] = (
-    vkbloom.apply,
-    vkbloom.capture,
-    vkbloom.check_grid,
-    vkbloom.contact_sheet,
-    vkbloom.fit,
-    vkbloom.fit_pyramid,
-    vkbloom.gaussian_weights,
-    vkbloom.grid,
-    vkbloom.load_method,
-    vkbloom.read,
-    vkbloom.response_curves,
-    vkbloom.render,
-    vkbloom.translate,
-    vkbloom.vjp,
-    vkbloom.write,
+    *(one for one in PUBLIC if inspect.isfunction(one) and one is not vkbloom.explore),
     vkbloom.Camera,
     vkbloom.Renderer,
     vkbloom.Scene.from_gltf,
@@ -140,11 +127,11 @@ FUNCTIONS: tuple[Callable[..., Any], ...] = (
         if name.islower() or name in ("Probe", "Tolerances")
     ),
     *(
-        getattr(vkbloom, name)
-        for name in vkbloom.__all__
-        if inspect.isclass(getattr(vkbloom, name))
-        and issubclass(getattr(vkbloom, name), vkbloom.Settings | vkbloom.Glare)
-        and name not in ("Settings", "Glare", "GlareLight")
+        one
+        for one in PUBLIC
+        if inspect.isclass(one)
+        and issubclass(one, vkbloom.Settings | vkbloom.Glare)
+        and one not in (vkbloom.Settings, vkbloom.Glare)
     ),
 )
 METHODS = ("apply", "map", "plan", "render", "sweep", "upload")

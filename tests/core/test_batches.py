@@ -99,8 +99,8 @@ def test_frames_that_fill_a_submission_alone(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, frames: int
 ) -> None:
     image = picture(33, 21, 4, seed=2)
-    monkeypatch.setattr(requests, "BYTES", frames * image.nbytes)
-    monkeypatch.setattr(requests, "SECONDS", 1e6)
+    monkeypatch.setattr(requests, "MAX_BYTES", frames * image.nbytes)
+    monkeypatch.setattr(requests, "MAX_SECONDS", 1e6)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
     source = _core.image_source(image)
@@ -112,12 +112,12 @@ def test_frames_that_fill_a_submission_alone(
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 
-@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.REQUESTS)])
+@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.MAX_REQUESTS)])
 def test_a_submission_is_as_long_as_a_wait_may_be(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
 ) -> None:
     image = picture(33, 21, 4, seed=2)
-    monkeypatch.setattr(requests, "SECONDS", seconds)
+    monkeypatch.setattr(requests, "MAX_SECONDS", seconds)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
     source = _core.image_source(image)
@@ -180,7 +180,7 @@ def test_settings_are_taken_a_bounded_way_ahead(
     assert taken == 0
     next(frames)
     assert taken == 1
-    limit = (requests.AHEAD + 1) * requests.REQUESTS
+    limit = (requests.AHEAD + 1) * requests.MAX_REQUESTS
     for given in range(2, 300):
         next(frames)
         assert given <= taken <= given + limit
@@ -370,7 +370,7 @@ def test_error_of_the_device_names_no_setting(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Batches double up to the largest size, however slow the machine is.
-    monkeypatch.setattr(requests, "SECONDS", 1e6)
+    monkeypatch.setattr(requests, "MAX_SECONDS", 1e6)
     settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
     blame = kind("all")
     results, error = run_failing(settings, {settings[50]: blame})

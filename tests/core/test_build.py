@@ -104,18 +104,26 @@ def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
 ) -> None:
     shipped, kept = tmp_path / "shipped", tmp_path / "kept"
     source = tmp_path / "a.comp"
-    source.touch()
+    source.write_text("one")
     versions = ["tool 1"]
     compiled: list[str] = []
 
-    def write(module: Any, target: Path) -> None:
-        compiled.append(module.name)
-        target.touch()
+    def compile_shader(module: Any, target: Path) -> None:
+        target.write_text(source.read_text() + module.name)
+
+    def optimize(module: Any, target: Path, passes: list[str]) -> None:
+        if passes is build.SIMPLER:
+            compiled.append(module.name)
 
     monkeypatch.setattr(build, "SPIRV", kept)
     monkeypatch.setattr(build, "SHIPPED", shipped)
-    monkeypatch.setattr(build, "sources", lambda: [source])
-    monkeypatch.setattr(build, "build_module", write)
+    recipes = [tmp_path / name for name in ("setup.py", "spirv.py")]
+    for recipe in recipes:
+        recipe.touch()
+    monkeypatch.setattr(build, "sources", lambda: [*recipes, source])
+    monkeypatch.setattr(build, "compile_shader", compile_shader)
+    monkeypatch.setattr(build, "decorate", lambda target: None)
+    monkeypatch.setattr(build, "optimize", optimize)
     monkeypatch.setattr(build, "run_tool", lambda *_: versions[-1])
     built = [build.Module(name, source) for name in ("one", "two")]
 
@@ -137,6 +145,9 @@ def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
     (kept / "two.spv").unlink()
     versions.append("tool 2")
     assert compile_from(kept) == ["one", "two"]
+    # A changed source that gives the same module, as a comment does, is compiled by glslang alone.
+    (kept / "made.json").write_text("{}")
+    assert compile_from(kept) == []
     # Modules of a source distribution are taken without tools, until a source is changed.
     kept.rename(shipped)
     monkeypatch.setattr(shutil, "which", lambda name: None)

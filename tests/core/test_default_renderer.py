@@ -45,13 +45,6 @@ def test_a_presets_name_is_a_settings(renderer: vkbloom.Renderer, call: str) -> 
 
     found, expected = called("kino"), called(vkbloom.presets["kino"])
     assert found.equals(expected) if call == "grid" else found == expected
-    with pytest.raises(ValueError, match="unknown preset 'kinoo'; did you mean 'kino'"):
-        called("kinoo")
-
-
-def test_a_field_that_the_settings_lack_is_named(renderer: vkbloom.Renderer) -> None:
-    with pytest.raises(TypeError, match="'blur_scale'"):
-        vkbloom.apply(IMAGE, "kino", blur_scale=2, renderer=renderer)
 
 
 @pytest.mark.parametrize(("suffix", "preset"), [(".png", "photo"), (".exr", "bevy_natural")])
@@ -129,3 +122,66 @@ atexit.register(lambda: print(vkbloom.apply(image)["final"].shape))
 
 def test_the_exit_of_the_interpreter() -> None:
     assert output("-c", AT_EXIT).split("\n")[:2] == ["(8, 8, 3)"] * 2
+
+
+LOST = """
+import os, time
+import numpy as np
+import vkbloom
+vkbloom.apply(np.ones((8, 8, 3), np.float32))
+vkbloom.default_renderer().close()
+os.environ["VKBLOOM_TIMEOUT"] = "1e-6"
+try:
+    vkbloom.apply(np.ones((512, 512, 3), np.float32))
+except vkbloom.DeviceLostError as error:
+    print("VKBLOOM_TIMEOUT" in str(error))
+del os.environ["VKBLOOM_TIMEOUT"]
+time.sleep(1)  # The device finishes, so that its objects can be destroyed.
+print(vkbloom.apply(np.ones((8, 8, 3), np.float32))["final"].shape)
+"""
+
+
+def test_a_lost_device_is_replaced_after_its_error() -> None:
+    assert output("-c", LOST).splitlines() == ["True", "(8, 8, 3)"]
+
+
+WORKERS = """
+import numpy as np
+import pytest
+import vkbloom
+
+@pytest.mark.parametrize("number", range(6))
+def test_one(number):
+    assert vkbloom.apply(np.ones((8, 8, 3), np.float32))["final"].shape == (8, 8, 3)
+"""
+
+
+def test_workers_of_xdist(tmp_path: Path) -> None:
+    pytest.importorskip("xdist")
+    file = tmp_path / "test_it.py"
+    file.write_text(WORKERS)
+    printed = output("-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", file, cwd=tmp_path)
+    assert "6 passed" in printed
+
+
+def test_a_kernel_that_restarts() -> None:
+    manager = pytest.importorskip("jupyter_client.manager")
+    pytest.importorskip("ipykernel")
+    kernel, client = manager.start_new_kernel()
+    printed: list[str] = []
+
+    def keep(message: dict[str, Any]) -> None:
+        if message["msg_type"] == "stream":
+            printed.append(message["content"]["text"].strip())
+
+    code = "import numpy, vkbloom\nprint(vkbloom.apply(numpy.ones((8, 8, 3), 'f4'))['final'].shape)"
+    try:
+        for _ in range(2):
+            reply = client.execute_interactive(code, output_hook=keep, timeout=60)
+            assert reply["content"]["status"] == "ok"
+            kernel.restart_kernel(now=True)
+            client.wait_for_ready(timeout=60)
+    finally:
+        client.stop_channels()
+        kernel.shutdown_kernel(now=True)
+    assert printed == ["(8, 8, 3)"] * 2

@@ -27,27 +27,20 @@ def describe(settings: Separable, has_sky: bool = True) -> _core.Plan:
     return scene_plan(settings, has_sky=has_sky)
 
 
-def test_the_three_dependencies_of_the_offscreen_render_pass() -> None:
-    # The order of the forward system's source. The second and third are not by region: a blur reads
-    # neighbouring pixels, so it must wait for the complete image.
-    assert dependencies(describe(Separable()), "glow") == [
-        DEPTH_BEFORE_DEPTH,
-        READ_BEFORE_WRITE,
-        WRITE_BEFORE_READ,
-    ]
-
-
-@pytest.mark.parametrize("name", ["blur_vertical", "bloom"])
-def test_the_blurs_wait_for_readers_and_are_waited_for(name: str) -> None:
-    assert dependencies(describe(Separable()), name) == [READ_BEFORE_WRITE, WRITE_BEFORE_READ]
-
-
-def test_the_scene_is_read_by_the_last_pass() -> None:
-    assert dependencies(describe(Separable()), "scene") == [
-        DEPTH_BEFORE_DEPTH,
-        READ_BEFORE_WRITE,
-        WRITE_BEFORE_READ,
-    ]
+@pytest.mark.parametrize(
+    ("name", "before"),
+    [
+        # The order of the forward system's source. The second and third are not by region: a blur
+        # reads neighbouring pixels, so it must wait for the complete image.
+        ("glow", [DEPTH_BEFORE_DEPTH]),
+        ("scene", [DEPTH_BEFORE_DEPTH]),
+        ("blur_vertical", []),
+        ("bloom", []),
+    ],
+)
+def test_dependencies_of_a_render_pass(name: str, before: list[tuple[int, ...]]) -> None:
+    expected = [*before, READ_BEFORE_WRITE, WRITE_BEFORE_READ]
+    assert dependencies(describe(Separable()), name) == expected
 
 
 def test_the_last_pass_is_followed_by_the_readback() -> None:
@@ -126,9 +119,3 @@ def test_no_image_is_written_by_two_render_passes() -> None:
                 assert writers.setdefault(target, row.render_pass) == row.render_pass
             assert set(row.reads) <= writers.keys()
             assert not set(row.reads) & set(row.writes)
-
-
-@pytest.mark.parametrize("size", [(0, 1), (1, 0)])
-def test_an_image_without_pixels_is_refused(size: tuple[int, int]) -> None:
-    with pytest.raises(ValueError, match="out of this adapter's range"):
-        scene_plan(Separable(), size)

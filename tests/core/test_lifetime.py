@@ -15,7 +15,7 @@ import pytest
 from tests.core.descriptors import open_descriptors
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output
-from vkbloom import Renderer, Scene, Separable, adapters
+from vkbloom import Renderer, Scene, adapters
 
 SIZE = (64, 36)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -27,28 +27,6 @@ def in_use() -> tuple[int, int]:
 
 
 # One renderer
-
-
-def test_arrays_outlive_the_renderer(scene: Scene) -> None:
-    with Renderer(validation=True) as renderer:
-        frames = renderer.render(scene, None, SIZE)
-        kept = {name: array.copy() for name, array in frames.items()}
-    # Another renderer may get the memory of the first.
-    with Renderer() as other:
-        other.render(scene, Separable(blur_strength=0.2), SIZE, time=0.5)
-        for name, array in frames.items():
-            np.testing.assert_array_equal(array, kept[name])
-            assert array.flags.owndata
-            array[:] = 0
-
-
-def test_close_twice() -> None:
-    renderer = Renderer(validation=True)
-    assert not renderer.closed
-    renderer.close()
-    assert renderer.closed
-    renderer.close()
-    assert renderer.closed
 
 
 def test_context_manager(scene: Scene) -> None:

@@ -110,9 +110,9 @@ import setup
 
 build_module = setup.build_module
 
-def build_changed(module, target):
+def build_changed(module, target, recipe):
     if module.shader.name == sys.argv[1]:
-        build_module(module, target)
+        build_module(module, target, recipe)
     else:
         shutil.copyfile(Path(sys.argv[2]) / f"{module.name}.spv", target)
 

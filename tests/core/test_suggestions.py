@@ -12,7 +12,7 @@ import pytest
 
 import vkbloom
 from vkbloom import psf
-from vkbloom._settings.registry import METHODS
+from vkbloom._settings.registry import METHODS, STAGES
 from vkbloom._suggestions import nearest
 
 IMAGE = np.zeros((8, 8, 3), np.float32)
@@ -62,6 +62,11 @@ def test_nothing_is_near() -> None:
     assert nearest("unity", ["unity_urp", "kino"]) == "unity_urp"
     assert nearest("kion", ["unity_urp", "kino"]) == "kino"
     assert nearest("--tresholds", ["--threshold"]) == "--threshold"
+
+
+def test_registries_are_tables() -> None:
+    assert "pyramid      vkbloom._methods.mip_chain:Pyramid\n" in repr(METHODS)
+    assert "<td>streaks</td>" in STAGES._repr_html_()
 
 
 @pytest.mark.parametrize(

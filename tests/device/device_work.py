@@ -180,7 +180,7 @@ def layers(renderer: Any) -> None:
     batches: Any = renderer._batches
     size = batches._size and batches._size[2]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vkbloom._renderer.batches.BYTES", 5 * (size or 0))
+        patch.setattr("vkbloom._renderer.batches.MAX_BYTES", 5 * (size or 0))
         for count in (9, 10):
             part = OnDevice(images[:count, ::-1])
             frames = list(renderer.map(part, LOW, framebuffers="final"))

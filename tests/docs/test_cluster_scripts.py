@@ -12,7 +12,6 @@ from tests.exhaustive import witness
 from tests.processes import output
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-SCRIPTS = sorted(FOLDER.glob("*on_*.py"))
 
 
 @witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
@@ -26,11 +25,3 @@ def test_on_this_machine(tmp_path: Path) -> None:
     with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
         assert stored["final"].shape == (8, 4, 90, 160, 3)
         assert bool(stored["done"].all())
-
-
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
-def test_scripts_start_nothing_when_they_are_imported(script: Path) -> None:
-    """As workers import them."""
-    code = script.read_text()
-    compile(code, script, "exec")
-    assert code.endswith('if __name__ == "__main__":\n    main()\n')

@@ -132,15 +132,3 @@ def test_a_command_of_a_page(line: str, folder: Path, kept_renderers: None) -> N
         more = SMALL if words[:2] == ["vkbloom", "check"] else []
         result = CliRunner().invoke(command, [*arguments, *more])
         assert result.exit_code == 0, result.output
-
-
-def test_each_reason_is_of_a_command() -> None:
-    printed = [re.sub(r"^(\w+=\S+ )+", "", parameters.values[0]) for parameters in lines()]
-    assert [begin for begin in NOT_RUN if not any(one.startswith(begin) for one in printed)] == []
-
-
-def test_bash_reads_brackets_as_a_pattern(tmp_path: Path) -> None:
-    """Why a line is not split by shlex: this was the install line, which pip cannot find."""
-    (tmp_path / "vkbloom-1.whl").touch()
-    assert words_of("pip install vkbloom-*.whl[all]", tmp_path)[2] == "vkbloom-*.whl[all]"
-    assert words_of("pip install vkbloom-*.whl", tmp_path)[2] == "vkbloom-1.whl"

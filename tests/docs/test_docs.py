@@ -90,19 +90,6 @@ def test_notebook(path: Path, folder: Path, kernel: Any) -> None:
     assert not any(content.get("name") == "stderr" for content in contents), contents
 
 
-def test_the_front_page_gets_to_a_picture_in_ten_lines() -> None:
-    (block,) = blocks(ROOT / "docs" / "index.md", "python")
-    assert len([line for line in block.splitlines() if line]) < 10
-
-
-def test_navigation() -> None:
-    """At most twelve entries in four groups; the other pages are behind them."""
-    trees = blocks(ROOT / "docs" / "index.md", "{toctree}")
-    groups = [re.findall(r"^:caption: (.*)$", tree, re.MULTILINE)[0] for tree in trees]
-    assert groups == ["Use", "Measure", "Extend", "Reference"]
-    assert sum(len(re.findall(r"^[\w-]+$", tree, re.MULTILINE)) for tree in trees) <= 12
-
-
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):

@@ -45,7 +45,7 @@ LONG: Final = ("tools/tables/write.py",)
 ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
     "examples/cluster/": "tests/docs/test_cluster_scripts.py",
-    "examples/image_quality/": "tests/plugin/test_image_quality.py",
+    "examples/image_quality/": "tests/plugin/test_guide.py",
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
+from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
@@ -16,12 +18,19 @@ from vkbloom._fit.translating import lights
 SIZE = (96, 64)
 
 
+Call = Callable[..., Any]
+
+
+@pytest.fixture
+def translated(renderer: Renderer) -> Call:
+    """Translate at a small size with the shared renderer."""
+    return functools.partial(vkbloom.translate, size=SIZE, renderer=renderer)
+
+
 class TestTranslate:
-    def test_method_is_translated_into_itself(self, renderer: Renderer) -> None:
+    def test_method_is_translated_into_itself(self, translated: Call) -> None:
         truth = Separable(blur_scale=1.8, blur_strength=1.2, intensity=0.4, tonemap="aces")
-        found = vkbloom.translate(
-            truth, Separable(encoding="srgb"), size=SIZE, renderer=renderer, max_calls=120
-        )
+        found = translated(truth, Separable(encoding="srgb"), max_calls=120)
         assert found.vary == ("blur_scale", "blur_strength", "intensity")
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
         assert found.loss < 0.01
@@ -29,30 +38,22 @@ class TestTranslate:
         assert (found.settings.tonemap, found.settings.encoding) == ("none", "srgb")
         assert found.frames.settings.encoding == "none"
 
-    def test_another_method(self, renderer: Renderer) -> None:
-        found = vkbloom.translate(
-            DualKawase(levels=2, intensity=0.5),
-            Pyramid,
-            size=SIZE,
-            renderer=renderer,
-            max_calls=150,
-        )
+    def test_another_method(self, translated: Call) -> None:
+        found = translated(DualKawase(levels=2, intensity=0.5), Pyramid, max_calls=150)
         assert isinstance(found.settings, Pyramid)
         assert found.settings.levels <= 4
         assert found.loss < 0.5 * found.start_loss
 
-    def test_thresholds_count(self, renderer: Renderer) -> None:
-        found = vkbloom.translate(
+    def test_thresholds_count(self, translated: Call) -> None:
+        found = translated(
             UrpBloom(threshold=2.5, scatter=0.5),
             UrpBloom(),
-            size=SIZE,
-            renderer=renderer,
             vary=["threshold", "scatter"],
             max_calls=150,
         )
         assert found.settings.threshold == pytest.approx(2.5, rel=0.01)
 
-    def test_a_function_such_as_a_program(self, renderer: Renderer) -> None:
+    def test_a_function_such_as_a_program(self, renderer: Renderer, translated: Call) -> None:
         """What it makes of the picture is the target: there is nothing else to know of it."""
         seen = []
 
@@ -60,7 +61,7 @@ class TestTranslate:
             seen.append(image.shape)
             return reference.apply(image, Separable(blur_scale=1.8, intensity=0.4))["final"]
 
-        found = vkbloom.translate(bloom, Separable(), size=SIZE, renderer=renderer, max_calls=120)
+        found = translated(bloom, Separable(), max_calls=120)
         assert seen == [(64, 96, 3)]
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
         assert found.loss < 0.02
@@ -83,11 +84,11 @@ class TestTranslate:
         assert [int((image[..., 0] == value).sum()) for value in (0.5, 40)] == [36, 36]
         assert int((lights((1920, 1080))[..., 0] == 6).sum()) == 36**2
 
-    def test_refused(self, renderer: Renderer) -> None:
+    def test_refused(self, translated: Call) -> None:
         with pytest.raises(TypeError, match="to: 'kino' is not a Settings"):
-            vkbloom.translate(Pyramid(), cast("Any", "kino"), renderer=renderer)
+            translated(Pyramid(), cast("Any", "kino"))
         with pytest.raises(ValueError, match="vary: the method urp has no field 'levels'"):
-            vkbloom.translate(Pyramid(), UrpBloom, size=SIZE, vary=["levels"], renderer=renderer)
+            translated(Pyramid(), UrpBloom, vary=["levels"])
 
 
 class TestPyramid:

@@ -38,9 +38,10 @@ def prepare(store: Path, part: tuple[int, int], intensity: float, start: Barrier
     kept = GridStore(open_keys(store), grid, layout, (1,), part)
     start.wait(60)
     try:
-        return "; ".join(kept.prepare(resume=True, verify=True))
+        kept.prepare(resume=True, verify=True)
     except ValueError as error:
         return str(error)
+    return ""
 
 
 def prepare_all(

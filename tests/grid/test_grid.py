@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import math
@@ -16,7 +17,6 @@ import pytest
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.images import noise
-from tests.processes import output
 from vkbloom import (
     Convolution,
     DualKawase,
@@ -32,8 +32,6 @@ from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.layout import Grid, PassCounter, ask, lay_out
 from vkbloom._grid.order import blocks
 from vkbloom._grid.progress import Progress
-
-xr = pytest.importorskip("xarray")
 
 # For images and scenes that no renderer has rendered.
 UNSEEN = itertools.count(1000)
@@ -53,6 +51,15 @@ DEPENDS = {
 }
 
 
+Call = Callable[..., Any]
+
+
+@pytest.fixture
+def filled(renderer: Renderer) -> Call:
+    """Fill grids with the shared renderer."""
+    return functools.partial(vkbloom.grid, progress=False, renderer=renderer)
+
+
 @pytest.fixture(scope="module")
 def image() -> Any:
     return noise(23, 37, 3, dtype="float32")
@@ -64,15 +71,8 @@ def fewest(depends: dict[str, list[str]], axes: dict[str, list[Any]]) -> int:
 
 
 class TestValues:
-    def test_every_point_is_that_of_a_single_call(self, renderer: Renderer, image: Any) -> None:
-        dataset = vkbloom.grid(
-            image,
-            Separable(intensity=0.7),
-            AXES,
-            framebuffers=("final", "bloom"),
-            progress=False,
-            renderer=renderer,
-        )
+    def test_every_point_is_that_of_a_single_call(self, filled: Call, image: Any) -> None:
+        dataset = filled(image, Separable(intensity=0.7), AXES, framebuffers=("final", "bloom"))
         assert dataset["final"].dims == (*AXES, "y", "x", "channel")
         assert dataset["bloom"].dims == (*AXES, "y", "x", "bloom_channel")
         with Renderer() as single:
@@ -82,16 +82,9 @@ class TestValues:
                 for name in ("final", "bloom"):
                     np.testing.assert_array_equal(dataset[name].values[place], expected[name])
 
-    def test_scenes_and_time(self, renderer: Renderer, scene: Scene) -> None:
+    def test_scenes_and_time(self, renderer: Renderer, filled: Call, scene: Scene) -> None:
         axes = {"intensity": [0.5, 1.0], "time": [0.0, 0.25], "blur_scale": [1.0, 3.0]}
-        dataset = vkbloom.grid(
-            scene,
-            Separable(),
-            axes,
-            size=(48, 27),
-            framebuffers=("final", "depth"),
-            renderer=renderer,
-        )
+        dataset = filled(scene, Separable(), axes, size=(48, 27), framebuffers=("final", "depth"))
         assert dataset["final"].shape == (2, 2, 2, 27, 48, 4)
         assert dataset["depth"].dims == (*axes, "y", "x")
         for place in np.ndindex(2, 2, 2):
@@ -101,33 +94,21 @@ class TestValues:
             for name in ("final", "depth"):
                 np.testing.assert_array_equal(dataset[name].values[place], expected[name])
 
-    def test_deferred_shading(self, renderer: Renderer, scene: Scene) -> None:
-        dataset = vkbloom.grid(
-            scene,
-            Separable(),
-            {"exposure": [-1, 0]},
-            size=(32, 18),
-            shading="deferred",
-            renderer=renderer,
-        )
-        expected = renderer.render(scene, Separable(exposure=-1), (32, 18), shading="deferred")
-        np.testing.assert_array_equal(dataset["final"].values[0], expected["final"])
-
     @pytest.mark.parametrize("labels", [None, ["a", "b", "c"]])
-    def test_lists_of_images(self, renderer: Renderer, labels: list[Any] | None) -> None:
+    def test_lists_of_images(
+        self, renderer: Renderer, filled: Call, labels: list[Any] | None
+    ) -> None:
         images = [noise(9, 11, 4, dtype="uint8", seed=seed) for seed in range(3)]
         source = images if labels is None else dict(zip(labels, images, strict=True))
-        dataset = vkbloom.grid(
-            source, Pyramid(), {"radius": [0.5, 2.0], "intensity": [0.1, 1.0]}, renderer=renderer
-        )
+        dataset = filled(source, Pyramid(), {"radius": [0.5, 2.0], "intensity": [0.1, 1.0]})
         assert dataset["final"].dims == ("image", "radius", "intensity", "y", "x", "channel")
         assert list(dataset["image"].values) == (labels or [0, 1, 2])
         for number, one in enumerate(images):
             expected = renderer.apply(one, Pyramid(radius=2.0, intensity=0.1))["final"]
             np.testing.assert_array_equal(dataset["final"].values[number, 1, 0], expected)
 
-    def test_no_axes(self, renderer: Renderer, image: Any) -> None:
-        dataset = vkbloom.grid(image, renderer=renderer)
+    def test_no_axes(self, renderer: Renderer, filled: Call, image: Any) -> None:
+        dataset = filled(image)
         assert dataset["final"].dims == ("y", "x", "channel")
         np.testing.assert_array_equal(dataset["final"].values, renderer.apply(image)["final"])
 
@@ -244,12 +225,12 @@ class TestWholeSettings:
     """The axes "preset" and "settings": settings of any methods."""
 
     @pytest.mark.parametrize("first", [True, False])
-    def test_presets(self, renderer: Renderer, image: Any, first: bool) -> None:
+    def test_presets(self, renderer: Renderer, filled: Call, image: Any, first: bool) -> None:
         names, exposures = ["kino", "tutorial", "filament"], [0.0, 1.0]
         axes: dict[str, Any] = {"preset": names, "exposure": exposures}
         if not first:
             axes = dict(reversed(axes.items()))
-        grid = vkbloom.grid(image, axes=axes, progress=False, renderer=renderer)
+        grid = filled(image, axes=axes)
         assert list(grid["final"].dims[:2]) == list(axes)
         assert list(grid["preset"].values) == names
         for name in names:
@@ -262,16 +243,14 @@ class TestWholeSettings:
         told = json.loads(grid["preset"].attrs["settings"])
         assert vkbloom.Settings.from_dict(told["kino"]) == vkbloom.presets["kino"]
 
-    def test_settings(self, renderer: Renderer, image: Any) -> None:
+    def test_settings(self, renderer: Renderer, filled: Call, image: Any) -> None:
         many = [Separable(threshold=0.5), Pyramid(levels=2, format="rgba32float")]
         against = {"settings": many[0]}
-        grid = vkbloom.grid(
+        grid = filled(
             image,
             axes={"settings": many, "intensity": [0.5, 1.0]},
             framebuffers=("final", "bloom"),
             reduce={"psnr": vkbloom.reductions.PSNR(against=against)},
-            progress=False,
-            renderer=renderer,
         )
         for place, one in enumerate(many):
             frames = renderer.apply(image, one.replace(intensity=0.5))
@@ -281,25 +260,12 @@ class TestWholeSettings:
                 np.testing.assert_array_equal(found, frames[name])
         assert np.isinf(grid["psnr"].isel(settings=0)).all()
 
-    def test_in_a_store(self, tmp_path: Path) -> None:
-        pytest.importorskip("zarr")
-        image = np.random.default_rng(3).random((8, 12, 3)).astype(np.float32)
-        arguments: Any = (image, None, {"settings": [Separable(), Pyramid(levels=2)]})
-        first = vkbloom.grid(*arguments, store=tmp_path, progress=False)["final"].values
-        again = vkbloom.grid(*arguments, store=tmp_path, resume=True, progress=False)
-        np.testing.assert_array_equal(again["final"].values, first)
-        assert again.attrs["passes_run"] == 0
-        assert vkbloom.check_grid(tmp_path).complete
-        other = {"settings": [Separable(), Pyramid(levels=3)]}
-        with pytest.raises(ValueError, match="axes"):
-            vkbloom.grid(image, None, other, store=tmp_path, resume=True, progress=False)
-
-    def test_floats_become_the_largest_of_their_dtypes(self, renderer: Renderer) -> None:
+    def test_floats_become_the_largest_of_their_dtypes(
+        self, renderer: Renderer, filled: Call
+    ) -> None:
         half = np.random.default_rng(4).random((8, 12, 3)).astype(np.float16)
         formats: Any = ["rgba16float", "rgba32float"]
-        grid = vkbloom.grid(
-            half, Separable(), {"format": formats}, framebuffers=("bloom",), renderer=renderer
-        )
+        grid = filled(half, Separable(), {"format": formats}, framebuffers=("bloom",))
         assert grid["bloom"].dtype == np.float32
         for name in formats:
             expected = renderer.apply(half, Separable(format=name))["bloom"]
@@ -320,35 +286,34 @@ class TestWholeSettings:
         ],
     )
     def test_refusals(
-        self, renderer: Renderer, settings: Any, axes: Any, kind: type[Exception], told: str
+        self, filled: Call, settings: Any, axes: Any, kind: type[Exception], told: str
     ) -> None:
         with pytest.raises(kind, match=told):
-            vkbloom.grid(np.zeros((4, 4, 3), np.uint8), settings, axes, renderer=renderer)
+            filled(np.zeros((4, 4, 3), np.uint8), settings, axes)
 
-    def test_framebuffer_that_some_points_lack_is_refused(self, renderer: Renderer) -> None:
+    def test_framebuffer_that_some_points_lack_is_refused(self, filled: Call) -> None:
         with pytest.raises(ValueError, match=r"blur_vertical .* along preset: .* not there at"):
-            vkbloom.grid(
+            filled(
                 np.zeros((8, 8, 3), np.float32),
                 axes={"preset": ["tutorial", "kino"]},
                 framebuffers=("blur_vertical",),
-                renderer=renderer,
             )
 
 
 class TestMemory:
     def test_grid_larger_than_memory_is_refused(
-        self, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+        self, filled: Call, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(Renderer, "_run_work", None)
+        monkeypatch.setattr(Renderer, "_run_requests", None)
         image = np.zeros((1000, 1000, 4), np.float32)
         axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
         told = r"1000000 points with final needs 16,000.0 GB .* grid, .* framebuffers=\(\)"
         with pytest.raises(MemoryError, match=told):
-            vkbloom.grid(image, None, axes, renderer=renderer)
+            filled(image, None, axes)
 
 
 class TestDataset:
-    def test_coordinates_say_what_they_are(self, renderer: Renderer, image: Any) -> None:
+    def test_coordinates_say_what_they_are(self, filled: Call, image: Any) -> None:
         axes: dict[str, Any] = {
             "threshold": [None, 0.5],
             "tonemap": ["none", "agx"],
@@ -358,7 +323,7 @@ class TestDataset:
             "direct": [False, True],
             "weights": [(0.5, 0.25), (1.0,)],
         }
-        dataset = vkbloom.grid(image, Separable(), axes, renderer=renderer)
+        dataset = filled(image, Separable(), axes)
         assert np.isnan(dataset["threshold"].values[0])
         assert list(dataset["tonemap"].values) == ["none", "agx"]
         assert list(dataset["bloom_size"].values) == ["none", "[8, 4]"]
@@ -371,10 +336,8 @@ class TestDataset:
         assert list(dataset["channel"].values) == ["r", "g", "b"]
         assert dataset["final"].attrs["units"] == "1"
 
-    def test_attributes_hold_the_rest(self, renderer: Renderer, image: Any) -> None:
-        dataset = vkbloom.grid(
-            image, Separable(intensity=0.3), {"blur_scale": [1.0]}, renderer=renderer
-        )
+    def test_attributes_hold_the_rest(self, renderer: Renderer, filled: Call, image: Any) -> None:
+        dataset = filled(image, Separable(intensity=0.3), {"blur_scale": [1.0]})
         settings = json.loads(dataset.attrs["settings"])
         assert settings["intensity"] == 0.3
         assert settings["method"] == "separable"
@@ -382,17 +345,6 @@ class TestDataset:
         assert dataset.attrs["adapter"] == renderer.info.name
         assert dataset.attrs["version"] == vkbloom.__version__
         assert json.loads(dataset.attrs["axes"]) == ["blur_scale"]
-
-    def test_xarray_selects(self, renderer: Renderer, image: Any) -> None:
-        dataset = vkbloom.grid(
-            image,
-            Separable(),
-            {"blur_scale": [0.5, 1.1, 2.0], "tonemap": ["none", "aces"]},
-            renderer=renderer,
-        )
-        chosen = dataset["final"].sel(blur_scale=1.0, method="nearest").sel(tonemap="aces")
-        expected = renderer.apply(image, Separable(blur_scale=1.1, tonemap="aces"))["final"]
-        np.testing.assert_array_equal(chosen.values, expected)
 
 
 class TestRefusals:
@@ -426,19 +378,19 @@ class TestRefusals:
         ids=str,
     )
     def test_arguments(
-        self, renderer: Renderer, image: Any, arguments: Any, kind: type[Exception], message: str
+        self, filled: Call, image: Any, arguments: Any, kind: type[Exception], message: str
     ) -> None:
         with pytest.raises(kind, match=message):
-            vkbloom.grid(image, Separable(), **arguments, renderer=renderer)
+            filled(image, Separable(), **arguments)
 
     @pytest.mark.parametrize("source", [None, "a.png", [], [np.zeros(3)], 3], ids=str)
-    def test_sources(self, renderer: Renderer, source: Any) -> None:
+    def test_sources(self, filled: Call, source: Any) -> None:
         with pytest.raises((TypeError, ValueError), match=r"source|image"):
-            vkbloom.grid(source, renderer=renderer)
+            filled(source)
 
     @pytest.fixture
     def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for name in ("apply", "_run_work"):
+        for name in ("apply", "_run_requests"):
             monkeypatch.setattr(Renderer, name, None)
 
     @pytest.mark.parametrize(
@@ -470,7 +422,7 @@ class TestRefusals:
     )
     def test_shapes_that_vary_before_anything_is_rendered(
         self,
-        renderer: Renderer,
+        filled: Call,
         nothing_renders: None,
         *,
         settings: Settings,
@@ -480,26 +432,24 @@ class TestRefusals:
     ) -> None:
         picture = noise(23, 37, 3, dtype="float32")
         with pytest.raises(ValueError, match=told):
-            vkbloom.grid(picture, settings, axes, framebuffers=names, renderer=renderer)
+            filled(picture, settings, axes, framebuffers=names)
 
-    def test_images_of_two_sizes_are_refused(self, renderer: Renderer) -> None:
+    def test_images_of_two_sizes_are_refused(self, filled: Call) -> None:
         images = [noise(4, 5, 3, dtype="uint8"), noise(4, 6, 3, dtype="uint8")]
         with pytest.raises(ValueError, match=r"along image: \(4, 5, 3\).*\(4, 6, 3\)"):
-            vkbloom.grid(images, renderer=renderer)
+            filled(images)
 
     def test_a_reduction_that_changes_its_shape_names_the_point(
-        self, renderer: Renderer, image: Any
+        self, filled: Call, image: Any
     ) -> None:
         def growing(frames: Frames) -> Any:
             return np.zeros(1 + int(frames.settings.exposure))
 
         with pytest.raises(ValueError, match=r"n: \(2,\) float64 at exposure=1"):
-            vkbloom.grid(
-                image, Separable(), {"exposure": [0, 1]}, reduce={"n": growing}, renderer=renderer
-            )
+            filled(image, Separable(), {"exposure": [0, 1]}, reduce={"n": growing})
 
     def test_an_error_on_the_way_leaves_the_renderer_usable(
-        self, renderer: Renderer, image: Any
+        self, renderer: Renderer, filled: Call, image: Any
     ) -> None:
         def failing(frames: Frames) -> float:
             if frames.settings.exposure:
@@ -507,18 +457,14 @@ class TestRefusals:
             return 0.0
 
         with pytest.raises(ZeroDivisionError):
-            vkbloom.grid(
-                image,
-                Separable(),
-                {"exposure": [0, 1, 2]},
-                reduce={"n": failing},
-                renderer=renderer,
-            )
+            filled(image, Separable(), {"exposure": [0, 1, 2]}, reduce={"n": failing})
         assert renderer.apply(image)["final"].shape == image.shape
 
 
 class TestReduce:
-    def test_next_to_and_instead_of_framebuffers(self, renderer: Renderer, image: Any) -> None:
+    def test_next_to_and_instead_of_framebuffers(
+        self, renderer: Renderer, filled: Call, image: Any
+    ) -> None:
         seen: list[list[str]] = []
 
         def spread(frames: Frames) -> Any:
@@ -526,12 +472,8 @@ class TestReduce:
             return frames["bloom"].std(axis=(0, 1))[:3]
 
         axes = {"blur_scale": [1.0, 2.0]}
-        beside = vkbloom.grid(
-            image, Separable(), axes, reduce={"spread": spread}, renderer=renderer
-        )
-        alone = vkbloom.grid(
-            image, Separable(), axes, framebuffers=(), reduce={"spread": spread}, renderer=renderer
-        )
+        beside = filled(image, Separable(), axes, reduce={"spread": spread})
+        alone = filled(image, Separable(), axes, framebuffers=(), reduce={"spread": spread})
         assert set(beside) == {"final", "spread"}
         assert set(alone) == {"spread"}
         assert alone["spread"].dims == ("blur_scale", "spread_dim_0")
@@ -540,18 +482,13 @@ class TestReduce:
         # Without a word about what it needs it gets all.
         assert "glow" in seen[0]
 
-    def test_points_to_compare_with(self, renderer: Renderer) -> None:
+    def test_points_to_compare_with(self, renderer: Renderer, filled: Call) -> None:
         images = [noise(12, 16, 3, dtype="uint8", seed=seed) for seed in range(2)]
         axes = {"exposure": [0.0, 0.5], "blur_scale": [0.5, 1.0, 4.0]}
         same = reductions.PSNR(against={"blur_scale": 1.0})
         fixed = reductions.PSNR(against={"image": 0, "exposure": 0.0, "blur_scale": 4.0})
-        dataset = vkbloom.grid(
-            images,
-            Separable(),
-            axes,
-            framebuffers=(),
-            reduce={"same": same, "fixed": fixed},
-            renderer=renderer,
+        dataset = filled(
+            images, Separable(), axes, framebuffers=(), reduce={"same": same, "fixed": fixed}
         )
         for place in np.ndindex(2, 2, 3):
             exposure, scale = axes["exposure"][place[1]], axes["blur_scale"][place[2]]
@@ -584,15 +521,14 @@ class TestReduce:
         [({"blur_scale": 3.0}, "3.0 is not a value of the axis"), ({"knee": 0}, "not an axis")],
     )
     def test_missing_points_of_a_reference_are_refused(
-        self, renderer: Renderer, image: Any, against: Any, told: str
+        self, filled: Call, image: Any, against: Any, told: str
     ) -> None:
         with pytest.raises(ValueError, match=told):
-            vkbloom.grid(
+            filled(
                 image,
                 Separable(),
                 {"blur_scale": [1.0]},
                 reduce={"s": reductions.SSIM(against=against)},
-                renderer=renderer,
             )
 
 
@@ -606,32 +542,8 @@ class TestExtras:
             vkbloom.grid(image, Separable(), {"exposure": [0]}, store=tmp_path / "a.zarr")
         assert not (tmp_path / "a.zarr").exists()
 
-    def test_importing_the_package_needs_none(self) -> None:
-        code = (
-            "import sys; sys.modules.update(dict.fromkeys(['xarray', 'zarr', 'dask', 'distributed',"
-            " 'matplotlib', 'tqdm'])); import vkbloom"
-        )
-        output("-c", code)
-
-    def test_grids_are_imported_late(self) -> None:
-        code = (
-            "import sys, vkbloom\n"
-            "assert not any(name.startswith('vkbloom._grid') for name in sys.modules)\n"
-            "assert all(hasattr(vkbloom, name) for name in vkbloom.__all__)\n"
-            "from vkbloom import reductions"
-        )
-        output("-c", code)
-        with pytest.raises(AttributeError, match="grids"):
-            vkbloom.grids  # type: ignore[attr-defined]  # noqa: B018
-
 
 class TestProgress:
-    def test_silent_without_a_terminal(
-        self, renderer: Renderer, image: Any, capfd: pytest.CaptureFixture[str]
-    ) -> None:
-        vkbloom.grid(image, Separable(), {"exposure": [0, 1]}, progress=True, renderer=renderer)
-        assert capfd.readouterr() == ("", "")
-
     def test_a_terminal_sees_passes(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -1,4 +1,4 @@
-"""OpenEXR files with several parts."""
+"""Files by OpenImageIO alone, without the package's own code."""
 
 from __future__ import annotations
 
@@ -8,6 +8,18 @@ from typing import Any
 
 import OpenImageIO as oiio
 from numpy.typing import NDArray
+
+
+def written(path: Path, spec: Any, pixels: NDArray[Any]) -> Path:
+    """Write an image as a specification says."""
+    writer = oiio.ImageOutput.create(str(path))
+    assert writer is not None
+    assert writer.open(str(path), spec), writer.geterror()
+    assert writer.write_image(pixels), writer.geterror()
+    assert writer.close(), writer.geterror()
+    # TIFF leaves a message about a directory that it left out.
+    writer.geterror()
+    return path
 
 
 def store_parts(path: Path, parts: Mapping[str, NDArray[Any]]) -> None:

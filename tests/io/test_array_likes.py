@@ -88,14 +88,8 @@ def test_errors_say_the_cure(image: NDArray[Any], error: type[Exception], cure: 
     assert check_image(cured).shape == (5, 7, 3)
 
 
-@pytest.mark.parametrize("image", [None, 3, "a.png", [[1, 2]], b""])
-def test_other_objects(image: Any) -> None:
-    with pytest.raises((TypeError, ValueError), match="image: "):
-        check_image(image)
-
-
 def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
-    with pytest.raises(TypeError, match=r"^scene: a Scene is needed, not ndarray$"):
+    with pytest.raises(TypeError, match=r"^scene: ndarray is not a Scene$"):
         renderer.render(IMAGE)  # type: ignore[arg-type]
 
 

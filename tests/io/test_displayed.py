@@ -179,7 +179,7 @@ class TestCommandLine:
         file, _ = self.apply(tmp_path, "b.png", "--view", f"{display}/{HDR}")
         assert chunk(file, b"cICP") == bytes([9, 16, 0, 1])
         np.testing.assert_allclose(stored(file), shown(RAMP, display, HDR), atol=HALF)
-        monkeypatch.setattr("vkbloom._cli.large_files.LARGE", 1)
+        monkeypatch.setattr("vkbloom._cli.bands.LARGE", 1)
         monkeypatch.setattr("vkbloom._cli.applied.is_large", lambda *_: True)
         again, _ = self.apply(tmp_path, "c.png", "--view", f"{display}/{HDR}")
         assert np.array_equal(stored(again), stored(file))

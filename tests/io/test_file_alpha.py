@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
+from tests.io.parts import written
 from vkbloom._io import rows
 from vkbloom._io.image_reading import decode
 from vkbloom._io.srgb import decode_srgb
@@ -228,10 +229,7 @@ def test_floats(tmp_path: Path, is_straight: bool) -> None:
     if is_straight:
         # OpenImageIO keeps its own name to itself.
         spec.attribute("xxxx:UnassociatedAlpha", 1)
-    writer = oiio.ImageOutput.create("a.exr")
-    assert writer.open(str(tmp_path / "a.exr"), spec)
-    assert writer.write_image(stored)
-    assert writer.close()
+    written(tmp_path / "a.exr", spec, stored)
     content = (tmp_path / "a.exr").read_bytes()
     (tmp_path / "a.exr").write_bytes(content.replace(b"xxxx:", b"oiio:"))
     for name in ("a.tif", "a.exr"):

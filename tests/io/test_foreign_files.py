@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
+from tests.io.parts import written
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
@@ -212,11 +213,8 @@ def test_ultra_hdr(tmp_path: Path) -> None:
     spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
     light = np.full((64, 64, 3), (0.6, 0.1, 0.05), np.float16)
     light[:16] = 3
-    writer = oiio.ImageOutput.create("a.jpg")
     path = tmp_path / "a.jpg"
-    assert writer.open(str(path), spec)
-    assert writer.write_image(light)
-    assert writer.close()
+    written(path, spec, light)
     made, facts = vkbloom.read(path, metadata=True)
     assert made.dtype == np.float16
     assert facts["alpha"] is None

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.io.parts import store_parts
+from tests.io.parts import written
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.image_reading import decode, load
@@ -45,13 +45,7 @@ def store(path: Path, pixels: NDArray[Any], numbers: str, **changes: Any) -> Pat
             setattr(spec, name, value)
         else:
             spec.attribute(name.replace("__", ":"), value)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(pixels), writer.geterror()
-    assert writer.close(), writer.geterror()
-    # TIFF leaves a message about a directory that it left out.
-    writer.geterror()
-    return path
+    return written(path, spec, pixels)
 
 
 def reread(path: Path) -> tuple[Any, NDArray[Any]]:
@@ -127,29 +121,11 @@ class TestLoad:
         assert stored.numbers == (numbers,) * channels
         assert stored.display == (0, 0, 7, 5)
 
-    def test_radiance(self, tmp_path: Path) -> None:
-        pixels = np.abs(noise(5, 7, 3, numbers="float"))
-        stored = load(store(tmp_path / "a.hdr", pixels, "float"))
-        # Three mantissas of 8 bits share the largest one's exponent.
-        assert np.abs(stored.pixels - pixels).max() <= pixels.max() / 128
-        assert stored.numbers == ("float",) * 3
-
     def test_doubles_become_floats(self, tmp_path: Path) -> None:
         pixels = noise(2, 3, 3, numbers="float")
         stored = load(store(tmp_path / "a.tif", pixels.astype(np.float64), "double"))
         assert stored.pixels.dtype == np.float32
         assert np.array_equal(stored.pixels, pixels)
-
-    def test_colours_under_alpha_0_stay(self, tmp_path: Path) -> None:
-        pixels = noise(2, 2, 4, numbers="uint8")
-        pixels[0, :, 3] = 0
-        assert np.array_equal(load(store(tmp_path / "a.png", pixels, "uint8")).pixels, pixels)
-
-    @pytest.mark.parametrize(("name", "associated"), [("a.exr", True), ("a.png", False)])
-    def test_knows_what_alpha_does(self, tmp_path: Path, name: str, associated: bool) -> None:
-        numbers = "half" if name == "a.exr" else "uint8"
-        path = store(tmp_path / name, noise(2, 2, 4, numbers=numbers), numbers)
-        assert load(path).associated is associated
 
     # (data window, display window) as x, y, width, height.
     @pytest.mark.parametrize(
@@ -180,33 +156,6 @@ class TestLoad:
         inside = stored.pixels[row : row + height, column : column + width]
         assert np.array_equal(inside, pixels)
         assert np.count_nonzero(stored.pixels) == np.count_nonzero(pixels)
-
-    @pytest.mark.parametrize("orientation", range(1, 9))
-    def test_is_upright(self, tmp_path: Path, orientation: int) -> None:
-        path = store(
-            tmp_path / "a.tif", noise(3, 5, 3, numbers="uint8"), "uint8", Orientation=orientation
-        )
-        expected = oiio.ImageBufAlgo.reorient(oiio.ImageBuf(str(path))).get_pixels(oiio.UINT8)
-        stored = load(path)
-        assert np.array_equal(stored.pixels, expected)
-        assert stored.display == (0, 0, expected.shape[1], expected.shape[0])
-
-    def test_parts(self, tmp_path: Path) -> None:
-        path = tmp_path / "a.exr"
-        parts = [noise(2, 3, 3, numbers="half", seed=seed) for seed in range(3)]
-        store_parts(path, {f"part {index}": part for index, part in enumerate(parts)})
-        assert np.array_equal(load(path).pixels, parts[0])
-        assert np.array_equal(load(path, 2).pixels, parts[2])
-        assert load(path).parts == load(path, 2).parts == ("part 0", "part 1", "part 2")
-        for wrong in (3, -1):
-            with pytest.raises(ValueError, match=f"a.exr: subimage {wrong} is not in 0..2"):
-                load(path, wrong)
-
-    @pytest.mark.parametrize("name", ["no.png", "no.exr", "no/a.png"])
-    def test_missing_files(self, tmp_path: Path, name: str) -> None:
-        with pytest.raises(FileNotFoundError) as caught:
-            load(tmp_path / name)
-        assert caught.value.filename == str(tmp_path / name)
 
     def test_folders(self, tmp_path: Path) -> None:
         with pytest.raises(IsADirectoryError):
@@ -291,22 +240,6 @@ class TestLoad:
 
 
 class TestDecode:
-    @pytest.mark.parametrize("numbers", ["uint8", "uint16"])
-    def test_integers_are_srgb(self, tmp_path: Path, numbers: str) -> None:
-        pixels = noise(4, 6, 4, numbers=numbers)
-        made = decode(load(store(tmp_path / "a.png", pixels, numbers)))
-        plain = pixels / np.iinfo(pixels.dtype).max
-        assert made.pixels.dtype == np.float32
-        assert made.encoding == "linear"
-        assert np.allclose(made.pixels[:, :, :3], decode_srgb(plain[:, :, :3]), rtol=1e-6, atol=0)
-        assert np.allclose(made.pixels[:, :, 3], plain[:, :, 3], rtol=1e-6, atol=0)
-        assert made.notes == ()
-
-    def test_integers_can_be_linear(self, tmp_path: Path) -> None:
-        pixels = noise(4, 6, 3, numbers="uint8")
-        made = decode(load(store(tmp_path / "a.png", pixels, "uint8")), "linear")
-        assert np.allclose(made.pixels, pixels / 255, rtol=1e-6, atol=0)
-
     def test_integers_that_the_file_calls_linear(self, tmp_path: Path) -> None:
         pixels = noise(4, 6, 3, numbers="uint8")
         linear = {"oiio__ColorSpace": "lin_rec709_scene"}
@@ -322,13 +255,6 @@ class TestDecode:
         assert note == "the file says g22_rec709_scene of its colours; converted to linear Rec. 709"
 
     @pytest.mark.parametrize("numbers", ["half", "float"])
-    def test_floats_are_linear_and_stay(self, tmp_path: Path, numbers: str) -> None:
-        pixels = noise(4, 6, 4, numbers=numbers)
-        made = decode(load(store(tmp_path / "a.exr", pixels, numbers)))
-        assert made.pixels.dtype == pixels.dtype
-        assert np.array_equal(made.pixels, pixels)
-
-    @pytest.mark.parametrize("numbers", ["half", "float"])
     def test_floats_can_be_srgb(self, tmp_path: Path, numbers: str) -> None:
         pixels = np.abs(noise(4, 6, 4, numbers=numbers))
         made = decode(load(store(tmp_path / "a.exr", pixels, numbers)), "srgb")
@@ -338,13 +264,6 @@ class TestDecode:
         # The power multiplies the rounding of its argument by 2.4, and adds its own.
         assert np.allclose(made.pixels[:, :, :3], expected, rtol=8 * step, atol=1e-7)
         assert np.array_equal(made.pixels[:, :, 3], pixels[:, :, 3])
-
-    def test_raw_values_stay(self, tmp_path: Path) -> None:
-        pixels = noise(4, 6, 4, numbers="uint8")
-        made = decode(load(store(tmp_path / "a.png", pixels, "uint8")), raw=True)
-        assert np.array_equal(made.pixels, pixels)
-        assert made.pixels.dtype == np.uint8
-        assert made.encoding is None
 
     def test_raw_has_conditions(self, tmp_path: Path) -> None:
         wide = load(store(tmp_path / "a.png", noise(2, 2, 3, numbers="uint16"), "uint16"))
@@ -376,12 +295,6 @@ class TestDecode:
         (note,) = made.notes
         assert set(note.removeprefix("left out the channels ").split(", ")) == {"Z", "light.R"}
 
-    def test_one_layers_name_before_all(self, tmp_path: Path) -> None:
-        pixels = noise(3, 4, 3, numbers="half")
-        names = ("light.R", "light.G", "light.B")
-        made = decode(load(store(tmp_path / "a.exr", pixels, "half", channelnames=names)))
-        assert np.array_equal(made.pixels, pixels)
-
     @pytest.mark.parametrize("names", [("X", "Y", "Z"), ("U", "V"), ("R", "G")])
     def test_other_channels_are_refused(self, tmp_path: Path, names: tuple[str, ...]) -> None:
         pixels = noise(3, 4, len(names), numbers="half")
@@ -391,32 +304,6 @@ class TestDecode:
 
 
 class TestSave:
-    @pytest.mark.parametrize("name", ["b.png", "b.tif"])
-    @pytest.mark.parametrize("numbers", ["uint8", "uint16"])
-    def test_every_integer_comes_back(self, tmp_path: Path, name: str, numbers: str) -> None:
-        side = 16 if numbers == "uint8" else 256
-        levels = np.arange(side * side, dtype=DTYPES[numbers]).reshape(side, side, 1)
-        pixels = np.repeat(levels, 3, axis=2)
-        made = decode(load(store(tmp_path / "a.png", pixels, numbers)))
-        assert save(made, tmp_path / name) == ()
-        spec, written = reread(tmp_path / name)
-        assert str(spec.format) == numbers
-        assert spec["oiio:ColorSpace"] == "srgb_rec709_scene"
-        assert np.array_equal(written, pixels)
-
-    @pytest.mark.parametrize("numbers", ["half", "float"])
-    @pytest.mark.parametrize("channels", [3, 4])
-    def test_floats_are_written_as_they_are(
-        self, tmp_path: Path, numbers: str, channels: int
-    ) -> None:
-        pixels = noise(5, 7, channels, numbers=numbers)
-        pixels[0, :3, 0] = (np.nan, np.inf, -np.inf)
-        pixels[:, :, 3:] = 1
-        assert save(linear_picture(pixels, numbers), tmp_path / "b.exr") == ()
-        spec, written = reread(tmp_path / "b.exr")
-        assert str(spec.format) == numbers
-        assert np.array_equal(written, pixels, equal_nan=True)
-
     # The numbers that a picture came with, a file, and the numbers and channels in it.
     @pytest.mark.parametrize(
         ("numbers", "name", "stored_as", "channels"),
@@ -475,11 +362,6 @@ class TestSave:
         again = decode(load(tmp_path / name), None if name == "b.png" else colour)
         assert np.allclose(again.pixels, 0.5, atol=1 / 255)
 
-    def test_alpha_is_not_encoded(self, tmp_path: Path) -> None:
-        pixels = np.full((4, 4, 4), 0.5, np.float32)
-        save(linear_picture(pixels, "uint8"), tmp_path / "b.png")
-        assert reread(tmp_path / "b.png")[1][0, 0].tolist() == [188, 188, 188, 128]
-
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22", None])
     def test_encoded_values_are_left_alone(self, tmp_path: Path, encoding: Any) -> None:
         pixels = np.full((4, 4, 3), 0.5, np.float32)
@@ -516,14 +398,6 @@ class TestSave:
         assert spec.nchannels == channels
         if channels == 1:
             assert spec.channelnames == ("Y",)
-
-    def test_grey_with_alpha(self, tmp_path: Path) -> None:
-        pixels = noise(4, 6, 2, numbers="uint8")
-        made = decode(load(store(tmp_path / "a.png", pixels, "uint8", channelnames=("Y", "A"))))
-        assert save(made, tmp_path / "b.png") == ()
-        spec, written = reread(tmp_path / "b.png")
-        assert spec.channelnames == ("Y", "A")
-        assert np.array_equal(written, pixels)
 
     def test_lost_alpha_is_noted(self, tmp_path: Path) -> None:
         pixels = np.full((8, 8, 4), 0.5, np.float32)
@@ -566,10 +440,7 @@ class TestSave:
         spec = oiio.ImageSpec(2, 2, 3, "half")
         spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), chromaticities)
         spec.attribute("PixelAspectRatio", 2.0)
-        writer = oiio.ImageOutput.create(str(tmp_path / "a.exr"))
-        assert writer.open(str(tmp_path / "a.exr"), spec)
-        assert writer.write_image(noise(2, 2, 3, numbers="half"))
-        assert writer.close()
+        written(tmp_path / "a.exr", spec, noise(2, 2, 3, numbers="half"))
         save(decode(load(tmp_path / "a.exr")), tmp_path / "b.exr")
         kept, _ = reread(tmp_path / "b.exr")
         assert np.allclose(kept["chromaticities"], chromaticities)
@@ -592,12 +463,6 @@ class TestSave:
         if is_kept:
             assert np.array_equal(profile, original.getattribute("ICCProfile"))
 
-    def test_attributes_are_added(self, tmp_path: Path) -> None:
-        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
-        save(made, tmp_path / "b.png", attributes={"Software": "vkbloom 9", "vkbloom:x": "y"})
-        spec, _ = reread(tmp_path / "b.png")
-        assert (spec["Software"], spec["vkbloom:x"]) == ("vkbloom 9", "y")
-
     @pytest.mark.parametrize("name", ["b.unknown", "b", "b.null", "b.term", "b.heic"])
     def test_unknown_extension_is_refused(self, tmp_path: Path, name: str) -> None:
         made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
@@ -613,12 +478,6 @@ class TestSave:
         with pytest.raises(ValueError, match=r"b\.zfile: zfile cannot hold this picture"):
             save(made, tmp_path / "b.zfile")
         assert only_in(tmp_path) == []
-
-    def test_missing_folder_is_an_error(self, tmp_path: Path) -> None:
-        made = linear_picture(np.ones((2, 2, 3), np.float32), "uint8")
-        with pytest.raises(FileNotFoundError) as caught:
-            save(made, tmp_path / "no" / "b.png")
-        assert caught.value.filename == str(tmp_path / "no" / "b.png")
 
     @pytest.mark.parametrize("name", ["b.png", "b.exr"])
     def test_old_file_stays_until_the_new_one_is_complete(
@@ -650,26 +509,3 @@ class TestSave:
             save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
             assert opened.read() == b"before"
         assert load(target).pixels.shape == (2, 2, 3)
-
-    def test_a_folder_in_its_place(self, tmp_path: Path) -> None:
-        (tmp_path / "b.png").mkdir()
-        with pytest.raises(OSError, match=r"b\.png") as caught:
-            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), tmp_path / "b.png")
-        assert caught.value.filename == str(tmp_path / "b.png")
-        assert only_in(tmp_path) == ["b.png"]
-
-    def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
-        with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
-            save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), "b.png")
-
-
-def test_real_files_come_back(shared_data: Path, tmp_path: Path) -> None:
-    for name in ("BrightRings.exr", "Desk.exr"):
-        made = decode(load(shared_data / "hdr" / name))
-        assert made.pixels.dtype == np.float16
-        save(made, tmp_path / name)
-        assert np.array_equal(load(tmp_path / name).pixels, load(shared_data / "hdr" / name).pixels)
-    for path in (shared_data / "seed_frames").glob("*.png"):
-        save(decode(load(path)), tmp_path / path.name)
-        assert np.array_equal(load(tmp_path / path.name).pixels, load(path).pixels)

@@ -142,16 +142,6 @@ def test_files_are_bounded_by_bytes(folder: Path, monkeypatch: pytest.MonkeyPatc
         kernel_cache.find_or_make((1,), no_kernel)
 
 
-def test_a_sweep_does_not_replace_all_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kernel_cache.find_or_make((0,), kernel_of(1))
-    size = next(folder.iterdir()).stat().st_size
-    monkeypatch.setattr(kernel_cache.CACHE, "max_bytes", 3 * size)
-    for number in range(1, 9):
-        kernel_cache.find_or_make((number,), kernel_of(1))
-    for number in range(3):
-        kernel_cache.find_or_make((number,), no_kernel)
-
-
 def test_another_formula_is_another_kernel(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, folder: Path
 ) -> None:

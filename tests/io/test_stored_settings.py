@@ -56,7 +56,6 @@ class TestFrames:
     def test_come_back(
         self, renderer: vkbloom.Renderer, tmp_path: Path, name: str, dtype: str
     ) -> None:
-        pytest.importorskip("OpenImageIO")
         image = (IMAGE * 255).astype(dtype) if dtype == "uint8" else IMAGE.astype(dtype)
         frames = renderer.apply(image, vkbloom.Pyramid(levels=2, threshold=0.3))
         frames.save(tmp_path / name)
@@ -73,7 +72,6 @@ class TestFrames:
     def test_a_scene_with_depth(
         self, renderer: vkbloom.Renderer, tmp_path: Path, name: str
     ) -> None:
-        pytest.importorskip("OpenImageIO")
         frames = renderer.render(vkbloom.Scene.ufo(), size=(16, 9))
         frames.save(tmp_path / name)
         again = vkbloom.Frames.load(tmp_path / name)
@@ -83,7 +81,6 @@ class TestFrames:
         assert all(np.array_equal(again[key], frames[key]) for key in frames)
 
     def test_jpeg_has_the_settings(self, tmp_path: Path) -> None:
-        pytest.importorskip("OpenImageIO")
         frames = make({"final": np.full((16, 16, 3), 90, np.uint8)})
         frames.save(tmp_path / "a.jpg")
         again = vkbloom.Frames.load(tmp_path / "a.jpg")
@@ -92,7 +89,6 @@ class TestFrames:
 
     @pytest.mark.parametrize("name", ["a.png", "a.tif", "."])
     def test_files_beside_them_are_left_out(self, tmp_path: Path, name: str) -> None:
-        pytest.importorskip("OpenImageIO")
         image = np.random.default_rng(1).integers(0, 256, (5, 7, 3), dtype=np.uint8)
         frames = make({"glow": image, "final": image[::-1]})
         frames.save(tmp_path / name)
@@ -105,7 +101,6 @@ class TestFrames:
         assert np.array_equal(again["final"], image[::-1])
 
     def test_files_of_two_calls(self, tmp_path: Path) -> None:
-        pytest.importorskip("OpenImageIO")
         image = np.full((5, 7, 3), 9, np.uint8)
         make({"glow": image, "final": image}).save(tmp_path / "a.png")
         make({"glow": image.astype(np.float16), "final": image}).save(tmp_path / "a.png")
@@ -115,7 +110,6 @@ class TestFrames:
     def test_settings_come_back_from_zarr(self, tmp_path: Path) -> None:
         """What `to_xarray` gives has them as JSON in its attributes, for any method."""
         xarray = pytest.importorskip("xarray")
-        pytest.importorskip("zarr")
         settings = vkbloom.presets["godot_4_5"]
         dataset = make({"final": np.zeros((5, 7, 3), np.uint8)}, settings=settings).to_xarray()
         # Version 2, since version 3 has no text yet, which the names of channels are.
@@ -124,7 +118,6 @@ class TestFrames:
             assert vkbloom.Settings.from_json(stored.attrs["settings"]) == settings
 
     def test_other_files(self, tmp_path: Path) -> None:
-        pytest.importorskip("OpenImageIO")
         with pytest.raises(FileNotFoundError):
             vkbloom.Frames.load(tmp_path / "no.exr")
         path = vkbloom.write(tmp_path / "a.png", IMAGE)

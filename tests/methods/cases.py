@@ -2,6 +2,178 @@
 
 from __future__ import annotations
 
+import itertools
+from typing import Any
+
+import numpy as np
+
+from vkbloom import (
+    BevyBloom,
+    BlenderGlare,
+    Convolution,
+    DualKawase,
+    FilamentBloom,
+    GodotBloom,
+    HdrpBloom,
+    KinoBloom,
+    PygfxBloom,
+    Pyramid,
+    Separable,
+    Settings,
+    UnrealBloom,
+    UrpBloom,
+    gaussian_weights,
+    presets,
+    psf,
+)
 from vkbloom._doctor.cases import DTYPES, HARD_THRESHOLD, METHODS, presets_of_low_levels
 
-__all__ = ["DTYPES", "HARD_THRESHOLD", "METHODS", "presets_of_low_levels"]
+__all__ = [
+    "DTYPES",
+    "GIVEN",
+    "HARD_THRESHOLD",
+    "METHODS",
+    "OTHERS",
+    "WHOLE",
+    "presets_of_low_levels",
+]
+
+NORMALIZED = Separable(weights=gaussian_weights(2.0), blur_strength=1.0)
+# A fused pass replaces several of these if only `final` is requested.
+WHOLE: dict[str, Settings] = {
+    "tutorial": Separable(),
+    "threshold": Separable(threshold=0.3, knee=0.5, composite="screen", intensity=0.7),
+    # (Without encoding: near black, the curve turns one level of the bloom into many.)
+    "hard": Separable(threshold=HARD_THRESHOLD, tonemap="aces"),
+    "near": Separable(blur_scale=0.63, composite="mix", intensity=0.4),
+    "wide": Separable(weights=gaussian_weights(4.0, 12), blur_strength=1.0, exposure=-1.0),
+    # (Dithering makes two levels of a value that differs in its last bit.)
+    "dithered": Separable(first_tap=0, blur_strength=0.4, texel="x", dither=True, dither_seed=3),
+    "curved-pyramid": Pyramid(levels=4, threshold=0.2, tonemap="reinhard", encoding="gamma22"),
+    "small-tent": Pyramid(levels=3, radius=0.6, exposure=0.5),
+}
+NOISE = np.random.default_rng(5).random((9, 12, 3))
+# Every method with its threshold, every formula of alpha and mix, every way to a smaller bloom.
+MASK, EMISSION, BOTH = ("mask",), ("emission",), ("mask", "emission")
+GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
+    "separable-mask": (Separable(threshold=0.3, knee=0.5, composite="mix"), MASK),
+    "separable-both": (Separable(threshold=HARD_THRESHOLD), BOTH),
+    "pyramid-mask": (Pyramid(levels=3, threshold=0.3, composite="mix"), MASK),
+    "pyramid-max": (Pyramid(levels=2, alpha="max", exposure=1.0), EMISSION),
+    "separable-half": (Separable(bloom_scale=0.5, alpha="blur"), MASK),
+    "separable-layers": (
+        Separable(layers=((1.0, 1.0), (2.0, 0.5)), alpha="blur", blur_strength=0.5),
+        EMISSION,
+    ),
+    "separable-direct": (Separable(direct=True, alpha="max"), MASK),
+    "separable-loops": (Separable(loops=2, blur_scale=1.7, alpha="blur"), ()),
+    "pyramid-alpha": (Pyramid(levels=3, alpha="blur"), MASK),
+    "pyramid-firefly-both": (Pyramid(firefly_filter=True, alpha="blur"), BOTH),
+    "pyramid-weights": (
+        Pyramid(levels=3, level_weights=(0.2, 0.5, 0.4), format="rgba16float", alpha="blur"),
+        MASK,
+    ),
+    "dual-kawase-mask": (DualKawase(levels=3, threshold=HARD_THRESHOLD, alpha="blur"), MASK),
+    "kino-mask": (KinoBloom(threshold=0.5, alpha="blur"), MASK),
+    "bevy-mask": (BevyBloom(threshold=0.3, max_mip_dimension=32, alpha="blur"), MASK),
+    "bevy-emission": (BevyBloom(max_mip_dimension=32), EMISSION),
+    "filament-mask": (FilamentBloom(threshold=0.4, resolution=16, alpha="blur"), MASK),
+    "filament-both": (FilamentBloom(resolution=48, alpha="max"), BOTH),
+    "urp-mask": (UrpBloom(threshold=0.5, clamp_max=3.0, alpha="blur"), MASK),
+    "hdrp-mask": (HdrpBloom(composite="mix", alpha="blur"), MASK),
+    "unreal-mask": (UnrealBloom(threshold=0.5, alpha="blur"), MASK),
+    "godot-mask": (
+        GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),
+        MASK,
+    ),
+    "godot-emission": (GodotBloom(composite="mix", alpha="max"), EMISSION),
+    "blender-mask": (BlenderGlare(threshold=0.5, alpha="blur"), MASK),
+    "pygfx-mask": (PygfxBloom(karis_average=True, alpha="blur"), MASK),
+    "convolution-mask": (Convolution(NOISE[:5, :7], alpha="blur"), MASK),
+    "convolution-emission": (Convolution(NOISE[:5, :7], alpha="max"), EMISSION),
+}
+KERNEL = (np.random.default_rng(7).random((7, 4, 3)) ** 4).astype(np.float32)
+GODOTS: Any = itertools.product(
+    ("screen", "soft_light", "add", "replace", "mix"), ("none", "reinhard", "aces")
+)
+OTHERS: dict[str, Settings] = {
+    "layers-normalized": NORMALIZED.replace(layers=((0.5, 0.4), (1.3, 0.5)), loops=2),
+    "loops": Separable(loops=3, blur_scale=1.1),
+    "loops-x": NORMALIZED.replace(loops=3, blur_scale=1.1, texel="x"),
+    "far": Separable(blur_scale=16.0, blur_strength=0.5),
+    "no-centre": Separable(weights=(0.0, 0.5), blur_strength=1.0),
+    "negative-weights": Separable(weights=(0.8, -0.2, 0.1)),
+    "longest-near": METHODS["longest"].replace(blur_scale=0.4),
+    "direct-outline": Separable(direct=True, blur_scale=1.37, texel="x", first_tap=0),
+    "fixed-scale": Separable(bloom_size=(40, 30), blur_scale=2.0),
+    "fixed-layers": Separable(bloom_size=(40, 30), layers=((1.0, 0.5), (2.0, 0.5))),
+    "fixed-wider": Separable(bloom_size=(300, 20)),
+    "fixed-direct": Separable(bloom_size=(50, 61), direct=True, texel="x", blur_scale=1.2),
+    "kawase-near": DualKawase(levels=2, threshold=0.3, knee=0.5),
+    "kawase-far": DualKawase(levels=2, threshold=0.3, offset=3.5),
+    **{
+        f"level-weights-{i}": Pyramid(levels=4, level_weights=weights, intensity=0.5)
+        for i, weights in enumerate(((1, 0.5, 0.25, 2), (0, 0, 1, 0), (0,) * 4))
+    },
+    # Differences of halves are off by more than a share of themselves.
+    "level-weights-negative": Pyramid(
+        levels=4, level_weights=(1, -0.5, 0, 0.25), format="rgba32float"
+    ),
+    "bevy": BevyBloom(max_mip_dimension=32),
+    # Bloom::OLD_SCHOOL, SCREEN_BLUR and ANAMORPHIC, of fewer levels
+    "bevy-old-school": BevyBloom(
+        intensity=0.05, threshold=0.6, knee=0.2, composite="add", max_mip_dimension=64
+    ),
+    "bevy-screen-blur": BevyBloom(
+        intensity=1.0,
+        max_mip_dimension=64,
+        low_frequency_boost=0.0,
+        low_frequency_boost_curvature=0.0,
+        high_pass_frequency=1 / 3,
+    ),
+    "bevy-anamorphic": BevyBloom(scale_x=4.0, max_mip_dimension=64),
+    "bevy-few-levels": BevyBloom(max_mip_dimension=5, composite="add"),
+    "bevy-scales": BevyBloom(scale_x=0.3, scale_y=2.7, max_mip_dimension=32, threshold=0.3),
+    "kino-wide": KinoBloom(radius=7.0),
+    "kino-narrow": KinoBloom(radius=1.0, threshold=None),
+    "kino-flicker": KinoBloom(radius=4.2, anti_flicker=False, knee=0.0, threshold=1.5),
+    "filament": FilamentBloom(resolution=32),
+    "filament-one-level": FilamentBloom(threshold=None, levels=1, resolution=64),
+    "filament-halved": FilamentBloom(resolution=40, levels=12, highlight=10.0),
+    "filament-odd": FilamentBloom(resolution=112, levels=5, threshold=0.25),
+    "urp-narrow": UrpBloom(scatter=0.0, threshold=None, iterations=2),
+    "urp-wide": UrpBloom(scatter=1.0, clamp_max=30.0, iterations=8),
+    "hdrp": HdrpBloom(),
+    "hdrp-narrow": HdrpBloom(scatter=0.0),
+    "hdrp-linear": HdrpBloom(scatter=1.0, high_quality_filtering=False),
+    "hdrp-down": HdrpBloom(anamorphism=0.7),
+    "hdrp-across": HdrpBloom(anamorphism=-1.0),
+    "unreal-wide": UnrealBloom(radius=1.0, threshold=0.85, smooth_width=0.5),
+    "unreal-no-threshold": UnrealBloom(radius=0.4, threshold=None, intensity=1.5),
+    "node": UnrealBloom(node=True, intensity=1.0, threshold=0.4),
+    **{
+        f"godot-{composite}-{tonemap}": GodotBloom(
+            composite=composite,
+            tonemap=tonemap,
+            exposure=0.5,
+            intensity=0.8,
+            threshold=0.3,
+            white=2.0,
+            format="rgba32float",
+        )
+        for composite, tonemap in GODOTS
+    },
+    "godot-fixed": presets["godot_4_6"].replace(bloom_size=(50, 31)),
+    "godot-weights": GodotBloom(level_weights=(0.5,) * 7, format="rgba32float"),
+    "godot-linear": GodotBloom(bicubic=False, level_weights=(0.5,) * 7, format="rgba32float"),
+    "blender-maximum": BlenderGlare(maximum=4.0),
+    "blender-half": BlenderGlare(bloom_scale=0.5, maximum=3.0, format="rgba32float"),
+    "pygfx-karis": PygfxBloom(karis_average=True, bloom_scale=0.7),
+    "pygfx-narrow": PygfxBloom(filter_radius=0.0, levels=4, format="rgba32float"),
+    "pygfx-wide": PygfxBloom(filter_radius=0.2, levels=4, format="rgba32float"),
+    "convolution-edge": Convolution(KERNEL, boundary="edge"),
+    "convolution-knee": Convolution(
+        KERNEL, threshold=0.2, knee=0.5, composite="mix", intensity=0.5
+    ),
+    "convolution-fixed": Convolution(psf.spencer(), bloom_size=(20, 31)),
+}

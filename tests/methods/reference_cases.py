@@ -7,28 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-
-from vkbloom import DualKawase, Pyramid, Separable
 
 Array = NDArray[np.float64]
 
 TUTORIAL_SUM = 0.227027 + 3 * (0.1945946 + 0.1216216 + 0.054054 + 0.016216)
 DEFERRED = (0.175713, 0.121703, 0.065984, 0.028002, 0.0093)
-
-METHODS = [
-    pytest.param(Separable(), id="separable"),
-    pytest.param(Separable(blur_scale=1.7, texel="x", first_tap=0), id="outline"),
-    pytest.param(Separable(loops=2, layers=((1.0, 1.0), (2.0, 0.5))), id="loops-layers"),
-    pytest.param(Separable(direct=True), id="direct"),
-    pytest.param(Pyramid(), id="pyramid"),
-    pytest.param(Pyramid(levels=3, radius=1.4), id="pyramid-radius"),
-    pytest.param(DualKawase(), id="dual-kawase"),
-    pytest.param(DualKawase(levels=2, offset=1.6), id="dual-kawase-offset"),
-]
-FIREFLY = pytest.param(Pyramid(levels=3, firefly_filter=True), id="firefly")
 
 
 def assert_close(actual: Any, expected: Any) -> None:
@@ -42,12 +27,6 @@ def random_image(height: int, width: int, channels: int = 3, seed: int = 1) -> A
 
 def flat(value: float, height: int = 12, width: int = 16, channels: int = 3) -> Array:
     return np.full((height, width, channels), value)
-
-
-def impulse(height: int, width: int, y: int, x: int) -> Array:
-    image = np.zeros((height, width, 1))
-    image[y, x] = 1
-    return image
 
 
 # Slow loops: one pixel, one tap, one texel at a time, in normalized coordinates

@@ -66,24 +66,6 @@ def check_adjoint(frame: Any, found: Any, image: Any, cotangent: Any) -> None:
     assert abs(forward.sum() - backward.sum()) < 1e-6 * np.abs(backward).sum()
 
 
-@pytest.mark.usefixtures("software")
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_halos_and_ghosts_are_transposed(monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
-    random = np.random.default_rng(VARIANTS.index(variant))
-    with Renderer("software", validation=True) as renderer:
-        for seed in range(8):
-            stage = flare(random)
-            alpha = random.random() < 0.3
-            settings = Pyramid(levels=1, glare=(stage,), alpha="blur" if alpha else "keep")
-            height, width = map(int, random.choice(SIDES, 2))
-            image = random_image(height, width, channels=4 if alpha else 3, seed=seed).astype(
-                np.float32
-            )
-            _, found, cotangents = both(renderer, settings, image, stage.stage)
-            check(found, reference.vjp(image, settings)[1](cotangents), "image")
-
-
 def sums_of(renderer: Renderer, image: Any, settings: Any) -> Any:
     """The passes that gather samples of ghosts and halos."""
     source = Inputs(image).source((image,))
@@ -145,21 +127,25 @@ def blender(random: np.random.Generator, type: Any) -> BlenderGlare:
     return BlenderGlare(type=type, **given)
 
 
+def of_flare(random: np.random.Generator) -> Pyramid:
+    alpha: Any = "blur" if random.random() < 0.3 else "keep"
+    return Pyramid(levels=1, glare=(flare(random),), alpha=alpha)
+
+
 @pytest.mark.usefixtures("software")
-@pytest.mark.parametrize("type", ["simple_star", "sun_beams"])
+@pytest.mark.parametrize("kind", ["flare", "simple_star", "sun_beams"])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_stars_and_beams_are_transposed(
-    monkeypatch: pytest.MonkeyPatch, variant: str, type: str
-) -> None:
+def test_glare_is_transposed(monkeypatch: pytest.MonkeyPatch, variant: str, kind: str) -> None:
     monkeypatch.setenv("VKBLOOM_VARIANT", variant)
     random = np.random.default_rng(VARIANTS.index(variant))
     with Renderer("software", validation=True) as renderer:
-        for seed in range(12):
-            settings = blender(random, type)
+        for seed in range(10):
+            settings: Any = of_flare(random) if kind == "flare" else blender(random, kind)
             height, width = map(int, random.choice(SIDES, 2))
             channels = 4 if settings.alpha == "blur" else 3
             image = random_image(height, width, channels=channels, seed=seed).astype(np.float32)
-            _, found, cotangents = both(renderer, settings, image, "bloom")
+            name = settings.glare[0].stage if kind == "flare" else "bloom"
+            _, found, cotangents = both(renderer, settings, image, name)
             check(found, reference.vjp(image, settings)[1](cotangents), "image")
 
 

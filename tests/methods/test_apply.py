@@ -5,7 +5,6 @@ Formats, presets and last passes are cases of the self-test (tests/device/test_s
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -64,37 +63,6 @@ def test_reference_of_a_large_image(renderer: Renderer) -> None:
     assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
-@pytest.mark.parametrize(
-    ("method", "dtype", "channels"),
-    by_turns(["tutorial", "pyramid", "dual-kawase"], DTYPES, turns=[3, 4]),
-)
-def test_names_shapes_and_dtypes(
-    renderer: Renderer, method: str, dtype: str, channels: int
-) -> None:
-    image = hdr_picture(40, 24, channels, dtype)
-    frames = renderer.apply(image, METHODS[method])
-    # The level of 1 x 1, after 2 x 1, is not part of the chain.
-    downs = {"down_0": (12, 20), "down_1": (6, 10), "down_2": (3, 5), "down_3": (1, 2)}
-    chain = {**downs, "up_2": (3, 5), "up_1": (6, 10), "up_0": (12, 20)}
-    blurs = {
-        "tutorial": {"blur_vertical": (24, 40)},
-        "pyramid": chain,
-        "dual-kawase": chain,
-    }[method]
-    shapes = {"glow": (24, 40), **blurs, "bloom": (24, 40)}
-    assert {name: array.shape for name, array in frames.items()} == {
-        **{name: (*shape, 4) for name, shape in shapes.items()},
-        "final": (24, 40, channels),
-    }
-    assert list(frames) == [*shapes, "final"]
-    assert {array.dtype.name for array in frames.values()} == {dtype}
-
-
-def test_direct_has_no_vertical_blur(renderer: Renderer) -> None:
-    frames = renderer.apply(hdr_picture(9, 5, 3, "uint8"), Separable(direct=True))
-    assert list(frames) == ["glow", "bloom", "final"]
-
-
 def test_no_settings_are_bevys(renderer: Renderer) -> None:
     image = hdr_picture(40, 20, 3, "uint8")
     assert renderer.apply(image).settings == presets["bevy_natural"]
@@ -115,30 +83,6 @@ def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -
     bloom = renderer.apply(image, settings, framebuffers="bloom")["bloom"][..., :3]
     expected = np.full(bloom.shape, gain * float(real(image)[0, 0, 0]))
     assert_close("bloom", bloom, expected, tolerance(dtype, expected, stages_of_8_bits=2))
-
-
-@pytest.mark.parametrize(
-    ("threshold", "knee", "other"),
-    by_turns(
-        [0.0, 0.5, 0.9, 1.5],
-        [0.0, 0.25, 1.0],
-        turns=itertools.product(["float16", "float32"], ["fractional", "pyramid", "dual-kawase"]),
-    ),
-)
-def test_gain_passes_the_threshold(
-    renderer: Renderer, threshold: float, knee: float, other: tuple[str, str]
-) -> None:
-    dtype, method = other
-    settings = METHODS[method].replace(threshold=threshold, knee=knee)
-    bloom = renderer.apply(flat(1, dtype), settings, framebuffers="bloom")["bloom"][..., :3]
-    expected = np.full(bloom.shape, reference.gain(settings))
-    assert_close("bloom", bloom, expected, tolerance(dtype, expected))
-
-
-def test_white_is_not_above_a_threshold_of_one(renderer: Renderer) -> None:
-    for dtype, white in {"uint8": 255, "float16": 1, "float32": 1}.items():
-        glow = renderer.apply(flat(white, dtype), Separable(threshold=1.0))["glow"]
-        assert not glow[..., :3].any(), dtype
 
 
 # --- Composite, exposure, tone map, encoding ---
@@ -175,21 +119,6 @@ def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, compos
 def test_exposure(renderer: Renderer, dtype: str, tonemap: Any, exposure: float) -> None:
     settings = Separable(tonemap=tonemap, exposure=exposure, intensity=0.5)
     assert_composite(renderer, bright(dtype), settings)
-
-
-@pytest.mark.parametrize(
-    ("intensity", "composite", "dtype"),
-    by_turns([0.0, 0.04, 1.0, 1000.0], COMPOSITES, turns=DTYPES),
-)
-def test_intensity(renderer: Renderer, dtype: str, composite: Any, intensity: float) -> None:
-    settings = Separable(composite=composite, intensity=intensity, blur_strength=0.5)
-    assert_composite(renderer, bright(dtype), settings)
-    image = bright(dtype)
-    final = renderer.apply(image, settings, framebuffers="final")["final"]
-    if intensity == 0:
-        # Nothing of the bloom comes in; screen costs a rounding, 1 - (1 - s).
-        limit = 0.0 if composite != "screen" else tolerance(dtype, real(image)) / 2
-        assert_close("final", final, real(image), limit)
 
 
 @pytest.mark.parametrize(

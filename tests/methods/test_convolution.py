@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,12 +94,6 @@ def test_convolution(
     assert_close(renderer, image_of(*size), settings)
 
 
-@pytest.mark.parametrize("dtype", ["float16", "uint8"])
-def test_formats(renderer: Renderer, dtype: str) -> None:
-    settings = Convolution(kernel_of(9, 5), threshold=0.2, knee=0.5, composite="mix", intensity=0.5)
-    assert_close(renderer, image_of(40, 23, 4, dtype), settings)
-
-
 def test_long_lines(renderer: Renderer) -> None:
     """Lines of more than 1024 elements have larger radices, of more than 4096 three stages."""
     assert_close(renderer, image_of(4201, 3), Convolution(kernel_of(101, 2), boundary="edge"))
@@ -143,39 +137,6 @@ def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
     image = np.zeros((1, 16000, 3), np.float32)
     passes = gpu.plan(image, Convolution(kernel_of(3, 1))).passes
     assert "lines" not in [each.variant for each in passes]
-
-
-def test_other_sizes(renderer: Renderer) -> None:
-    """The kernel is resampled to the bloom buffers, and the bloom enlarged."""
-    image = image_of(61, 34)
-    for scale in (0.5, 2.0):
-        assert_close(renderer, image, Convolution(kernel_of(9, 8), bloom_scale=scale))
-    assert_close(renderer, image, Convolution(psf.spencer(), bloom_size=(20, 31)))
-
-
-def test_alpha_and_mask(renderer: Renderer) -> None:
-    image = np.clip(image_of(31, 22, 4), 0, 1)
-    mask = np.random.default_rng(3).random((22, 31), np.float32)
-    settings = Convolution(kernel_of(5, 7), alpha="blur")
-    frames = renderer.apply(image, settings, mask=mask)
-    expected = reference.apply(image, settings, mask=mask)
-    for name in ("bloom", "final"):
-        np.testing.assert_allclose(frames[name], expected[name], atol=1e-5)
-
-
-def test_emission_and_the_largest_alpha(renderer: Renderer) -> None:
-    """The bloom is that of the emission, and covers where the image is transparent."""
-    image, emission = np.clip(image_of(31, 22, 4), 0, 1), image_of(31, 22, 4)[::-1]
-    settings = Convolution(kernel_of(5, 7), alpha="max")
-    frames = renderer.apply(image, settings, emission=emission)
-    expected = reference.apply(image, settings, emission=emission)
-    assert list(frames) == list(expected)
-    for name, array in frames.items():
-        np.testing.assert_allclose(array, expected[name], atol=1e-5, err_msg=name)
-    # The emission and the alpha count.
-    assert np.abs(frames["final"] - renderer.apply(image, settings)["final"]).max() > 0.1
-    kept = renderer.apply(image, settings.replace(alpha="keep"), emission=emission)["final"]
-    assert (frames["final"][..., 3] - kept[..., 3]).max() > 0.1
 
 
 def test_prefilter(renderer: Renderer) -> None:
@@ -274,30 +235,6 @@ def test_gain() -> None:
     gains = reference.gain(Convolution([[[1, 2, 3]]], normalize=False))
     np.testing.assert_allclose(gains, [1, 2, 3])
     np.testing.assert_allclose(reference.gain(Convolution(kernel_of(3, 3))), 1)
-
-
-def test_a_flat_image(renderer: Renderer) -> None:
-    """Keeps its value where the boundary is an edge."""
-    image = np.full((9, 14, 3), 0.5, np.float32)
-    bloom = renderer.apply(image, Convolution(kernel_of(20, 9), boundary="edge"))["bloom"]
-    np.testing.assert_allclose(bloom[..., :3], 0.5, atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Convolution(np.ones((2, 2, 4))), r"psf: shape \(2, 2, 4\) is not \(h, w\)"),
-        (lambda: Convolution([[np.nan]]), "psf: some numbers are not finite"),
-        (lambda: Convolution({"psf": "lens"}), "psf: 'lens' is not one of"),
-        (lambda: Convolution(boundary=cast("Any", "mirror")), "boundary: 'mirror' is not one of"),
-        (lambda: Convolution(normalize=cast("Any", 2)), "normalize: 2 is out of range, 0 to 1"),
-        (lambda: Convolution(pixels_per_degree=0), "pixels_per_degree: 0 is out of range"),
-        (lambda: Convolution(kernel_size=(0, 3)), "kernel_size: .* out of range"),
-    ],
-)
-def test_wrong_settings(make: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()
 
 
 def test_a_kernel_without_a_sum(renderer: Renderer) -> None:

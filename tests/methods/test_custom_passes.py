@@ -7,14 +7,13 @@ import shutil
 import struct
 import subprocess
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vkbloom import Renderer, Scene, _core
-from vkbloom._renderer.sources import scene_arguments
+from vkbloom import Renderer, _core
 
 compiler = shutil.which("glslangValidator") or shutil.which("glslang")
 pytestmark = pytest.mark.skipif(compiler is None, reason="needs glslang")
@@ -140,33 +139,6 @@ def test_passes_make_the_bloom(renderer: Renderer, spirv: dict[str, bytes]) -> N
     np.testing.assert_allclose(frames["final"][..., :3], image[..., :3] + bloom / 4, rtol=1e-6)
 
 
-def test_small_bloom_is_enlarged(renderer: Renderer, spirv: dict[str, bytes]) -> None:
-    small = tint(spirv, "bloom", "GLOW", 1, 1, 1, 1, size=(16, 10))
-    frames, _ = run(renderer, np.ones((20, 32, 4), np.float32), Own(small))
-    assert frames["bloom"].shape == (20, 32, 4)
-    np.testing.assert_allclose(frames["bloom"], 1, rtol=1e-6)
-
-
-def test_own_picture_takes_the_place_of_the_frame(
-    renderer: Renderer, spirv: dict[str, bytes]
-) -> None:
-    image = picture()
-    main = tint(spirv, "main", "MAIN", 3, 2, 1, 1)
-    frames, _ = run(renderer, image, Own(main, exposure=1.0))
-    assert list(frames) == ["glow", "main", "final"]
-    np.testing.assert_allclose(frames["final"][..., :3], image[..., :3] * (6, 4, 2), rtol=1e-6)
-
-
-@pytest.mark.parametrize("shading", ["forward", "deferred"])
-def test_passes_read_a_drawn_scene(
-    renderer: Renderer, spirv: dict[str, bytes], shading: Literal["forward", "deferred"]
-) -> None:
-    source = _core.scene_source(*scene_arguments(Scene.ufo(), (32, 20), shading, 0.0))
-    frames, _ = finish(renderer, source, Own(tint(spirv, "bloom", "MAIN", 1, 1, 1, 1)))
-    scene = frames["scene"].astype(np.float32) / (255 if shading == "forward" else 1)
-    np.testing.assert_allclose(frames["bloom"][..., :3], scene[..., :3], rtol=1e-6)
-
-
 def test_compute_pass_has_its_own_groups(renderer: Renderer, spirv: dict[str, bytes]) -> None:
     image = picture(33, 19)
     shader = _core.shader("compute", spirv["compute"])
@@ -187,22 +159,6 @@ def test_gpu_runs_the_compute_shader_of_a_pass_in_its_place(
         with Renderer("software", validation=True) as renderer:
             frames, _ = run(renderer, image, Own(one))
         np.testing.assert_allclose(frames["bloom"], expected, rtol=1e-6)
-
-
-def test_changed_bytes_run_only_the_passes_after_them(
-    renderer: Renderer, spirv: dict[str, bytes]
-) -> None:
-    image = picture()
-
-    def settings(first: float, second: float) -> Own:
-        return Own(
-            tint(spirv, "first", "GLOW", *[first] * 4), tint(spirv, "bloom", "first", *[second] * 4)
-        )
-
-    run(renderer, image, settings(1, 1))
-    assert set(run(renderer, image, settings(1, 2))[1]) == {"bloom", "final"}
-    assert not run(renderer, image, settings(1, 2))[1]
-    assert set(run(renderer, image, settings(3, 2))[1]) == {"first", "bloom", "final"}
 
 
 def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(

@@ -4,19 +4,15 @@ gradient."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
-from tests.framebuffers import read
 from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, UnrealBloom, reference
-from vkbloom._cli.program import program
 from vkbloom._scene.textures import Texture
 
 Array = NDArray[Any]
@@ -59,38 +55,6 @@ def test_the_noise_is_the_hash_of_place_and_seed(renderer: Renderer, seed: int) 
     assert (shown[..., 3] == 101).all()
 
 
-def test_the_noise_is_the_same_again_and_another_with_another_seed(
-    new_renderer: Callable[[], Renderer], renderer: Renderer
-) -> None:
-    image = flat((64, 64), 3)
-    first = final(renderer, image, HALVED)
-    np.testing.assert_array_equal(final(new_renderer(), image, HALVED), first)
-    second = final(renderer, image, HALVED.replace(dither_seed=1))
-    # Half of them by chance: 3 sigma of 12288 throws of a coin are 1.4 %.
-    assert (first != second)[..., :3].mean() == pytest.approx(0.5, abs=0.014)
-    assert (first[..., 0] != first[..., 1]).mean() == pytest.approx(0.5, abs=0.024)
-
-
-@pytest.mark.parametrize("exposure", [-3.0, -1.0, -0.3])
-def test_the_mean_is_the_value(renderer: Renderer, exposure: float) -> None:
-    size = (256, 256)
-    for level in (1, 77, 254):
-        shown = final(renderer, flat(size, level), HALVED.replace(exposure=exposure))
-        exact = level * 2.0**exposure
-        # 4 sigma of the mean of 196608 roundings, half a level each at the most.
-        assert shown[..., :3].mean() == pytest.approx(exact, abs=4 * 0.5 / math.sqrt(196608))
-        assert set(np.unique(shown[..., :3])) <= {math.floor(exact), math.floor(exact) + 1}
-
-
-def test_neighbours_are_independent(renderer: Renderer) -> None:
-    shown = final(renderer, flat((256, 256), 101), HALVED)[..., :3].astype(float) - 50.5
-    for axis in (0, 1):
-        for distance in (1, 2, 8, 64):
-            moved = np.roll(shown, distance, axis)
-            # Products of +-1/2 are +-1/4; 4.5 sigma of the mean of 196608 of them.
-            assert abs((shown * moved).mean()) < 4.5 * 0.25 / math.sqrt(196608)
-
-
 # What it leaves alone
 
 
@@ -99,12 +63,6 @@ def test_levels_of_8_bits_stay(renderer: Renderer) -> None:
     for image in (ramp, np.tile(ramp, (8, 8, 1))):
         shown = final(renderer, image, Separable(bloom=False, dither=True))
         np.testing.assert_array_equal(shown, image)
-
-
-def test_black_and_white_stay(renderer: Renderer) -> None:
-    for level, exposure in ((0, 5.0), (255, 5.0), (200, 30.0)):
-        shown = final(renderer, flat((64, 64), level), HALVED.replace(exposure=exposure))
-        assert (shown[..., :3] == (255 if level else 0)).all()
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
@@ -206,20 +164,3 @@ def test_the_reference_dithers_alike(renderer: Renderer, settings: Settings, cha
 
 
 # The command line
-
-
-def test_the_command_line_dithers(tmp_path: Any) -> None:
-    words = ["render", "--size", "64x36", "--shading", "deferred"]
-    words += ["--framebuffers", "final"]
-    for name, more in (("plain", []), ("a", ["--dither"]), ("b", ["--dither-seed", "5"])):
-        extra = [*more, "--dither"] if name == "b" else more
-        result = CliRunner().invoke(program, [*words, *extra, "-o", str(tmp_path / f"{name}.png")])
-        assert result.exit_code == 0, result.output
-    plain, first, second = (
-        read(tmp_path / f"{name}.png")[""].pixels.astype(int) for name in ("plain", "a", "b")
-    )
-    for one, other in ((plain, first), (plain, second), (first, second)):
-        assert np.abs(one - other).max() == 1
-    result = CliRunner().invoke(program, [*words, "--dither-seed", "70000", "-o", "x.png"])
-    assert result.exit_code == 2
-    assert "dither_seed" in result.output

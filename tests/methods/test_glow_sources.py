@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,81 +10,21 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import by_turns
 from tests.images import hdr_picture, picture
+from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
-    BevyBloom,
-    BlenderGlare,
-    DualKawase,
-    FilamentBloom,
-    GodotBloom,
-    HdrpBloom,
-    KinoBloom,
     PygfxBloom,
     Pyramid,
     Renderer,
     Scene,
     Separable,
     Settings,
-    UnrealBloom,
-    UrpBloom,
     reference,
 )
 from vkbloom._explorer.viewer import Viewer
 
 Image = NDArray[Any]
-
-
-class Case(NamedTuple):
-    settings: Settings
-    given: tuple[str, ...]
-    dtype: str = "float32"
-    size: tuple[int, int] = (61, 47)
-
-
-BOTH = ("mask", "emission")
-
-# Every method with its threshold, every formula of alpha and mix, every way to a smaller bloom;
-# sizes of which some levels are exactly half of the one before.
-CASES: dict[str, Case] = {
-    "separable": Case(Separable(threshold=0.3, knee=0.5, composite="mix"), ("mask",)),
-    "separable-fused": Case(Separable(threshold=0.30001), BOTH, "uint8", (64, 48)),
-    "separable-half": Case(Separable(bloom_scale=0.5, alpha="blur"), ("mask",)),
-    "separable-layers": Case(
-        Separable(layers=((1.0, 1.0), (2.0, 0.5)), alpha="blur", blur_strength=0.5),
-        ("emission",),
-        "float16",
-    ),
-    "separable-direct": Case(Separable(direct=True, alpha="max"), ("mask",), "uint8", (31, 17)),
-    "separable-loops": Case(Separable(loops=2, blur_scale=1.7, alpha="blur"), (), "uint8"),
-    "pyramid": Case(
-        Pyramid(levels=3, threshold=0.3, composite="mix"), ("mask",), "float16", (64, 48)
-    ),
-    "pyramid-alpha": Case(Pyramid(levels=3, alpha="blur"), ("mask",), "float32", (64, 48)),
-    "pyramid-firefly": Case(Pyramid(firefly_filter=True, alpha="blur"), BOTH, "uint8"),
-    "pyramid-max": Case(Pyramid(levels=2, alpha="max", exposure=1.0), ("emission",), size=(64, 48)),
-    "pyramid-weights": Case(
-        Pyramid(levels=3, level_weights=(0.2, 0.5, 0.4), format="rgba16float", alpha="blur"),
-        ("mask",),
-        "uint8",
-    ),
-    "dual-kawase": Case(DualKawase(levels=3, threshold=0.30001, alpha="blur"), ("mask",)),
-    "kino": Case(KinoBloom(threshold=0.5, alpha="blur"), ("mask",)),
-    "bevy": Case(BevyBloom(threshold=0.3, max_mip_dimension=32, alpha="blur"), ("mask",)),
-    "bevy-emission": Case(BevyBloom(max_mip_dimension=32), ("emission",), "float16"),
-    "filament": Case(FilamentBloom(threshold=0.4, resolution=16, alpha="blur"), ("mask",)),
-    "filament-near": Case(FilamentBloom(resolution=48, alpha="max"), BOTH),
-    "urp": Case(UrpBloom(threshold=0.5, clamp_max=3.0, alpha="blur"), ("mask",)),
-    "hdrp": Case(HdrpBloom(composite="mix", alpha="blur"), ("mask",)),
-    "unreal": Case(UnrealBloom(threshold=0.5, alpha="blur"), ("mask",)),
-    "godot": Case(
-        GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"), ("mask",)
-    ),
-    "godot-emission": Case(GodotBloom(composite="mix", alpha="max"), ("emission",), "float16"),
-    "blender": Case(BlenderGlare(threshold=0.5, alpha="blur"), ("mask",)),
-    "pygfx": Case(PygfxBloom(karis_average=True, alpha="blur"), ("mask",)),
-}
 
 
 def image_of(size: tuple[int, int], dtype: str, seed: int = 0) -> Image:
@@ -98,59 +36,14 @@ def image_of(size: tuple[int, int], dtype: str, seed: int = 0) -> Image:
     return image
 
 
-def given_of(case: Case) -> dict[str, Any]:
-    mask = np.random.default_rng(3).random(case.size[::-1], dtype=np.float32)
-    mask[:9, :9] = 0
-    made = {"mask": mask, "emission": image_of(case.size, case.dtype, seed=5)}
-    return {name: made[name] for name in case.given}
-
-
-@pytest.fixture(scope="module")
-def varied(request: pytest.FixtureRequest) -> Iterator[Renderer]:
-    """A renderer that uses one column of the table of variants."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", str(request.param))
-        opened = Renderer(validation=True)
-    with opened:
-        yield opened
-
-
-VARIANTS = ("fragment", "cpu", "gpu")
-# Cases of which a pass replaces several run in all variants.
-FUSED = ("separable", "separable-fused", "pyramid", "pyramid-max")
-
-
-@pytest.mark.parametrize(
-    ("name", "varied"),
-    [
-        *itertools.product(FUSED, VARIANTS),
-        *by_turns([name for name in CASES if name not in FUSED], turns=VARIANTS),
-    ],
-    indirect=["varied"],
-    scope="module",
-)
-def test_against_the_reference(varied: Renderer, name: str) -> None:
-    case = CASES[name]
-    image, given = image_of(case.size, case.dtype), given_of(case)
-    frames = varied.apply(image, case.settings, **given)
-    assert_matches_reference(frames, image, case.settings, **given)
-    # A fused pass may replace several.
-    varied.apply(image[::-1], case.settings, framebuffers=("glow",), **given)
-    alone = varied.apply(image, case.settings, framebuffers=("final",), **given)
-    assert_array_equal(alone["final"], frames["final"])
-
-
 # One of each method.
-@pytest.mark.parametrize(
-    "name", {case.settings.method: name for name, case in CASES.items()}.values()
-)
+@pytest.mark.parametrize("name", {one.method: name for name, (one, _) in GIVEN.items()}.values())
 def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
     renderer: Renderer, name: str
 ) -> None:
-    case = CASES[name]
-    image = image_of(case.size, case.dtype)
-    settings = case.settings
-    ones = np.ones(case.size[::-1], bool)
+    settings, _ = GIVEN[name]
+    image = image_of((61, 47), "float32")
+    ones = np.ones(image.shape[:2], bool)
     plain, full = renderer.apply(image, settings), renderer.apply(image, settings, mask=ones)
     for framebuffer in plain:
         assert_array_equal(full[framebuffer], plain[framebuffer], framebuffer)
@@ -185,33 +78,6 @@ def test_mix_takes_from_the_scene_what_the_bloom_came_of(
         assert_allclose(lit["final"], image + 0.25 * emission, rtol=1e-5)
 
 
-def test_an_emission_takes_the_place_of_the_image(renderer: Renderer) -> None:
-    image, emission = picture(33, 17, 4), 3 * picture(33, 17, 4, seed=2)
-    settings = Pyramid(levels=2, threshold=1.0)
-    lit, own = (
-        renderer.apply(image, settings, emission=emission),
-        renderer.apply(emission, settings),
-    )
-    for name in ("glow", "down_0", "bloom"):
-        assert_array_equal(lit[name], own[name], name)
-    expected = image[..., :3] + lit["bloom"][..., :3]
-    assert_allclose(lit["final"][..., :3], expected, rtol=1e-6)
-    assert_array_equal(lit["final"][..., 3], image[..., 3])
-
-
-@pytest.mark.parametrize("composite", ["add", "mix", "screen"])
-def test_alpha_max(renderer: Renderer, composite: Any) -> None:
-    image = flat(0.5, 2.0, 0.25, 0.125)
-    settings = Pyramid(levels=1, alpha="max", composite=composite, intensity=0.2)
-    settings = settings.replace(exposure=3.0, tonemap="reinhard", encoding="srgb")
-    # i b, before exposure and curve.
-    assert_allclose(renderer.apply(image, settings)["final"][..., 3], 0.4, rtol=1e-5)
-    high = settings.replace(intensity=2.0)
-    assert_array_equal(renderer.apply(image, high)["final"][..., 3], 1.0)
-    low = settings.replace(intensity=0.01)
-    assert_array_equal(renderer.apply(image, low)["final"][..., 3], np.float32(0.125))
-
-
 def test_alpha_blur(renderer: Renderer) -> None:
     image = flat(0.5, 0.25, 0.25, 0.5)
     settings = Pyramid(levels=1, alpha="blur", intensity=0.5)
@@ -224,13 +90,6 @@ def test_alpha_blur(renderer: Renderer) -> None:
     dark = renderer.apply(image, settings.replace(threshold=1.0))
     assert not dark["bloom"].any()
     assert_array_equal(dark["final"], image)
-
-
-def test_alpha_blur_of_a_grey_image_blurs_alpha_like_its_colours(renderer: Renderer) -> None:
-    image = np.repeat(picture(31, 21, 1), 4, axis=2)
-    for settings in (Separable(), Pyramid(firefly_filter=True), KinoBloom(), HdrpBloom()):
-        bloom = renderer.apply(image, settings.replace(alpha="blur"))["bloom"]
-        assert_allclose(bloom[..., 3], bloom[..., 0], rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("alpha", ["max", "blur"])
@@ -250,16 +109,6 @@ def test_scenes_ignore_alpha(renderer: Renderer, scene: Scene) -> None:
     blurred = renderer.render(scene, Pyramid(levels=2, alpha="blur"), (48, 32))
     for name in plain:
         assert_array_equal(blurred[name], plain[name], name)
-
-
-def test_masked_buffers_of_rg11b10(renderer: Renderer) -> None:
-    image = picture(33, 17, 4)
-    mask = np.random.default_rng(4).random((17, 33)) < 0.5
-    settings = Pyramid(levels=2, format="rg11b10ufloat")
-    masked = renderer.apply(image, settings, mask=mask)
-    lit = renderer.apply(image, settings, emission=image * mask[..., np.newaxis])
-    for name in lit:
-        assert_array_equal(masked[name], lit[name], name)
 
 
 # --- What is given ---

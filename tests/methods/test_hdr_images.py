@@ -1,4 +1,4 @@
-"""Bloom on real HDR images: equal to the reference, and without visible artefacts."""
+"""Bloom on real HDR images, without visible artefacts."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
-from tests.exhaustive import by_turns
-from tests.tolerance import assert_close, assert_matches_reference, tolerance
-from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings
 
 Image = NDArray[Any]
 Array = NDArray[np.float64]
@@ -57,28 +55,6 @@ def apply(renderer: Renderer, image: Image, settings: Settings) -> dict[str, Arr
     """Return the colours of all framebuffers as float64."""
     frames = renderer.apply(image, settings)
     return {name: array[..., :3].astype(np.float64) for name, array in frames.items()}
-
-
-@pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=["float16", "float32"]))
-def test_reference(renderer: Renderer, photo: Image, method: str, dtype: str) -> None:
-    settings = METHODS[method]
-    # The part around its brightest pixel, so that the reference is quick.
-    image = crop(photo, 5).astype(dtype)
-    frames = renderer.apply(image, settings)
-    # The files hold neither NaN nor infinity, and none comes in.
-    assert (frames.info["nan"], frames.info["inf"]) == (0, 0)
-    assert_matches_reference(frames, image, settings)
-
-
-@pytest.mark.parametrize("tonemap", ["reinhard", "aces", "khronos_neutral", "agx"])
-def test_reference_tone_mapped(renderer: Renderer, photo: Image, tonemap: Any) -> None:
-    settings = Pyramid(
-        threshold=1.0, composite="mix", intensity=0.2, tonemap=tonemap, encoding="srgb"
-    )
-    image = crop(photo, 4)
-    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
-    expected = reference.composite(image, frames["bloom"], settings)
-    assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
 
 
 # Of a chain's small level, the texels beyond the edge are the edge's, and so a mirror of them.

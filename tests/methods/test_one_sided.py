@@ -142,7 +142,7 @@ def has_a_median(settings: Any) -> bool:
     return bool(getattr(settings, "anti_flicker", False))
 
 
-def check_points(number: int, renderer: Renderer | None, count: int) -> int:
+def check_points(number: int, count: int) -> int:
     """Check derivatives at points of some settings; return how many there were."""
     random = np.random.default_rng(number)
     settings = SETTINGS[number].replace(format="rgba32float")
@@ -153,34 +153,23 @@ def check_points(number: int, renderer: Renderer | None, count: int) -> int:
             image = image + random.random(image.shape) / 8
         image = image.astype(np.float32).astype(np.float64)
         frames, pullback = reference.vjp(image, settings)
-        pulled = renderer and vkbloom.vjp(image.astype(np.float32), settings, renderer=renderer)[1]
         for _ in range(DIRECTIONS):
             given, direction = cotangents(random, frames), moved(random, image.shape)
             derivative = pullback(given)["image"]
             assert np.isfinite(derivative).all()
             expected, size = slope(image, settings, given, direction)
-            found = [(derivative, 3e-5)]
-            if pulled:
-                singles = {name: part.astype(np.float32) for name, part in given.items()}
-                found.append((pulled(singles)["image"].astype(np.float64), 1e-4))
-                assert np.isfinite(found[1][0]).all()
-            for one, tolerance in found if expected is not None else ():
+            if expected is not None:
                 # After transforms, values count as 0 up to the rounding of the largest one.
-                rounding = 2.0**-23 * np.abs(one).max() * np.abs(direction).sum()
-                limit = tolerance * size + rounding
-                assert abs((one * direction).sum() - expected) <= limit, settings
+                rounding = 2.0**-23 * np.abs(derivative).max() * np.abs(direction).sum()
+                off = abs((derivative * direction).sum() - expected)
+                assert off <= 3e-5 * size + rounding, settings
             seen += expected is not None
     return seen
 
 
 @pytest.mark.parametrize("number", some(range(len(SETTINGS)), 24))
 def test_reference_has_the_differences_to_both_sides(number: int) -> None:
-    assert check_points(number, None, POINTS if EXHAUSTIVE else 1)
-
-
-@pytest.mark.parametrize("number", some(range(len(SETTINGS)), 4))
-def test_renderer_has_the_differences_to_both_sides(renderer: Renderer, number: int) -> None:
-    check_points(number, renderer, POINTS if EXHAUSTIVE else 1)
+    assert check_points(number, POINTS if EXHAUSTIVE else 1)
 
 
 CHAINS: tuple[Any, ...] = (

@@ -19,8 +19,6 @@ from vkbloom._cli import fields
 from vkbloom._cli.program import program
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._explorer.controls import as_code, controls, settings_from
-from vkbloom._fit.space import space_of
-from vkbloom._grid.axes import read_axes
 from vkbloom._settings.fields import fields_of, number_field
 from vkbloom._settings.registry import METHODS
 
@@ -116,27 +114,6 @@ class TestRegistered:
     def test_code_makes_it_again(self) -> None:
         settings = HazeBloom(haze=2.0, threshold=1.0)
         assert eval(as_code(settings), {"HazeBloom": HazeBloom}) == settings
-
-    def test_grids_vary_its_fields(self) -> None:
-        haze, radius = read_axes(HazeBloom(), {"haze": [0, 1.5], "radius": [5, 6]}, has_time=False)
-        assert haze.values == (0.0, 1.5)
-        assert haze.attributes["description"] == "Share of the light, 0 to 3"
-        assert (haze.unit, radius.unit) == ("1", "pixel")
-        with pytest.raises(ValueError, match="haze: 4 is out of range, 0 to 3"):
-            read_axes(HazeBloom(), {"haze": [4]}, has_time=False)
-
-    def test_fits_vary_its_fields(self) -> None:
-        space = space_of(HazeBloom(), ["haze", "shape"], {}, brightest=10.0, height=100)
-        haze, shape = space.axes
-        assert (haze.kind, haze.low, haze.high) == ("number", 0, 3)
-        assert shape.choices == ("round", "square")
-        assert space.settings(np.array([1.0, 1.0])) == HazeBloom(haze=3, shape="square")
-
-    def test_json_stores_it(self) -> None:
-        settings = HazeBloom(haze=2, glare="anamorphic")  # type: ignore[arg-type]
-        assert Settings.from_json(settings.to_json()) == settings
-        spread = psf.measured(HazeBloom(), (8, 8))
-        assert psf.PSF.from_json(spread.to_json()) == spread
 
     def test_the_reference_computes_it(self) -> None:
         image = np.full((4, 6, 3), 0.25)

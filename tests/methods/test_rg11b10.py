@@ -17,7 +17,6 @@ from vkbloom import (
     GodotBloom,
     Pyramid,
     Renderer,
-    Scene,
     Separable,
     Settings,
     reference,
@@ -139,16 +138,3 @@ def test_engines_round_their_levels_alone(renderer: Renderer, name: str) -> None
         assert_array_equal(rounded(values), values, err_msg=level)
     bloom = frames["bloom"][..., :3].astype(np.float64)
     assert not np.array_equal(rounded(bloom), bloom)
-
-
-@pytest.mark.parametrize("shading", ["forward", "deferred"])
-@pytest.mark.parametrize("name", ["tutorial", "jimenez2014", "bevy_natural", "godot_4_6"])
-def test_of_a_scene(renderer: Renderer, name: str, shading: Any) -> None:
-    settings = LOW[name].replace(format="rg11b10ufloat")
-    frames = renderer.render(Scene.ufo(), settings, (80, 45), shading=shading)
-    assert frames["bloom"].dtype == np.float32
-    assert frames["bloom"].max() > 0
-    if shading == "forward":
-        expected = reference.passes(frames["glow"], settings, (80, 45))["bloom"]
-        difference = np.abs(frames["bloom"] - expected)[..., :3]
-        assert difference.mean() <= 2e-3 * expected[..., :3].mean()

@@ -78,14 +78,6 @@ def test_a_value_is_a_level_off_at_most(renderer: Renderer, settings: Settings) 
         assert difference.mean() <= 0.02 * STEP, name
 
 
-def test_sums_are_clamped_as_in_pygfx(renderer: Renderer) -> None:
-    """Six levels of 0.5 add up to 3, of which a level holds 1."""
-    image = np.full((64, 64, 3), 0.5, np.float32)
-    frames = renderer.apply(image, PygfxBloom(format=FORMAT))
-    assert_allclose(frames["up_0"][..., :3], 1, atol=1e-6)
-    assert_allclose(frames["bloom"][..., :3], 1, atol=1e-6)
-
-
 def test_of_a_published_method_the_bloom_is_not_rounded(renderer: Renderer) -> None:
     frames = renderer.apply(0.1 * lights((67, 45)), PygfxBloom(format=FORMAT))
     is_level = {

@@ -1,99 +1,32 @@
-"""All variants of passes give the same picture: each is compared with the reference and the
-others."""
+"""What the variants of passes run, and large images in them; test_matrix.py has their pictures."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.exhaustive import EXHAUSTIVE, by_turns
+from tests.exhaustive import EXHAUSTIVE
 from tests.framebuffers import assert_same
 from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS
-from tests.tolerance import assert_matches_reference, real, tolerance
+from tests.methods.cases import OTHERS, WHOLE
+from tests.tolerance import assert_matches_reference, tolerance
 from vkbloom import (
     BevyBloom,
     Convolution,
-    DualKawase,
-    FilamentBloom,
     Frames,
-    HdrpBloom,
     Pyramid,
     Renderer,
     Scene,
     Separable,
-    Settings,
-    UnrealBloom,
-    gaussian_weights,
     presets,
 )
 from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
 
 VARIANTS = ("fragment", "cpu", "gpu")
-
-# Sides that are multiples of the variants' strips and tiles, and some that are not; levels of
-# exactly half the size, and others.
-SIZES = ((97, 61), (136, 144))
-
-# A pass of N x N taps has no variants except as a compute shader, and is slow.
-TWO_PASSES = [name for name in METHODS if not name.startswith("direct")]
-
-# For these a fused pass may replace several if only `final` is requested.
-WHOLE: dict[str, Settings] = {
-    "tutorial": Separable(),
-    "threshold": Separable(threshold=0.3, knee=0.5, composite="screen", intensity=0.7),
-    # (Without encoding: near black, the curve turns one level of the bloom into many.)
-    "hard": Separable(threshold=0.30001, tonemap="aces"),
-    "fractional": Separable(blur_scale=0.63, composite="mix", intensity=0.4),
-    "wide": Separable(weights=gaussian_weights(4.0, 12), blur_strength=1.0, exposure=-1.0),
-    "outline": Separable(first_tap=0, blur_strength=0.4, texel="x", dither=True, dither_seed=3),
-    "pyramid": Pyramid(levels=4, threshold=0.2, tonemap="reinhard", encoding="gamma22"),
-    "pyramid-radius": Pyramid(levels=3, radius=0.6, exposure=0.5),
-}
-
-# Methods with the same bits in every variant: all but blurs into another size, for which some
-# variants add the taps before the filter.
-BIT_EQUAL = {
-    **WHOLE,
-    "layers": METHODS["layers"],
-    "loops": Separable(loops=3, blur_scale=1.1),
-    "long": METHODS["longest"],
-    "still": METHODS["still"],
-    "kawase": METHODS["dual-kawase-offset"],
-    "kawase-near": DualKawase(levels=2, threshold=0.3, knee=0.5),
-    "kawase-far": DualKawase(levels=2, threshold=0.3, offset=3.5),
-    # Levels that are smaller than the images here.
-    "bevy": BevyBloom(max_mip_dimension=32),
-    "filament": FilamentBloom(resolution=32),
-    "hdrp": HdrpBloom(),
-}
-
-# Methods with a blur into another size, and Fourier transforms, whose stages differ.
-NEARLY_EQUAL: dict[str, Settings] = {
-    "unity_urp": presets["unity_urp"],
-    "threejs_unreal": presets["threejs_unreal"],
-    "node": UnrealBloom(node=True, intensity=1.0),
-    "convolution": Convolution(np.random.default_rng(2).random((4, 5, 3)), boundary="edge"),
-}
-
-
-# Convolutions, and Blender's fog glow, have the same passes but for the kernel.
-PRESETS = [
-    *(
-        presets[name]
-        for name in presets
-        if not isinstance(presets[name], Convolution)
-        and name not in (*NEARLY_EQUAL, "blender_fog_glow")
-    ),
-    presets["godot_4_6"].replace(bloom_size=(50, 31)),
-    presets["blender_bloom"].replace(maximum=4.0),
-    presets["pygfx"].replace(karis_average=True, bloom_scale=0.7),
-]
 
 
 def opened(variant: str) -> Renderer:
@@ -124,124 +57,6 @@ def varied(variant: str, unfused: Renderer) -> Iterator[Renderer]:
         yield renderer
 
 
-# The variant of the fixture `renderer` has the same comparison in test_apply.py.
-@pytest.mark.parametrize("variant", ["fragment", "gpu"], indirect=True, scope="module")
-@pytest.mark.parametrize(
-    ("method", "other"), by_turns(TWO_PASSES, turns=itertools.product(DTYPES, SIZES))
-)
-def test_every_variant_against_the_reference(
-    varied: Renderer, method: str, other: tuple[str, tuple[int, int]]
-) -> None:
-    dtype, size = other
-    image = hdr_picture(*size, 4, dtype)
-    settings = METHODS[method]
-    assert_matches_reference(varied.apply(image, settings), image, settings)
-
-
-# The others have the same bits in every variant, and test_presets.py has their references.
-@pytest.mark.parametrize("name", NEARLY_EQUAL)
-def test_presets_whose_variants_round_differently(varied: Renderer, name: str) -> None:
-    image, settings = hdr_picture(48, 32, 4, "float32"), NEARLY_EQUAL[name]
-    frames = varied.apply(image, settings)
-    assert_matches_reference(frames, image, settings)
-    # Another image in between, so that no result of the first call is cached.
-    varied.apply(image[::-1], settings)
-    alone = varied.apply(image, settings, framebuffers=("final",))
-    np.testing.assert_array_equal(alone["final"], frames["final"])
-
-
-FIRST = pytest.mark.parametrize("variant", VARIANTS[:1], indirect=True, scope="module")
-OTHERS = pytest.mark.parametrize("variant", VARIANTS[1:], indirect=True, scope="module")
-
-
-@FIRST
-@pytest.mark.parametrize(
-    ("name", "other"),
-    by_turns(WHOLE, turns=itertools.product(DTYPES, [(1, 1), (61, 97), (520, 48)])),
-)
-def test_final_alone_is_the_final_of_all(
-    varied: Renderer, name: str, other: tuple[str, tuple[int, int]]
-) -> None:
-    dtype, size = other
-    image = hdr_picture(*size, 4, dtype)
-    settings = WHOLE[name]
-    all_at_once = varied.apply(image, settings)
-    # Another image in between, so that no result of the first call is cached.
-    varied.apply(image[::-1], settings)
-    alone = varied.apply(image, settings, framebuffers=("final",))
-    assert list(alone) == ["final"]
-    np.testing.assert_array_equal(alone["final"], all_at_once["final"])
-    if not settings.dither:
-        # (Dithering makes two levels of a value that differs in its last bit.)
-        assert_matches_reference(all_at_once, image, settings)
-
-
-@OTHERS
-@pytest.mark.parametrize(
-    ("name", "other"),
-    by_turns(
-        BIT_EQUAL,
-        turns=itertools.product([(256, 160), (61, 97), (520, 48), (1, 1)], DTYPES),
-    ),
-)
-def test_every_variant_gives_the_same_bits(
-    varied: Renderer, unfused: Renderer, name: str, other: tuple[tuple[int, int], str]
-) -> None:
-    size, dtype = other
-    image = hdr_picture(*size, 4, dtype)
-    expected = unfused.apply(image, BIT_EQUAL[name])
-    alone = varied.apply(image, BIT_EQUAL[name], framebuffers=("final",))
-    np.testing.assert_array_equal(alone["final"], expected["final"])
-    varied.apply(image[::-1], BIT_EQUAL[name])
-    frames = varied.apply(image, BIT_EQUAL[name])
-    for framebuffer in expected:
-        np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
-
-
-@OTHERS
-@pytest.mark.parametrize(
-    ("settings", "shape"),
-    by_turns(PRESETS, turns=[("uint8", 136, 144), ("float16", 97, 61), ("float32", 136, 144)]),
-)
-def test_presets_have_the_same_bits_in_every_variant(
-    varied: Renderer, unfused: Renderer, settings: Settings, shape: tuple[str, int, int]
-) -> None:
-    dtype, width, height = shape
-    image = hdr_picture(width, height, 4, dtype)
-    expected = unfused.apply(image, settings)
-    alone = varied.apply(image, settings, framebuffers=("final",))
-    np.testing.assert_array_equal(alone["final"], expected["final"])
-    varied.apply(image[::-1], settings)
-    frames = varied.apply(image, settings)
-    for framebuffer in expected:
-        np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
-
-
-@OTHERS
-@pytest.mark.parametrize(
-    ("name", "other"),
-    by_turns(
-        ["tutorial", "threshold", "outline", "pyramid", "long"],
-        turns=itertools.product([(256, 160), (61, 97), (33, 5), (1, 1)], DTYPES),
-    ),
-)
-def test_three_channels_have_the_bits_of_four(
-    varied: Renderer, unfused: Renderer, name: str, other: tuple[tuple[int, int], str]
-) -> None:
-    size, dtype = other
-    image = hdr_picture(*size, 4, dtype)
-    image[..., 3] = 255 if dtype == "uint8" else 1
-    expected = unfused.apply(image, BIT_EQUAL[name])
-    image = np.ascontiguousarray(image[..., :3])
-    alone = varied.apply(image, BIT_EQUAL[name], framebuffers=("final",))
-    np.testing.assert_array_equal(alone["final"], expected["final"][..., :3])
-    varied.apply(image[::-1], BIT_EQUAL[name])
-    frames = varied.apply(image, BIT_EQUAL[name])
-    for framebuffer in expected:
-        right = expected[framebuffer][..., : frames[framebuffer].shape[2]]
-        np.testing.assert_array_equal(frames[framebuffer], right, framebuffer)
-
-
 @pytest.mark.parametrize("name", ["pygfx", "blender_bloom"])
 def test_levels_of_another_format_than_the_frame(varied: Renderer, scene: Scene, name: str) -> None:
     """Half floats, where a deferred frame has 8 bits: the fused last pass is for one format."""
@@ -260,8 +75,8 @@ def test_values_that_are_not_finite(varied: Renderer, dtype: str) -> None:
     image[21, 40, 0] = np.inf
     image[49, 69, 2] = -np.inf
     # (Also passes that read the image itself: into half of its size and into other sizes.)
-    reading = [BIT_EQUAL[name] for name in ("kawase-near", "bevy", "filament", "hdrp")]
-    every = [*WHOLE.values(), *reading]
+    names = ("kawase-near", "bevy", "filament", "hdrp", "convolution-edge")
+    every = [*WHOLE.values(), *(OTHERS[name] for name in names)]
     for settings in every if EXHAUSTIVE else every[dtype == "float16" :: 2]:
         frames = varied.apply(image, settings)
         # Another image in between, so that no result of the first call is cached.
@@ -400,27 +215,6 @@ def test_the_forward_frame(
         # variants only have rounding errors.
         assert off.max() <= (2 if array.dtype == np.uint8 else 0), name
         assert (off > 1).mean() < 1e-5, name
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        Separable(bloom_size=(40, 30), blur_scale=2.0),
-        Separable(bloom_size=(40, 30), format="rgba16float"),
-        Separable(bloom_size=(40, 30), layers=((1.0, 0.5), (2.0, 0.5))),
-        Separable(bloom_scale=2.0),
-        Separable(bloom_size=(300, 20)),
-    ],
-    ids=["scale", "half", "layers", "larger", "wider"],
-)
-def test_blurs_into_other_sizes(varied: Renderer, settings: Settings) -> None:
-    image = hdr_picture(150, 110, 4, "float32")
-    assert_matches_reference(varied.apply(image, settings), image, settings)
-    uint8 = hdr_picture(150, 110, 4, "uint8")
-    alone = varied.apply(uint8, settings, framebuffers=("final",))["final"]
-    expected = reference_apply(uint8, settings)["final"]
-    limit = tolerance(np.uint8, expected, stages_of_8_bits=2)
-    assert np.abs(real(alone) - expected).max() <= limit
 
 
 def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

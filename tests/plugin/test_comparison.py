@@ -77,10 +77,6 @@ class TestFigures:
         assert compare(a, b).identical
         assert compare(a, changed(b, (0, 0, 0), b[0, 0, 0] ^ 1)).max_error == 1 / 65535
 
-    def test_half_against_float(self) -> None:
-        a = noise_image(16, 16, 3, dtype="float16")
-        assert compare(a, a.astype(np.float32)).identical
-
     @pytest.mark.parametrize("dtype", ["uint8", "float32"])
     def test_ssim_and_psnr_are_those_of_scikit_image(self, dtype: str) -> None:
         a = noise_image(40, 50, 4, dtype=dtype)
@@ -120,14 +116,6 @@ class TestFigures:
         expected = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=hdr).get_pixels().mean()
         assert expected > 0.1
         assert compare(a, b).flip == pytest.approx(expected, rel=1e-5)
-
-    def test_flip_of_8_bits_sees_what_the_eye_sees(self) -> None:
-        # The published extremes: nothing between equals, near 1 from black to white.
-        black = np.zeros((32, 32, 3), np.uint8)
-        found = compare(black, np.full_like(black, 255))
-        assert found.flip is not None
-        assert 0.9 < found.flip <= 1
-        assert compare(black, np.full_like(black, 1)).flip < 0.1  # type: ignore[operator]
 
     def test_alpha_counts_but_for_flip(self) -> None:
         a = noise_image(16, 16, 4)
@@ -232,6 +220,10 @@ class TestFigures:
         with pytest.raises(ValueError, match="a, b: not comparable: the sizes differ"):
             flip_map(a, b[1:])
 
+    def test_half_against_float(self) -> None:
+        a = noise_image(16, 16, 3, dtype="float16")
+        assert compare(a, a.astype(np.float32)).identical
+
 
 class TestMismatches:
     @pytest.mark.parametrize(
@@ -266,9 +258,6 @@ class TestMismatches:
         assert all(getattr(found, name) is None for name in FIGURES)
         with pytest.raises(ValueError, match=f"a, b: not comparable: {reason}"):
             difference(a, b)
-
-    def test_black_is_not_what_is_missing(self) -> None:
-        assert not compare(np.zeros((8, 8, 3), np.uint8), np.zeros((9, 8, 3), np.uint8)).identical
 
     @pytest.mark.parametrize("one", [math.nan, math.inf, -math.inf])
     @pytest.mark.parametrize("swapped", [False, True])
@@ -356,14 +345,6 @@ class TestTolerances:
         assert reasons(some, tolerances_of(max_error=0.25, fail_percent=5)) == ()
         assert len(reasons(some, tolerances_of(max_error=0.25, fail_percent=4))) == 1
 
-    def test_all_that_fail_are_told(self) -> None:
-        found = compare(self.A, noise_image(20, 20, 3))
-        limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
-        assert len(reasons(found, limits)) == 4
-
-    def test_psnr_of_equals_passes_any_limit(self) -> None:
-        assert reasons(compare(self.A, self.A), tolerances_of(min_psnr=math.inf)) == ()
-
     @pytest.mark.parametrize(
         ("name", "value"),
         [
@@ -385,9 +366,10 @@ class TestTolerances:
         ):
             tolerances_of(**{name: value})
 
-    def test_types(self) -> None:
-        with pytest.raises(TypeError, match="max_error"):
-            tolerances_of(max_error="0.1")  # type: ignore[arg-type]
+    def test_all_that_fail_are_told(self) -> None:
+        found = compare(self.A, noise_image(20, 20, 3))
+        limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
+        assert len(reasons(found, limits)) == 4
 
 
 class TestArguments:
@@ -415,16 +397,6 @@ class TestArguments:
                 difference(a, a, scale=value)
         with pytest.raises(ValueError, match="threshold"):
             compare(a, a, threshold=math.nan)
-
-    @pytest.mark.parametrize(
-        ("package", "extra"), [("skimage.metrics", "quality"), ("OpenImageIO", "images")]
-    )
-    def test_extras_missing(
-        self, monkeypatch: pytest.MonkeyPatch, package: str, extra: str
-    ) -> None:
-        monkeypatch.setitem(sys.modules, package, None)
-        with pytest.raises(ModuleNotFoundError, match=rf"pip install vkbloom\[{extra}\]"):
-            compare(noise_image(8, 8, 3), noise_image(8, 8, 3))
 
     @pytest.mark.parametrize("relative", [-0.1, math.nan, math.inf])
     def test_relative_out_of_range(self, relative: float) -> None:

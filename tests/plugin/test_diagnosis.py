@@ -133,8 +133,6 @@ class TestPlanted:
         assert f"; residual {verdict.diagnosis.residual:.3g}\n" in str(caught.value)
 
     def test_on_the_command_line(self, cause: str, tmp_path: Path) -> None:
-        pytest.importorskip("OpenImageIO")
-        pytest.importorskip("skimage")
         files = [
             str(write(tmp_path / f"{name}.exr", image.astype(np.float32), premultiplied=True))
             for name, image in zip("ab", planted(cause), strict=True)

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from vkbloom import DualKawase, Renderer, Separable, reference, testing
+from vkbloom import Renderer, Separable, reference, testing
 from vkbloom.testing import LawReport, LawRow, Probe
 from vkbloom.testing._law_table import LAWS
 
@@ -270,13 +270,6 @@ def test_a_light_below_the_rounding_is_not_judged() -> None:
     assert {row(found, name).held for name in ("centroid_kept", "separable", "energy")} == {None}
 
 
-def test_images_of_grey_have_no_laws_of_colour() -> None:
-    probe = Probe(size=(32, 32), channels=None, dtype="uint8")
-    found = testing.report(lambda image: image, probe=probe)
-    untested = [each.name for each in found.rows if each.held is None]
-    assert untested == ["bounded_fireflies", "unclamped", "colour", "grey", "channels", "finite"]
-
-
 @pytest.mark.parametrize("dtype", ["uint8", "float16"])
 def test_another_probe(renderer: Renderer, dtype: str) -> None:
     probe = testing.Probe(size=(64, 48), channels=4, dtype=dtype, value=0.5)
@@ -286,13 +279,6 @@ def test_another_probe(renderer: Renderer, dtype: str) -> None:
     assert found.probe == probe
     found.assert_held("superposition", "gain", "symmetric", "separable", "no_ringing")
     assert (row(found, "bounded_fireflies").held is None) == (dtype == "uint8")
-
-
-def test_a_picture_with_its_bloom_is_additive(renderer: Renderer) -> None:
-    found = testing.report(
-        lambda image: renderer.apply(image, DualKawase(levels=2))["final"], size=(64, 64)
-    )
-    found.assert_held("additive", "superposition", "gain")
 
 
 def test_what_is_no_bloom() -> None:

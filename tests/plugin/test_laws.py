@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from tests.exhaustive import by_turns
 from tests.plugin.broken_laws import fails
-from vkbloom import DualKawase, Pyramid, Renderer, Separable, gaussian_weights, reference, testing
+from vkbloom import Renderer, Separable, reference, testing
 from vkbloom.testing import Probe
 
 Image = NDArray[Any]
@@ -85,39 +85,8 @@ def test_blurs_that_keep_all_laws(name: str, dtype: str, channels: int | None) -
     testing.assert_no_ringing(blur, probe)
 
 
-@pytest.mark.parametrize(
-    ("dtype", "format"),
-    by_turns(["uint8", "float16", "float32"], turns=["rgba8unorm", "rgba16float", "rgba32float"]),
-)
-def test_separable_on_the_device(renderer: Renderer, dtype: str, format: Any) -> None:
-    settings = Separable(weights=gaussian_weights(1.5, 6), blur_strength=1.0, format=format)
-    probe = Probe(size=(41, 33), dtype=dtype)
-    bloom = bloom_of(renderer, settings)
-    testing.assert_superposition(bloom, probe)
-    testing.assert_gain(bloom, 1.0, probe)
-    testing.assert_symmetric(bloom, probe, axes=("x", "y", "xy"))
-    testing.assert_centroid_kept(bloom, probe)
-    testing.assert_separable(bloom, probe)
-    testing.assert_spread(bloom, 1.5, probe)
-    testing.assert_no_ringing(bloom, probe)
-
-
 def bloom_of(renderer: Renderer, settings: Any, name: str = "bloom") -> Bloom:
     return lambda image: renderer.apply(image, settings, framebuffers=(name,))[name]
-
-
-@pytest.mark.parametrize("settings", [Pyramid(levels=3), DualKawase(levels=3)])
-def test_chains_on_the_device(renderer: Renderer, settings: Any) -> None:
-    bloom = bloom_of(renderer, settings)
-    probe = Probe(size=(45, 37))
-    testing.assert_superposition(bloom, probe)
-    testing.assert_gain(bloom, 1.0, probe)
-    testing.assert_symmetric(bloom, probe, axes=("x", "y", "xy"))
-    testing.assert_no_ringing(bloom, probe)
-    assert "instead of" in fails(testing.assert_separable, bloom, probe)
-    wide = Probe(size=(128, 128))
-    # A pixel's light goes to the middle of the square of 8 x 8 pixels that becomes one.
-    testing.assert_centroid_kept(bloom, wide, within=3.5)
 
 
 def test_the_picture_with_its_bloom(renderer: Renderer) -> None:
@@ -249,12 +218,6 @@ class TestBrokenLaws:
         # The lit pixel itself may be as bright as it was.
         testing.assert_bounded_fireflies(IDENTITY, 0.0, SMALL)
 
-    def test_fireflies_on_the_device(self, renderer: Renderer) -> None:
-        probe = Probe(size=(64, 64))
-        clamped = Pyramid(levels=2, format="rgba8unorm")
-        testing.assert_bounded_fireflies(bloom_of(renderer, clamped), 1.0, probe)
-        fails(testing.assert_bounded_fireflies, bloom_of(renderer, Pyramid(levels=2)), 1.0, probe)
-
     def test_infinity_that_spreads(self) -> None:
         with pytest.raises(AssertionError, match="the bloom of finite values is finite"):
             testing.assert_bounded_fireflies(BOX, 1.0, SMALL, brightness=(math.inf,))
@@ -289,43 +252,6 @@ class TestBrokenLaws:
         arguments = (1.5,) if assertion is testing.assert_spread else ()
         with pytest.raises(ValueError, match="% lies in the outermost pixels of an image of 7 x 7"):
             assertion(GAUSSIAN, *arguments, Probe(size=(7, 7)))
-
-
-class TestSmallFaults:
-    """What a careless edit of a blur does, as large as it is there."""
-
-    WEIGHTS = gaussian_weights(1.5, 4)
-
-    def line(self, weights: list[float]) -> Bloom:
-        taps = np.array(weights)
-
-        def blur(plane: Image) -> Image:
-            rows = ndimage.correlate1d(plane, taps, axis=0, mode="nearest")
-            return np.asarray(ndimage.correlate1d(rows, taps, axis=1, mode="nearest"))
-
-        return over_the_plane(blur)
-
-    @property
-    def weights(self) -> list[float]:
-        return [*self.WEIGHTS[:0:-1], *self.WEIGHTS]
-
-    def test_none(self) -> None:
-        blur = self.line(self.weights)
-        testing.assert_gain(blur, 1.0)
-        testing.assert_symmetric(blur)
-
-    def test_a_weight_wrong_by_2_percent(self) -> None:
-        weights = self.weights
-        weights[5] *= 1.02
-        fails(testing.assert_gain, self.line(weights), 1.0)
-        fails(testing.assert_symmetric, self.line(weights))
-
-    def test_a_missing_half_texel(self) -> None:
-        halved = over_the_plane(
-            lambda plane: ndimage.shift(plane, (0, 0.5), order=1, mode="nearest")
-        )
-        fails(testing.assert_symmetric, halved)
-        assert "0.5 pixels" in fails(testing.assert_centroid_kept, halved)
 
 
 class TestMeasurements:
@@ -366,16 +292,6 @@ class TestMeasurements:
         np.testing.assert_array_equal(found.sigma[1], 0)
         with pytest.raises(ValueError, match="values"):
             testing.response(lambda image, gain: image, "gain", [], SMALL)
-
-    def test_response_of_settings(self, renderer: Renderer) -> None:
-        def bloom(image: Image, blur_scale: float) -> Image:
-            settings = Separable(
-                weights=gaussian_weights(1.5, 6), blur_strength=1.0, blur_scale=blur_scale
-            )
-            return renderer.apply(image, settings, framebuffers=("bloom",))["bloom"]
-
-        found = testing.response(bloom, "blur_scale", [1.0, 2.0], SMALL)
-        np.testing.assert_allclose(found.sigma, [[1.5, 1.5], [3.0, 3.0]], rtol=1e-3)
 
 
 class TestProbe:

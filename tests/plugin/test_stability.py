@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tests.plugin.broken_laws import fails
-from vkbloom import DualKawase, KinoBloom, Pyramid, Renderer, testing
+from vkbloom import testing
 from vkbloom.testing import Probe
 
 Image = NDArray[Any]
@@ -159,12 +159,6 @@ class TestStability:
         np.testing.assert_allclose(found.energy, 1, rtol=1e-4)
         assert found.jitter < 1e-3
 
-    def test_no_light(self) -> None:
-        assert math.isnan(testing.stability(np.zeros_like, texel=1, probe=SMALL).ripple)
-        assert "the bloom of a light is not black" in fails(
-            testing.assert_stable, np.zeros_like, texel=1, probe=SMALL
-        )
-
     def test_light_that_leaves_the_image(self) -> None:
         with pytest.raises(ValueError, match="in the outermost pixels of an image of 20 x 20"):
             testing.assert_stable(lambda image: gaussian(image, 4.0), probe=Probe(size=(20, 20)))
@@ -185,18 +179,6 @@ class TestStability:
             testing.assert_stable(gaussian, growth=-1)
         with pytest.raises(TypeError, match="bloom: None is not callable"):
             testing.stability(None, temporal="temporal" in options)  # type: ignore[arg-type]
-
-    def test_on_the_device(self, renderer: Renderer) -> None:
-        def bloom(settings: Any) -> Callable[[Image], Image]:
-            return lambda image: renderer.apply(image, settings, framebuffers="bloom")["bloom"]
-
-        testing.assert_stable(bloom(Pyramid(levels=3)), steps=1)
-        # Its reduction moves the light to the middle of a texel.
-        found = testing.stability(bloom(DualKawase(levels=3)), steps=1)
-        assert 1 < found.jitter < 5.7
-        # The median removes a light on one pixel, and not on two by two.
-        lamp = Probe(size=(128, 128), value=50.0)
-        assert testing.stability(bloom(KinoBloom()), texel=1, probe=lamp).ripple > 1
 
 
 class TestSequences:
@@ -289,10 +271,6 @@ class TestResolution:
         )
         testing.assert_resolution_independent(bloom, (1, 2), peak=0.7, probe=SMALL)
 
-    def test_no_light(self) -> None:
-        assert np.isnan(testing.resolution_response(np.zeros_like, (1,), probe=SMALL).r50).all()
-        fails(testing.assert_resolution_independent, np.zeros_like, (1, 2), probe=SMALL)
-
     @pytest.mark.parametrize(
         ("options", "message"),
         [
@@ -305,17 +283,3 @@ class TestResolution:
     def test_wrong_arguments(self, options: dict[str, Any], message: str) -> None:
         with pytest.raises(ValueError, match=message):
             testing.resolution_response(gaussian, probe=SMALL, **options)
-
-    def test_on_the_device(self, renderer: Renderer) -> None:
-        def bloom(image: Image) -> Image:
-            levels = int(np.log2(image.shape[0])) - 3
-            settings = Pyramid(levels=levels, level_weights=(*[0.0] * (levels - 1), 1.0))
-            return renderer.apply(image, settings, framebuffers="bloom")["bloom"]
-
-        # The coarsest level alone is an eighth of the height at each size.
-        testing.assert_resolution_independent(bloom, (1, 2))
-        fails(
-            testing.assert_resolution_independent,
-            lambda image: renderer.apply(image, Pyramid(), framebuffers="bloom")["bloom"],
-            (1, 2),
-        )

@@ -433,44 +433,6 @@ def test_without_pygltflib_the_message_says_what_to_install(
 
 
 @pytest.mark.parametrize(
-    "uri",
-    [
-        "../secret.bin",
-        "inner/../../secret.bin",
-        "..\\secret.bin",
-        "%2e%2e/secret.bin",
-        "..%2Fsecret.bin",
-        "/etc/hostname",
-        "%2Fetc%2Fhostname",
-        "\\\\server\\share\\a.bin",
-        "C:\\a.bin",
-        "C:/a.bin",
-        "file:///etc/hostname",
-        "FILE:a.bin",
-        "https://example.org/a.bin",
-        "a.bin%00",
-        "link.bin",
-        "linked/secret.bin",
-        ".",
-        "",
-    ],
-)
-def test_a_uri_does_not_leave_the_folder(tmp_path: Path, uri: str) -> None:
-    document = triangle()
-    folder = tmp_path / "model"
-    (folder / "inner").mkdir(parents=True)
-    (tmp_path / "secret.bin").write_bytes(document.data)
-    (folder / "inside.bin").write_bytes(document.data)
-    (folder / "link.bin").symlink_to(tmp_path / "secret.bin")
-    (folder / "linked").symlink_to(tmp_path)
-    text = json.loads(document.as_gltf("x"))
-    text["buffers"][0]["uri"] = uri
-    (folder / "mesh.gltf").write_text(json.dumps(text))
-    with pytest.raises(ValueError, match=r"mesh\.gltf.*buffers\[0\]"):
-        load_mesh(folder / "mesh.gltf")
-
-
-@pytest.mark.parametrize(
     ("uri", "name"),
     [
         ("sub/../a.bin", "a.bin"),
@@ -521,46 +483,64 @@ def test_missing_files_are_os_errors_that_name_them(tmp_path: Path) -> None:
 # Damaged files
 
 
-@pytest.mark.parametrize(("call", "error"), rows(__file__, "damaged glTF"))
-def test_damage_is_named(tmp_path: Path, call: str, error: str) -> None:
-    file = tmp_path / "mesh.gltf"
+class Damage:
+    """Files of glTF that are damaged; each function loads one."""
 
-    def damaged(path: str, value: Any) -> Mesh:
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def loaded(self, content: bytes) -> Mesh:
+        path = self.folder / "mesh.gltf"
+        path.write_bytes(content)
+        return load_mesh(path)
+
+    def damaged(self, path: str, value: Any) -> Mesh:
         text = json.loads(nested().as_gltf())
         at(text, path, value)
-        file.write_text(json.dumps(text))
-        return load_mesh(file)
+        return self.loaded(json.dumps(text).encode())
 
-    assert_refused(call, error, {"damaged": damaged, "math": math})
+    def with_values(self, attribute: str, value: float) -> Mesh:
+        document = nested()
+        values = document.accessor([[0, 0, 1], [0, value, 0], [0, 1, 0]])
+        at(document.json, f"meshes.0.primitives.0.attributes.{attribute}", values)
+        return document.load(self.folder)
+
+    def with_indices(self, indices: list[int]) -> Mesh:
+        document = Document()
+        document.primitive(indices=document.accessor(indices, BYTE))
+        return document.load(self.folder)
+
+    def with_sparse(self, places: list[int]) -> Mesh:
+        document = triangle()
+        indices = {"bufferView": document.view(bytes(places)), "componentType": BYTE}
+        values = {"bufferView": document.view(bytes(24))}
+        sparse = {"count": 2, "indices": indices, "values": values}
+        document.json["accessors"][1]["sparse"] = sparse
+        return document.load(self.folder)
+
+    def with_header(self, place: int) -> Mesh:
+        content = bytearray(nested().as_glb())
+        content[place : place + 4] = struct.pack("<I", 10**6)
+        return self.loaded(bytes(content))
+
+    def with_uri(self, uri: str) -> Mesh:
+        document, folder = triangle(), self.folder / "model"
+        (folder / "inner").mkdir(parents=True)
+        (self.folder / "secret.bin").write_bytes(document.data)
+        (folder / "inside.bin").write_bytes(document.data)
+        (folder / "link.bin").symlink_to(self.folder / "secret.bin")
+        (folder / "linked").symlink_to(self.folder)
+        text = json.loads(document.as_gltf("x"))
+        text["buffers"][0]["uri"] = uri
+        self.folder = folder
+        return self.loaded(json.dumps(text).encode())
 
 
-@pytest.mark.parametrize("attribute", ["POSITION", "NORMAL", "COLOR_0"])
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_values_that_are_not_finite(tmp_path: Path, attribute: str, value: float) -> None:
-    document = nested()
-    attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
-    attributes[attribute] = document.accessor([[0, 0, 1], [0, value, 0], [0, 1, 0]])
-    with pytest.raises(ValueError, match=rf"mesh\.gltf: .*{attribute} holds NaN or infinity"):
-        document.load(tmp_path)
-
-
-def test_an_index_beyond_the_vertices(tmp_path: Path) -> None:
-    document = Document()
-    document.primitive(indices=document.accessor([0, 1, 3], BYTE))
-    with pytest.raises(ValueError, match=r"mesh\.gltf: .*index 3, but only 3 vertices"):
-        document.load(tmp_path)
-
-
-@pytest.mark.parametrize("places", [[2, 1], [1, 1], [1, 3]])
-def test_sparse_indices_that_do_not_ascend(tmp_path: Path, places: list[int]) -> None:
-    document = triangle()
-    document.json["accessors"][1]["sparse"] = {
-        "count": 2,
-        "indices": {"bufferView": document.view(bytes(places)), "componentType": BYTE},
-        "values": {"bufferView": document.view(bytes(24))},
-    }
-    with pytest.raises(ValueError, match=r"mesh\.gltf: .*do not ascend"):
-        document.load(tmp_path)
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "damaged glTF"))
+def test_damage_is_named(tmp_path: Path, call: str, error: str) -> None:
+    damage = Damage(tmp_path)
+    names = {name: getattr(damage, name) for name in vars(Damage) if name[0] != "_"}
+    assert_refused(call, error, {**names, "math": math})
 
 
 def test_a_small_file_cannot_ask_for_any_amount_of_memory(
@@ -579,45 +559,12 @@ def test_a_small_file_cannot_ask_for_any_amount_of_memory(
         document.load(tmp_path)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"{",
-        b"[]",
-        b"{}",
-        b'{"meshes": {"a": {}}}',
-        b"null",
-        b"5",
-        b'{"asset": 3}',
-        b"\xff\xfe",
-        b"[" * 100000,
-        b"glTF",
-    ],
-)
-def test_file_that_is_not_gltf_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "mesh.gltf"
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match=r"mesh\.gltf: "):
-        load_mesh(path)
-
-
 def test_a_glb_cut_anywhere_is_refused(tmp_path: Path) -> None:
     whole = nested().as_glb()
     path = tmp_path / "mesh.glb"
     assert load_or_refuse(path, whole) is not None
     for size in range(len(whole)):
         assert load_or_refuse(path, whole[:size]) is None, size
-
-
-@pytest.mark.parametrize(("place", "message"), [(12, "chunk 0"), (8, "truncated"), (4, "version")])
-def test_a_glb_with_a_wrong_header(tmp_path: Path, place: int, message: str) -> None:
-    content = bytearray(nested().as_glb())
-    content[place : place + 4] = struct.pack("<I", 10**6)
-    path = tmp_path / "mesh.glb"
-    path.write_bytes(bytes(content))
-    with pytest.raises(ValueError, match=rf"mesh\.glb: .*{message}"):
-        load_mesh(path)
 
 
 @many

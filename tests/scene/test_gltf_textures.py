@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
+from tests.framebuffers import write_image
 from tests.images import noise
 from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import (
@@ -50,16 +50,7 @@ FRONT = [0, 1, 2, 0, 2, 3]
 
 def encoded(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any) -> bytes:
     """Return an image file of pixels (h, w, C), uint8 or uint16."""
-    path = folder / f"encoded{suffix}"
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], str(pixels.dtype))
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    for name, value in attributes.items():
-        spec.attribute(name, value)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer is not None, oiio.geterror()
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
-    writer.close()
+    path = write_image(folder / f"encoded{suffix}", pixels, **attributes)
     data = path.read_bytes()
     path.unlink()
     return data

@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from numpy.typing import NDArray
 
+from tests.framebuffers import write_image
 from tests.refusals import assert_refused, rows
 from tests.scene.changed_bytes import CHANGES, many
 from vkbloom._scene import ktx, skybox
@@ -73,19 +74,6 @@ def ktx_bytes(
         for face in level.astype(dtype):
             data += b"".join(line.tobytes() + padding for line in face)
     return data
-
-
-def write_image(path: Path, image: NDArray[Any], kind: str) -> Path:
-    height, width, channels = image.shape
-    spec = oiio.ImageSpec(width, height, channels, kind)
-    # The texels as they are: without this, those of a PNG would be divided by their alpha.
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    file = oiio.ImageOutput.create(str(path))
-    assert file is not None, oiio.geterror()
-    assert file.open(str(path), spec), file.geterror()
-    assert file.write_image(np.ascontiguousarray(image)), file.geterror()
-    file.close()
-    return path
 
 
 def look_up(faces: NDArray[Any], direction: tuple[float, float, float]) -> NDArray[Any]:

@@ -21,7 +21,7 @@ packaging/core_wheel.sh "$folder/package" "$PYTHON" "$folder/venv/bin/python"
 "$PYTHON" packaging/sbom.py check "$folder"/package/dist/*.whl
 "$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --no-deps --force-reinstall \
     "$folder"/package/dist/*.whl
-"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_free_threaded.py
+"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_threads.py
 "$folder/venv/bin/python" -m tests.core.all_calls "$calls"
 test "$tsan_calls" != 0 || exit 0
 

@@ -19,17 +19,15 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
+from vkbloom._cli.bands import apply_file, is_large
 from vkbloom._cli.glow_options import accompanying, uploaded
-from vkbloom._cli.image_files import read_picture
-from vkbloom._cli.large_files import apply_file, finished, is_large
+from vkbloom._cli.image_files import FileOptions, finished, read_picture
 from vkbloom._cli.overlapped import read_ahead, rendered
-from vkbloom._cli.program import given as was_given
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import detail, hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
-from vkbloom._io.displayed import Saved
-from vkbloom._io.images import Colour, Picture, SavedColour
+from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
 
 __all__ = ["Begun", "Options", "Pair", "Run", "of_format"]
@@ -46,37 +44,20 @@ _OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(FileOptions):
     """The options of the command by their names."""
 
-    quality: int | None
     pipe_format: str
     framebuffers: str
-    input_colour: Colour | None
-    output_colour: SavedColour | None
-    primaries: str
-    view: str | None
-    raw: bool
-    half: bool | None
-    bits: int | None
     overwrite: bool
     skip_existing: bool
     expand: float | None
-    subimage: int
-    layer: str | None
-    mask: str | None
-    emission: str | None
     settings: Callable[[str], Begun]
 
     @property
     def names(self) -> str | list[str]:
         """The framebuffers to write."""
         return "all" if self.framebuffers == "all" else ["final", *self.framebuffers.split(",")]
-
-    @property
-    def saved(self) -> Saved:
-        """What the colours of OUT are to be."""
-        return Saved(self.output_colour, self.primaries, self.view)
 
 
 def of_format(target: str, pipe_format: str) -> str:
@@ -141,23 +122,12 @@ class Run:
 
             self._make_folder(target)
             notes = apply_file(
+                self._renderer()._core,
                 name,
-                target,
+                Path(target),
                 settings,
-                renderer=self._renderer(),
-                mask=options.mask,
-                emission=options.emission,
-                layer=options.layer,
-                subimage=options.subimage if was_given("subimage") else None,
-                input_colour=options.input_colour,
-                output_colour=options.output_colour,
-                primaries=options.primaries,
-                view=options.view,
-                raw=options.raw,
-                half=options.half,
-                bits=options.bits,
+                options,
                 expand=expand,
-                quality=options.quality,
                 progress=show,
             )
             for text in notes:

@@ -88,7 +88,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     _note_no_bloom(grid, given["adapter"], given["validation"])
     with opened_renderer(given["adapter"], given["validation"]) as renderer:
         if is_store:
-            how |= {"store": out, "on_mended": terminal.note, "progress": not terminal.is_quiet()}
+            how |= {"store": out, "progress": not terminal.is_quiet()}
             found = vkbloom.grid(source, settings, axes, renderer=renderer, **shared, **how).attrs
             ran, saved = found["passes_run"], found["passes_saved"]
         else:

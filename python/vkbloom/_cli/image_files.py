@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, suppress
 from typing import Any, Final
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom._cli.program import given
 from vkbloom._cli.streams import as_file, shown
 from vkbloom._cli.terminal import detail, note
 from vkbloom._io import image_reading
-from vkbloom._io.alpha import hidden_notes
+from vkbloom._io.alpha import divided, hidden_notes
+from vkbloom._io.array_files import has_straight
 from vkbloom._io.colour import check_space
+from vkbloom._io.displayed import Saved
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.images import Colour, Picture, StoredImage
+from vkbloom._io.images import Colour, Picture, SavedColour, StoredImage
+from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
 COLOURS: Final = ("linear", "srgb")
@@ -27,48 +32,56 @@ COLOURS: Final = ("linear", "srgb")
 _STANDARD_ERROR = 2
 
 
-def subimage_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--subimage``, the argument of `vkbloom._io.image_reading.load`."""
-    return click.option(
-        "--subimage",
-        metavar="N",
-        type=click.IntRange(min=0),
-        default=0,
-        show_default=True,
-        help="Index of the part to read from a file with several parts.",
-    )(command)
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """How image files are read and written: options of commands by their names."""
+
+    subimage: int = 0
+    layer: str | None = None
+    input_colour: Colour | None = None
+    raw: bool = False
+    mask: str | None = None
+    emission: str | None = None
+    half: bool | None = None
+    output_colour: SavedColour | None = None
+    primaries: str = "rec709"
+    view: str | None = None
+    bits: int | None = None
+    quality: int | None = None
+
+    @property
+    def saved(self) -> Saved:
+        """What the colours of a written file are to be."""
+        return Saved(self.output_colour, self.primaries, self.view)
 
 
-def layer_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--layer``, the argument of `vkbloom.read`."""
-    return click.option(
-        "--layer",
-        metavar="NAME",
-        help="The layer to read from an OpenEXR file with several layers, such as "
-        "ViewLayer.Combined.",
-    )(command)
-
-
-def expand_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--expand``, the argument of `vkbloom.read`."""
-    return click.option(
-        "--expand",
-        metavar="X",
-        type=click.FloatRange(1, 1024),
-        help="What the highlights of a file of integers are expanded up to, so that they can glow; "
-        f"1: they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
-    )(command)
-
-
-def input_colour_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--input-colour``, the argument `colour` of `vkbloom._io.image_reading.decode`."""
-    return click.option(
-        "--input-colour",
-        metavar="linear|srgb|SPACE",
-        help="Colour space of the file; SPACE is one of OpenColorIO's built-in configuration, such "
-        "as ACEScg or 'Linear Rec.2020' [default linear for floats; for integers that of the file, "
-        "or srgb if it names none]",
-    )(command)
+subimage_option: Final = click.option(
+    "--subimage",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Index of the part to read from a file with several parts.",
+)
+layer_option: Final = click.option(
+    "--layer",
+    metavar="NAME",
+    help="The layer to read from an OpenEXR file with several layers, such as ViewLayer.Combined.",
+)
+expand_option: Final = click.option(
+    "--expand",
+    metavar="X",
+    type=click.FloatRange(1, 1024),
+    help="What the highlights of a file of integers are expanded up to, so that they can glow; "
+    f"1: they stay as they are [default {PHOTO_EXPANSION:g} with the preset photo, else 1]",
+)
+input_colour_option: Final = click.option(
+    "--input-colour",
+    metavar="linear|srgb|SPACE",
+    help="Colour space of the file; SPACE is one of OpenColorIO's built-in configuration, such "
+    "as ACEScg or 'Linear Rec.2020' [default linear for floats; for integers that of the file, "
+    "or srgb if it names none]",
+)
 
 
 def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
@@ -114,15 +127,16 @@ def read_picture(
     if raw and stored.pixels.dtype != np.uint8:
         raise not_of_bytes(source, stored.numbers[0])
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
-    note_parts(source, stored, layer)
+    for told in part_notes(stored, layer):
+        note(f"{source}: {told}")
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
-    if (text := image_reading.specials_note(*counts)) is not None:
+    if (text := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {text}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
     hidden = 0.0 if is_blended else picture.hidden
-    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
-        note(f"{source}: {text}")
+    for told in (*picture.notes, *hidden_notes(hidden, picture.visible)):
+        note(f"{source}: {told}")
     return picture
 
 
@@ -146,11 +160,20 @@ def not_of_bytes(source: str, numbers: str) -> click.UsageError:
     return click.UsageError(f"--raw: {source} has {numbers}, not 8-bit integers; leave out --raw")
 
 
-def note_parts(source: str, stored: StoredImage, layer: str | None) -> None:
-    """Print a note if the first of several parts was read without --subimage."""
-    if len(stored.parts) > 1 and layer is None and not given("subimage"):
-        parts = image_reading.listed_parts(stored)
-        note(f"{source}: read the first of its {parts}; --subimage reads another")
+def part_notes(stored: StoredImage, layer: str | None) -> list[str]:
+    """Return a text if the first of several parts is read without --subimage."""
+    if len(stored.parts) <= 1 or layer is not None or given("subimage"):
+        return []
+    parts = image_reading.listed_parts(stored)
+    return [f"read the first of its {parts}; --subimage reads another"]
+
+
+def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:
+    """Return a picture with the pixels of `final`, and their alpha and encoding as in its file."""
+    if settings.alpha != "keep" and has_straight(picture):
+        final = divided(final)
+    encoding = picture.encoding if settings.encoding == "none" else settings.encoding
+    return dataclasses.replace(picture, pixels=final, encoding=encoding)
 
 
 _quiet = threading.Lock()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import MANY_SETTINGS, checked_as
 from vkbloom._checks import check_image, check_index, import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
@@ -71,7 +71,7 @@ def fit(
     gradient: bool = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
-@checked
+@checked_as(settings=MANY_SETTINGS)
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any] | Maker,
@@ -153,14 +153,14 @@ def fit(
 
     Notes
     -----
-    Images of more than 384 pixels are reduced first, by boxes. There, points that fill the space
-    are tried, and ``scipy.optimize.least_squares`` starts from the best of them; "flip" and
-    callables are minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Integers
-    and choices are changed one at a time, while the numbers follow. The result is refined at the
-    image's own size. With `gradient`, the derivatives of the least squares come from pullbacks,
-    which are no calls. If that ends far from the target, the search without derivatives follows.
-    Fields that put few passes out of date are changed first. The same arguments give the same
-    result.
+    Images of more than 384 pixels are reduced first, by boxes. There,
+    ``scipy.optimize.differential_evolution`` searches the whole space, and
+    ``scipy.optimize.least_squares`` starts from the best of its points; "flip" and callables are
+    minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Larger populations
+    follow while the loss is not close to 0. The result is refined at the image's own size. With
+    `gradient`, the derivatives of the least squares come from pullbacks, which are no calls. If
+    that ends far from the target, the search without derivatives follows. The same arguments give
+    the same result.
 
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
@@ -444,9 +444,10 @@ def _derivatives(
         whole = np.zeros((*cotangent.shape[:2], channels))
         whole[..., :3] = cotangent
         found = pullback({framebuffer: whole})
-        if "blur_scale" in found:  # of `_smaller`
-            found["blur_scale"] = found["blur_scale"] / np.float32(stage.factor)
-        return found
+        if stage.factor == 1 or "blur_scale" not in found:
+            return found
+        # `_smaller` has divided the scale.
+        return {**found, "blur_scale": found["blur_scale"] / np.float32(stage.factor)}
 
     return back
 

@@ -71,15 +71,6 @@ def fit_pyramid(
         `settings` is a `Pyramid` whose buffers are floats. `calls` is the number of renders: one
         for each level and two for the losses.
 
-    Raises
-    ------
-    TypeError
-        `psf` is not a PSF.
-    ValueError
-        An argument is out of range, or the frame is too small for so many levels.
-    ModuleNotFoundError
-        SciPy is missing: ``pip install vkbloom[fit]``.
-
     Notes
     -----
     Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, on non-negative least

@@ -25,8 +25,6 @@ Bounds = Mapping[str, Sequence[Any]]
 
 # A range this many times as wide as its scale is searched on a logarithmic scale.
 _WIDE: Final = 4.0
-# Of at most this many integers, all are tried.
-_FEW: Final = 16
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,16 +65,6 @@ class Axis:
             return 0.0
         number = min(max(float(value), self.low), self.high)
         return self._warped(number - self.low) / self._length
-
-    def others(self, value: Any) -> list[Any]:
-        """Return what to try in place of an integer or a choice: all of a few, else near ones."""
-        if self.kind == "choice":
-            return [choice for choice in self.choices if choice != value]
-        low, high = round(self.low), round(self.high)
-        if high - low <= _FEW:
-            return [number for number in range(low, high + 1) if number != value]
-        steps = [sign * 2**power for power in range(0, _FEW, 2) for sign in (1, -1)]
-        return [value + step for step in steps if low <= value + step <= high]
 
     @property
     def _length(self) -> float:

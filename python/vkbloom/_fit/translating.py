@@ -91,11 +91,6 @@ def translate(
         `settings` are those of the method `to`; ``final`` was compared, without tone curve and
         encoding.
 
-    Raises
-    ------
-    TypeError, ValueError, ModuleNotFoundError, Error
-        As for `fit`.
-
     See Also
     --------
     fit : Finds the settings of a picture.

@@ -40,17 +40,6 @@ class Dirt(Glare):
     mode : {"multiply", "lerp"}
         The light L becomes L D s, or L (1 + s (D - 1)).
 
-    Raises
-    ------
-    ValueError
-        A field is out of its range.
-    TypeError
-        A field has the wrong type.
-
-    See Also
-    --------
-    Settings : Takes at most one Dirt in `glare`.
-
     Notes
     -----
     Source: "multiply" from google/filament, colorGrading.mat @ 263d042924de; "lerp" from

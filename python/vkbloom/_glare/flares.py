@@ -35,10 +35,6 @@ class Ghosts(GlareLight):
     **glare
         The fields of `GlareLight`.
 
-    See Also
-    --------
-    Halo : A ring around the centre.
-
     Notes
     -----
     With the position p of a pixel, 0 to 1 along both sides, and the glow c,
@@ -122,10 +118,6 @@ class Halo(GlareLight):
         Distance by which red and blue are moved along the radius, 0 to 0.5 of the picture's sides.
     **glare
         The fields of `GlareLight`.
-
-    See Also
-    --------
-    Ghosts : Mirrored and scaled copies of the picture.
 
     Notes
     -----

@@ -32,10 +32,6 @@ class Streaks(GlareLight):
     **glare
         The fields of `GlareLight`.
 
-    See Also
-    --------
-    GlareLight : The fields of all stages with light.
-
     Notes
     -----
     With b the base and d a step of `length` texels along the ray, iteration i is

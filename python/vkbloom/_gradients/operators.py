@@ -7,8 +7,6 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
-import os
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, cast
 
@@ -16,6 +14,7 @@ import numpy as np
 
 from vkbloom._checks import check_mask, import_extra
 from vkbloom._gradients.pulling import pull_each, pullback_of
+from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merged, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer
 from vkbloom._renderer.sources import Inputs, checked_inputs
@@ -106,38 +105,17 @@ def _field_value(value: Any) -> Any:
     return tuple(map(_field_value, value)) if isinstance(value, list) else value
 
 
-#: The number that stands for this module's own renderer. Those of others begin at 1.
-_OWN: Final = 0
-_opening = threading.Lock()
-
-
-@functools.cache
-def _own_renderer() -> Renderer:
-    return Renderer()
-
-
-@functools.cache
-def _renderer_on(index: int) -> Renderer:
-    """Return this module's renderer on the GPU with PyTorch's number."""
-    return Renderer(f"uuid:{torch.cuda.get_device_properties(index).uuid}")
-
-
-def _forget_own() -> None:
-    """Let a forked process, such as a worker of a DataLoader, open renderers of its own."""
-    global _opening  # noqa: PLW0603  another thread of the parent may have held it
-    _opening = threading.Lock()
-    _own_renderer.cache_clear()
-    _renderer_on.cache_clear()
-
-
-os.register_at_fork(after_in_child=_forget_own)
+#: The number that stands for the default renderer. Those of others begin at 1.
+_DEFAULT: Final = 0
 
 
 def _renderer(number: int, image: Any = None) -> Renderer:
-    """Return the renderer with that number; for tensors of CUDA, this module's is on their GPU."""
-    if number == _OWN:
-        with _opening:
-            return _own_renderer() if image is None else _renderer_on(image.device.index)
+    """Return the renderer with that number; for tensors of CUDA, the default is on their GPU."""
+    if number == _DEFAULT:
+        if image is None:
+            return default_renderer()
+        uuid = torch.cuda.get_device_properties(image.device.index).uuid
+        return renderer_on(f"uuid:{uuid}")
     renderer = RENDERERS.get(number)
     if renderer is None:
         raise ValueError("renderer: it was collected; keep a reference to it until the last call")
@@ -145,11 +123,11 @@ def _renderer(number: int, image: Any = None) -> Renderer:
 
 
 def number_of(renderer: Renderer | None) -> int:
-    """Return the number of a renderer that the operator takes; None: of this module's own.
+    """Return the number of a renderer that the operator takes; None: the default one.
 
     (Dynamo reads and guards an attribute in each version of PyTorch.)
     """
-    return _OWN if renderer is None else renderer._number
+    return _DEFAULT if renderer is None else renderer._number
 
 
 def _each(  # noqa: PLR0917

@@ -14,7 +14,7 @@ from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Inputs
-from vkbloom.reference._derivatives import Gradients, differentiable
+from vkbloom.reference._derivatives import check_known, differentiable
 
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 __all__ = ["DeviceGradients", "Passes", "Running", "check_finite", "device_fields", "on_device"]
 
 #: The most framebuffers with cotangents that a source can bring.
-_MOST: Final = 7
+_MAX_LEVELS: Final = 7
 #: The fields whose derivatives are the channels of a sum.
 _SUMS: Final = {
     "by_composite": ("intensity", "exposure", "reference_white"),
     "by_threshold": ("threshold", "knee"),
 }
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
-_LEAST: Final = 0.3
+_MIN_SHARE: Final = 0.3
 #: Curves that magnify the rounding of a float.
 _STEEP: Final = {"aces", "agx", "pq", "hlg"}
 
@@ -93,7 +93,7 @@ class Passes:
         """
         core = self.renderer._core
         levels = tuple(map(_level, self.cotangents.values()))
-        if core.closed or not 0 < len(levels) <= _MOST:
+        if core.closed or not 0 < len(levels) <= _MAX_LEVELS:
             return None
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
@@ -117,7 +117,7 @@ class Passes:
                 continue
             sums, squares = (found[key][0, 0] for key in (kind, f"{kind}_squares"))
             for name, total, square in zip(names, sums, squares, strict=False):
-                if name in wanted and abs(total) >= _LEAST * np.sqrt(square):
+                if name in wanted and abs(total) >= _MIN_SHARE * np.sqrt(square):
                     results[name] = np.asarray(total)
         return results
 
@@ -150,7 +150,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
     )
 
 
-class DeviceGradients(Gradients):
+class DeviceGradients(Mapping[str, NDArray[Any]]):
     """Derivatives of the device; others are computed when the first of them is read.
 
     - `found`: Those by images.
@@ -166,28 +166,15 @@ class DeviceGradients(Gradients):
         fields: Callable[[], Mapping[str, NDArray[Any]]],
         every: Callable[[], Mapping[str, NDArray[Any]]],
     ) -> None:
-        super().__init__(found)
+        self._found = dict(found)
         self._names = tuple(names)
-        self._more = [fields, every]
+        self._sources = [fields, every]
 
-    def _complete(self) -> None:
-        """Take what is missing: of the device, then of the reference, as `__missing__` does."""
-        while self._more:
-            found = self._more.pop(0)()
-            known = {**found, **dict(super().items())}
-            super().clear()
-            super().update((name, known[name]) for name in self._names if name in known)
-
-    def __missing__(self, name: str) -> NDArray[Any]:
-        if name not in self._names:
-            raise ValueError(
-                f"gradients: {name!r} has no derivative; available: {', '.join(self._names)}"
-            )
-        if len(self._more) > 1:
-            super().update(self._more.pop(0)())
-            return self[name]
-        self._complete()
-        return self[name]
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        check_known(name, self._names)
+        while name not in self._found:
+            self._found = {**self._sources.pop(0)(), **self._found}
+        return self._found[name]
 
     def __contains__(self, name: object) -> bool:
         return name in self._names
@@ -199,29 +186,8 @@ class DeviceGradients(Gradients):
         return iter(self._names)
 
     def __repr__(self) -> str:
-        self._complete()
-        return super().__repr__()
-
-    def __eq__(self, other: object) -> bool:
-        self._complete()
-        return super().__eq__(other)
-
-    __hash__ = None  # type: ignore[assignment]
+        return repr(dict(self))
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return a derivative, or the default where there is none."""
         return self[name] if name in self._names else default
-
-    def keys(self) -> Any:
-        """Return the names."""
-        return dict.fromkeys(self._names).keys()
-
-    def values(self) -> Any:
-        """Return all derivatives."""
-        self._complete()
-        return super().values()
-
-    def items(self) -> Any:
-        """Return all names and derivatives."""
-        self._complete()
-        return super().items()

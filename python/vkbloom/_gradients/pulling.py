@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Pullback", "pull_each", "pullback_of", "vjp"]
 
+Derivatives = Mapping[str, NDArray[Any]]
 #: From cotangents by framebuffer to derivatives by name.
-Pullback = Callable[[Mapping[str, NDArray[Any]]], Gradients]
+Pullback = Callable[[Mapping[str, NDArray[Any]]], Derivatives]
 #: Cotangents as `Passes` has them.
 Checked = Mapping[str, NDArray[Any] | ImportedArray]
 
@@ -118,7 +119,7 @@ def vjp(
     place = place_of(next(iter(frames.values())))
     pulled = pullback_of(renderer, inputs, settings, place)
 
-    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Derivatives:
         return pulled(_checked(cotangents, frames, core))
 
     return frames, pullback
@@ -146,7 +147,7 @@ def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
 
 def pullback_of(
     renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination = "host"
-) -> Callable[[Checked], Gradients]:
+) -> Callable[[Checked], Derivatives]:
     """Return the pullback alone, of arrays that do not change, and checked cotangents.
 
     `place`: Where the derivatives by images go.
@@ -160,9 +161,9 @@ def pull_each(
     settings: Settings,
     sequence: Iterable[tuple[Inputs, Checked]],
     place: Destination = "host",
-) -> Iterator[Gradients]:
+) -> Iterator[Derivatives]:
     """Yield the derivatives of each image. The device works on later ones meanwhile."""
-    started: deque[Callable[[], Gradients]] = deque()
+    started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
         started.append(_starter(renderer, inputs, settings, place)(cotangents))
         if len(started) == IMAGES_AHEAD:
@@ -173,7 +174,7 @@ def pull_each(
 
 def _starter(
     renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination
-) -> Callable[[Checked], Callable[[], Gradients]]:
+) -> Callable[[Checked], Callable[[], Derivatives]]:
     """Return a function that submits passes, and returns one that waits for the derivatives."""
     floats = settings.replace(format="rgba32float")
     recorded = functools.cache(lambda: _recorded(inputs, settings))
@@ -186,11 +187,11 @@ def _starter(
         found = recorded()({name: _on_host(part) for name, part in cotangents.items()})
         return Gradients((name, part.astype(np.float32)) for name, part in found.items())
 
-    def start(cotangents: Checked) -> Callable[[], Gradients]:
+    def start(cotangents: Checked) -> Callable[[], Derivatives]:
         passes = Passes(renderer, inputs, floats, cotangents, place)
         running = passes.submit()
 
-        def end() -> Gradients:
+        def end() -> Derivatives:
             if running is None:
                 return _placed(by_reference(cotangents), inputs, place, renderer)
             return DeviceGradients(

@@ -19,7 +19,6 @@ from vkbloom._grid.store import (
     METADATA,
     PARTS,
     checked_identity,
-    describe,
     mark_of,
     normal,
     read_json,
@@ -120,6 +119,15 @@ def _described_arrays(root: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(found, dict) or not all(re.fullmatch(r"\w[\w.-]*", name) for name in found):
         return {}
     return found
+
+
+def describe(axes: Iterable[Axis], block: Block) -> str:
+    """Return the points of a block as text: the value, or first and last value, of each axis."""
+    parts = []
+    for axis, start, stop in zip(axes, block.start, block.stop, strict=True):
+        labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
+        parts.append(f"{axis.name}={'..'.join(labels)}")
+    return ", ".join(parts) or "the only point"
 
 
 class _Stored:

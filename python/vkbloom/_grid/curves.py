@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import MAPPING, checked_as
 from vkbloom._checks import import_extra
 from vkbloom._grid import selection
 
@@ -20,7 +20,7 @@ __all__ = ["response_curves"]
 _WIDTH, _HEIGHT = 6.4, 3.2  # inches of one diagram
 
 
-@checked
+@checked_as(at=MAPPING)
 def response_curves(
     dataset: xarray.Dataset,
     axis: str | None = None,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import import_extra
+from vkbloom._checks import check_index, import_extra
 from vkbloom._grid.identity import chunk_in
 from vkbloom._grid.keys import Keys, open_keys
 from vkbloom._grid.layout import Grid, Layout, ask
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from vkbloom._scene import Scene
 
-__all__ = ["check_chunks", "grid"]
+__all__ = ["grid"]
 
 
 @checked
@@ -58,7 +58,6 @@ def grid(
     part: tuple[int, int] | str | None = None,
     resume: bool = True,
     verify: bool = True,
-    on_mended: Callable[[str], object] | None = None,
     client: Client | None = None,
     adapter: str | None = None,
     validation: bool = False,
@@ -107,16 +106,14 @@ def grid(
     part : (int, int) or str, optional
         Render only part i of n of a store, from 1. Part 0 is part n. Each part is a run of chunks,
         about 1/n of the points. Processes may render parts at the same time, in any order and
-        repeatedly; `check_grid` names missing parts. Text is "3/16"; "auto/16" takes i, and "auto"
-        also n, from the environment of a job array, such as SLURM_ARRAY_TASK_ID. The default of
-        `chunks` has at least n chunks; name `chunks` for the same bytes as without parts.
+        repeatedly; `check_grid` names missing parts. Text is "3/16"; "auto/16" takes i from
+        SLURM_ARRAY_TASK_ID, and "auto" also n from SLURM_ARRAY_TASK_COUNT. The default of `chunks`
+        has at least n chunks; name `chunks` for the same bytes as without parts.
     resume : bool
         Whether to continue an existing store. False: raise FileExistsError.
     verify : bool
         Whether to read the existing points of a store first and render damaged ones again. False:
         trust the marks in ``done``.
-    on_mended : callable, optional
-        Called with a line of text for each damaged or missing key of a store that was replaced.
     client : distributed.Client, optional
         The workers of its cluster render a store and write it. Default: this process does.
     adapter, validation
@@ -176,8 +173,8 @@ def grid(
     >>> grid["final"].sel(preset="kino", intensity=0.5).shape
     (32, 48, 3)
     """
-    import_extra("xarray", "grid", "grid")
-    given = {"chunks": chunks, "part": part, "client": client, "on_mended": on_mended}
+    xr = import_extra("xarray", "grid", "grid")
+    given = {"chunks": chunks, "part": part, "client": client}
     for name, value in given.items():
         if store is None and value is not None:
             raise ValueError(f"{name}: a grid in memory has none; give store, too")
@@ -204,21 +201,22 @@ def grid(
             by = stack.enter_context(opened_renderer(adapter or "auto", validation))
         else:
             by = renderer or default_renderer()
-        if keys is None and isinstance(by, Renderer):
+        if keys is None:
+            assert isinstance(by, Renderer)  # a client needs a store
             return in_memory(asked, by, progress)
-        options = _Stored(keys, chunks, read_part(part), resume, verify, on_mended)
-        return _stored(asked, options, by, progress)
+        number, count = read_part(part)
+        _check_stored(asked, by, chunks)
 
+        def prepared(layout: Layout) -> GridStore:
+            chunk = _chunk(asked, layout, chunks, keys, count)
+            stored = GridStore(keys, asked, layout, chunk, (number, count))
+            stored.prepare(resume=resume, verify=verify)
+            return stored
 
-class _Stored(NamedTuple):
-    """How a grid is stored."""
-
-    keys: Any
-    chunks: Mapping[str, int] | None
-    part: tuple[int, int]
-    resume: bool
-    verify: bool
-    on_mended: Callable[[str], object] | None
+        tally = render_grid(asked, prepared, by, progress=progress)
+    dataset: xarray.Dataset = xr.open_zarr(keys.store)
+    dataset.attrs.pop(IDENTITY, None)
+    return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
 
 
 def _keys(store: Any, client: Client | None) -> Keys:
@@ -230,33 +228,23 @@ def _keys(store: Any, client: Client | None) -> Keys:
     return keys
 
 
-def _stored(
-    grid: Grid, options: _Stored, by: Renderer | Workers, progress: bool | None
-) -> xarray.Dataset:
-    """Render a grid into a store, and return that opened."""
-    xr = import_extra("xarray", "grid", "grid")
-    keys, chunks, part, resume, verify, on_mended = options
+def _check_stored(grid: Grid, by: Renderer | Workers, chunks: Mapping[str, int] | None) -> None:
+    """Raise TypeError or ValueError for a grid that cannot be stored, or not by these workers."""
     if (
         isinstance(by, Workers)
         and isinstance(grid.source, ImageSource)
         and any(isinstance(image, Image) for image in grid.source.images)
     ):
         raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
-    if "done" in (axis.name for axis in grid.axes):
+    names = [axis.name for axis in grid.axes]
+    if "done" in names:
         raise ValueError("axes: 'done' is not a possible name; the store uses it for its marks")
-    check_chunks(grid, chunks)
-
-    def prepared(layout: Layout) -> GridStore:
-        kept = GridStore(keys, grid, layout, _chunk(grid, layout, chunks, keys, part[1]), part)
-        for text in kept.prepare(resume=resume, verify=verify):
-            if on_mended is not None:
-                on_mended(text)
-        return kept
-
-    tally = render_grid(grid, prepared, by, progress=progress)
-    dataset: xarray.Dataset = xr.open_zarr(keys.store)
-    dataset.attrs.pop(IDENTITY, None)
-    return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
+    for name, count in (chunks or {}).items():
+        if name not in names:
+            raise ValueError(
+                f"chunks: {name!r} is not an axis of the grid; it has {', '.join(names)}"
+            )
+        check_index(f"chunks: {name}", count, 1, sys.maxsize)
 
 
 def _chunk(
@@ -268,19 +256,3 @@ def _chunk(
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
-
-
-def check_chunks(grid: Grid, chunks: Mapping[str, int] | None) -> None:
-    """Check the argument `chunks` of `grid`: a mapping of axis names to counts from 1."""
-    if chunks is None:
-        return
-    if not isinstance(chunks, Mapping):
-        raise TypeError(f"chunks: {chunks!r} is not a mapping of axis names to point counts")
-    names = [axis.name for axis in grid.axes]
-    for name, count in chunks.items():
-        if name not in names:
-            raise ValueError(
-                f"chunks: {name!r} is not an axis of the grid; it has {', '.join(names)}"
-            )
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-            raise ValueError(f"chunks: {name}: {count!r} is not an integer of at least 1")

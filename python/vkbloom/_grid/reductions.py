@@ -88,21 +88,6 @@ class Mean(Reduction):
     ... )
     >>> round(Mean()(frames), 3)
     0.2
-
-    In a grid, without storing frames:
-
-    >>> image = np.full((16, 16, 4), 0.5, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     grid = vkbloom.grid(
-    ...         image,
-    ...         vkbloom.Pyramid(levels=2),
-    ...         {"intensity": [0.0, 1.0]},
-    ...         framebuffers=(),
-    ...         reduce={"mean": Mean()},
-    ...         renderer=renderer,
-    ...     )
-    >>> grid["mean"].values.round(3)
-    array([0.5, 1. ])
     """
 
     def __call__(self, frames: Frames) -> float:
@@ -282,16 +267,6 @@ class PSNR(Comparing):
 
     Examples
     --------
-    An error of 0.1 everywhere is 20 dB:
-
-    >>> from vkbloom._grid.reductions import PSNR
-    >>> reference = np.full((16, 16, 4), 0.5, np.float32)
-    >>> frames = vkbloom.Frames(
-    ...     {"final": reference + 0.1}, timings={}, settings=vkbloom.Separable(), info={}
-    ... )
-    >>> round(PSNR(against=reference)(frames), 3)
-    20.0
-
     Every point of a grid against the one with `blur_scale` 1:
 
     >>> image = np.zeros((16, 16, 4), np.uint8)

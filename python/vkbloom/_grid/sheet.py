@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import MAPPING, checked_as
 from vkbloom._checks import check_index
 from vkbloom._framebuffers import leading
 from vkbloom._grid import selection
@@ -25,7 +25,7 @@ _CELL: Final = 40
 _LETTER_WIDTH: Final = 0.6
 
 
-@checked
+@checked_as(at=MAPPING)
 def contact_sheet(
     dataset: xarray.Dataset,
     rows: str | None = None,

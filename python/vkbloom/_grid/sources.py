@@ -26,7 +26,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import IMAGES_AHEAD, Request
-from vkbloom._renderer.sources import image_source, is_image, scene_source
+from vkbloom._renderer.sources import SCENE_SIZE, image_source, is_image, scene_source
 from vkbloom._settings.settings import Settings, check_shading
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from vkbloom._settings.settings import Shading
 
 __all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
-
-_SCENE_SIZE = (1280, 720)
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def visit(
             drawn.append(point.index)
             yield Request(source.on(renderer, point.place), point.settings)
 
-    for frames in renderer._run_work(work(), check_framebuffers(framebuffers)):
+    for frames in renderer._run_requests(work(), check_framebuffers(framebuffers)):
         yield drawn.popleft(), frames
 
 
@@ -194,7 +192,7 @@ def read_source(
         for name, array in given.items():
             if array is not None:
                 raise ValueError(f"{name}: the source is a scene; leave the argument out")
-        frame = check_size("size", size or _SCENE_SIZE)
+        frame = check_size("size", size or SCENE_SIZE)
         return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
         ("size", size is not None),

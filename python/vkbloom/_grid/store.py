@@ -28,7 +28,6 @@ from typing import Any, Final
 import numpy as np
 
 from vkbloom._checks import import_extra
-from vkbloom._grid.axes import Axis
 from vkbloom._grid.chunks import DONE, Chunks
 from vkbloom._grid.identity import FORMAT, differences, fingerprint, identity, short
 from vkbloom._grid.keys import Keys
@@ -42,7 +41,6 @@ __all__ = [
     "PARTS",
     "GridStore",
     "checked_identity",
-    "describe",
     "mark_of",
     "normal",
     "read_json",
@@ -165,11 +163,11 @@ class GridStore:
                 if key.startswith(PARTS):
                     self.keys.remove(key)
 
-    def prepare(self, *, resume: bool, verify: bool) -> list[str]:
+    def prepare(self, *, resume: bool, verify: bool) -> None:
         """Create the store, or examine an existing one and replace damaged metadata.
 
-        Returns a phrase for each damaged or missing key. FileExistsError: the store exists and
-        `resume` is False. ValueError: it contains other data or another grid; nothing is written.
+        FileExistsError: the store exists and `resume` is False. ValueError: it contains other data
+        or another grid; nothing is written.
         """
         expected = expected_keys(self.grid, self.layout, self.chunk)
         held = self.keys.all()
@@ -183,19 +181,16 @@ class GridStore:
         self._check_identity(expected)
         if self.part == WHOLE:
             self.keys.remove_leftovers()
-        mended = []
         for key, content in expected.items():
-            found = self.keys.read(key) if held or key == METADATA else None
-            if normal(key, found) != normal(key, content):
+            stored = self.keys.read(key) if held or key == METADATA else None
+            if normal(key, stored) != normal(key, content):
                 self.keys.write(key, content)
-                # Another part may have begun to write the metadata.
-                if found is not None or self.part == WHOLE:
-                    mended.append(f"{key} was {'missing' if found is None else 'damaged'}")
         self.keys.flush(expected)
         if self.part != WHOLE:
             order = json.dumps(self.layout.ranking).encode()
             self.keys.write(f"{PARTS}{self.part[1]}", order)
-        return mended + self._find_done(held, verify=verify) if held else []
+        if held:
+            self._find_done(held, verify=verify)
 
     def _check_identity(self, expected: Mapping[str, bytes]) -> None:
         """Raise ValueError unless the store contains this grid."""
@@ -212,43 +207,25 @@ class GridStore:
             what = "contains another grid" if mark else "its content is not a grid of vkbloom"
             raise ValueError(f"{self.keys.name}: {what}, and its {METADATA} is missing or damaged")
 
-    def _find_done(self, held: set[str], *, verify: bool) -> list[str]:
+    def _find_done(self, held: set[str], *, verify: bool) -> None:
         """Find the completed points, and remove the marks of damaged ones."""
-        mended: list[str] = []
         unmarked = []
         for block in self.blocks():
             marked = self._chunks.marked(block, held)
-            place = describe(self.grid.axes, block)
-            if isinstance(marked, str):
-                mended.append(f"{self._chunks.key(DONE, block)} was {marked}, of {place}")
-            elif not marked and not verify:
+            if not (marked or verify):
                 continue
-            problem = self._problem(block, held, verify=verify)
-            self.done[block.slices] = problem is None
-            if problem is None and marked is not True:
+            problems = (
+                self._chunks.problem(name, block, held, read=verify)
+                for name in self.layout.variables
+            )
+            is_complete = not any(problems)
+            self.done[block.slices] = is_complete
+            if is_complete and marked is not True:
                 # A complete block without a mark was written just before the process ended.
                 unmarked.append(block)
-            elif problem is not None and marked:
-                mended.append(f"{problem}, of {place}")
+            elif marked and not is_complete:
                 self.keys.remove(self._chunks.key(DONE, block))
         self._chunks.mark(unmarked)
-        return mended
-
-    def _problem(self, block: Block, held: set[str], *, verify: bool) -> str | None:
-        for name in self.layout.variables:
-            problem = self._chunks.problem(name, block, held, read=verify)
-            if problem is not None:
-                return f"{self._chunks.key(name, block)} was {problem}"
-        return None
-
-
-def describe(axes: Iterable[Axis], block: Block) -> str:
-    """Return the points of a block as text: the value, or first and last value, of each axis."""
-    parts = []
-    for axis, start, stop in zip(axes, block.start, block.stop, strict=True):
-        labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
-        parts.append(f"{axis.name}={'..'.join(labels)}")
-    return ", ".join(parts) or "the only point"
 
 
 def read_json(content: bytes | None) -> dict[str, Any] | None:

@@ -12,14 +12,13 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FLAG, checked, checked_as
 from vkbloom._checks import check_index, import_extra, native_order
-from vkbloom._io import displayed, image_reading, safe_writing
+from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
 from vkbloom._io.displayed import Saved, check_saved
 from vkbloom._io.expansion import check_expansion
-from vkbloom._io.image_writing import BITS, as_numbers, check_quality, described_as, put
-from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, is_exr
+from vkbloom._io.images import PIXEL_TYPES, Picture, SavedColour, check_name, is_exr
 
 __all__ = ["has_straight", "premultiplied", "read", "write"]
 
@@ -29,7 +28,7 @@ _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
 # The file's number types for floats, in order of preference, by the requested bits.
 _FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
     None: ("half", "float", "uint8"),
-    **BITS,
+    **image_writing.BITS,
 }
 # Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
@@ -55,7 +54,7 @@ def read(
     expand: float | None = ...,
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
-@checked
+@checked_as(metadata=FLAG)
 def read(
     path: str | os.PathLike[str],
     *,
@@ -103,20 +102,6 @@ def read(
         the file, such as "uint8"), "colour" (the colour space from which colours were decoded),
         "alpha" ("straight", "premultiplied", or None without alpha), "parts" (the names of the
         parts) and "notes" (assumptions).
-
-    Raises
-    ------
-    OSError
-        The file does not exist or cannot be opened. The error names it.
-    ValueError
-        The file is damaged or not an image; it has no such part or layer; or it has several layers
-        and `layer` is missing (the message lists them). The error names the file.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-    See Also
-    --------
-    write : Writes image files. Renderer.apply : Accepts the array.
 
     Notes
     -----
@@ -241,22 +226,6 @@ def write(
     Path
         The file.
 
-    Raises
-    ------
-    TypeError
-        The array's dtype is not uint8, uint16 or a float.
-    ValueError
-        The array's shape or an argument is not one of the above; or the format cannot store the
-        array: JPEG, GIF and Radiance HDR have no alpha, OpenEXR has no integers.
-    OSError
-        The file cannot be written. The error names it, and no partial file is left.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-    See Also
-    --------
-    read : Reads image files. Frames.save : Every framebuffer, with settings and timings.
-
     Notes
     -----
     `read` returns colours with the primaries of Rec. 709. A Display P3 photograph that is read and
@@ -276,27 +245,12 @@ def write(
     saved = Saved(encoding, primaries, view)
     _check_conversions(values, saved, bits)
     safe_writing.check_extension(oiio, target.suffix)
-    check_quality(target, quality)
-    with safe_writing.replacing(oiio, target, values.nbytes) as temporary:
-        numbers = _numbers(oiio, values, bits, temporary, target)
-        is_integer = numbers.startswith("uint")
-        if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
-            values = divided(values) if premultiplied else multiplied(values)
-        if view is not None and not is_integer:
-            raise ValueError(f"view: {target} has linear floats; write a file of integers")
-        picture = Picture.of_values(values, numbers, None, _typed(oiio, metadata or {}))
-        if is_float:
-            curve = encoding or ("srgb" if is_integer else "linear")
-            values, what = displayed.converted(oiio, values, saved, curve, is_integer=is_integer)
-            picture = described_as(oiio, picture, target, what)
-        put(
-            oiio,
-            as_numbers(values, numbers),
-            picture,
-            temporary,
-            target,
-            attributes={} if quality is None else {"CompressionQuality": quality},
-        )
+    if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
+        values = divided(values) if premultiplied else multiplied(values)
+    layout = values.shape[2], _numbers(oiio, values, bits, target)
+    stored: SavedColour | None = "linear" if is_float else None
+    picture = Picture.of_values(values, layout[1], stored, _typed(oiio, metadata or {}))
+    image_writing.save(picture, target, saved, quality=quality, layout=layout)
     return target
 
 
@@ -319,23 +273,21 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
     return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
 
 
-def _numbers(
-    oiio: ModuleType, values: NDArray[Any], bits: int | None, temporary: Path, target: Path
-) -> str:
+def _numbers(oiio: ModuleType, values: NDArray[Any], bits: int | None, target: Path) -> str:
     """Return OpenImageIO's name of the number type to write."""
     own = PIXEL_TYPES[values.dtype.name]
     wanted: Sequence[str] = [own]
     if values.dtype.kind == "f":
         wanted = [*dict.fromkeys((own, *_FLOATS[None]))] if bits is None else _FLOATS[bits]
     channels = values.shape[2]
-    writer = oiio.ImageOutput.create(str(temporary))
+    writer = oiio.ImageOutput.create(target.name)
     kind = writer.format_name()
     if channels in (2, 4) and not safe_writing.has_alpha(writer):
         raise ValueError(f"{target}: {kind} has no alpha; write array[..., :{channels - 1}]")
     for numbers in wanted:
-        if safe_writing.holds(oiio, temporary, channels, numbers):
+        if safe_writing.holds(oiio, target.suffix, channels, numbers):
             return numbers
-    if values.dtype.kind == "u" and safe_writing.holds(oiio, temporary, channels, "float"):
+    if values.dtype.kind == "u" and safe_writing.holds(oiio, target.suffix, channels, "float"):
         raise ValueError(
             f"{target}: {kind} holds floats, not {values.dtype}; write linear floats, as "
             "vkbloom.read gives them"

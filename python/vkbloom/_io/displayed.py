@@ -219,8 +219,8 @@ def with_names(
         return False, {**kept, **named}
     if points == _DISPLAYS["sRGB - Display"]:
         return False, kept
-    cure = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
-    raise ValueError(f"{target}: {kind} cannot name the colours {name}; {cure}")
+    hint = "write PNG" if curve in ("", *HDR_CURVES) else "write PNG or OpenEXR"
+    raise ValueError(f"{target}: {kind} cannot name the colours {name}; {hint}")
 
 
 def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:

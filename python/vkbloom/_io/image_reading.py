@@ -44,12 +44,12 @@ __all__ = [
     "is_photograph",
     "listed_parts",
     "load",
+    "non_finite_note",
     "of_layer",
     "opened",
     "points_of",
     "readable_extensions",
     "size_of",
-    "specials_note",
 ]
 
 _LARGEST_SIDE: Final = 65536
@@ -359,7 +359,7 @@ def listed_parts(stored: StoredImage) -> str:
     return f"parts {names}" if names else f"{len(stored.parts)} parts"
 
 
-def specials_note(nan: int, infinite: int) -> str | None:
+def non_finite_note(nan: int, infinite: int) -> str | None:
     """Return a note about values that are not finite; None: there are none."""
     if not nan and not infinite:
         return None

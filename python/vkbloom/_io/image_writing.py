@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_index, import_extra
+from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, is_exr
@@ -23,10 +22,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BITS",
-    "as_numbers",
+    "Part",
     "check_bits",
     "check_quality",
     "check_writable",
+    "described_as",
     "is_straight",
     "put",
     "save",
@@ -53,6 +53,14 @@ BITS: Final[Mapping[int | None, tuple[str, ...]]] = {
 }
 # OpenImageIO's names of the formats that have a quality, 1 to 100.
 _LOSSY: Final = ("jpeg", "webp", "jpegxl")
+
+
+class Part(NamedTuple):
+    """Values to write unchanged, shape (H, W, C) with 1 to 4 channels, and what describes them."""
+
+    values: NDArray[Any]
+    picture: Picture
+    attributes: Mapping[str, str | int]
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -94,11 +102,10 @@ def check_bits(path: str | os.PathLike[str], bits: int | None) -> None:
     if bits not in BITS:
         raise ValueError(f"bits: {bits!r} is not one of {', '.join(map(str, BITS))}")
     oiio = import_extra("OpenImageIO", "images", "Writing images")
-    with tempfile.TemporaryDirectory() as folder:
-        tried = Path(folder, f"image{Path(path).suffix}")
-        if not any(safe_writing.holds(oiio, tried, 3, numbers) for numbers in BITS[bits]):
-            kind = oiio.ImageOutput.create(tried.name).format_name()
-            raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
+    suffix = Path(path).suffix
+    if not any(safe_writing.holds(oiio, suffix, 3, numbers) for numbers in BITS[bits]):
+        kind = oiio.ImageOutput.create(f"image{suffix}").format_name()
+        raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
 
 
 def save(
@@ -109,6 +116,7 @@ def save(
     quality: int | None = None,
     *,
     bits: int | None = None,
+    layout: tuple[int, str] | None = None,
 ) -> tuple[str, ...]:
     """Write a picture to a file, with its own number type or the closest one of the format.
 
@@ -119,6 +127,7 @@ def save(
     `saved`: The colours in the file, for linear pictures. With HDR curves, files of integers have
     16 bits where the format has them.
     `bits`: Size of a number. None: that of the picture, or the closest one of the format.
+    `layout`: The number of channels and the number type, if they are chosen already.
     """
     saved = saved or Saved()
     if saved != Saved() and picture.encoding != "linear":
@@ -132,34 +141,14 @@ def save(
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     added = {} if quality is None else {"CompressionQuality": quality}
-    with safe_writing.replacing(oiio, target, picture.values.nbytes) as temporary:
-        return _write(
-            oiio,
-            picture,
-            saved,
-            temporary,
-            target,
-            attributes={**(attributes or {}), **added},
-            bits=bits,
-        )
-
-
-def _write(
-    oiio: ModuleType,
-    picture: Picture,
-    saved: Saved,
-    temporary: Path,
-    target: Path,
-    *,
-    attributes: Mapping[str, str | int],
-    bits: int | None,
-) -> tuple[str, ...]:
     picture = in_colour(picture, saved)
-    writer = oiio.ImageOutput.create(str(temporary))
-    is_hdr = displayed.is_hdr(saved)
-    layout = chosen_layout(oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits)
+    if layout is None:
+        is_hdr = displayed.is_hdr(saved)
+        layout = chosen_layout(oiio, picture, target, is_hdr=is_hdr, bits=bits)
     values, described, notes = prepared(oiio, picture, layout, saved, target)
-    put(oiio, values, described, temporary, target, attributes=attributes)
+    part = Part(values, described, {**(attributes or {}), **added})
+    with safe_writing.replacing(oiio, {target: values.nbytes}) as (temporary,):
+        put(oiio, [part], temporary, target)
     return notes
 
 
@@ -225,39 +214,22 @@ def described_as(
     return dataclasses.replace(picture, encoding=None, stored=dataclasses.replace(stored, space=""))
 
 
-def put(
-    oiio: ModuleType,
-    values: NDArray[Any],
-    picture: Picture,
-    temporary: Path,
-    target: Path,
-    *,
-    attributes: Mapping[str, str | int],
-) -> None:
-    """Write values unchanged into a temporary file.
-
-    `values`: ndarray, shape (H, W, C); 1 to 4 channels of a dtype that the format supports.
-    """
+def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) -> None:
+    """Write the parts of a file to its temporary file; only OpenEXR has more than one."""
     writer = oiio.ImageOutput.create(str(temporary))
-    stored = picture.stored
-    x, y, width, height = stored.display
     if not writer.supports("displaywindow"):
-        row, column = y - stored.origin[1], x - stored.origin[0]
-        values = values[row : row + height, column : column + width]
-    spec = spec_of(
-        oiio,
-        writer,
-        values.shape,
-        values.dtype,
-        picture=picture,
-        target=target,
-        attributes=attributes,
-    )
-    is_written = (
-        writer.open(str(temporary), spec)
-        and writer.write_image(np.ascontiguousarray(values))
-        and writer.close()
-    )
+        parts = [part._replace(values=_displayed(part)) for part in parts]
+    specs = [spec_of(oiio, writer, part, target) for part in parts]
+    is_written = True
+    for index, (part, spec) in enumerate(zip(parts, specs, strict=True)):
+        mode = ("AppendSubimage",) if index else ()
+        opened = specs if len(specs) > 1 and not index else spec
+        is_written = (
+            is_written
+            and writer.open(str(temporary), opened, *mode)
+            and writer.write_image(np.ascontiguousarray(native_order(part.values)))
+        )
+    is_written = is_written and writer.close()
     # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
     is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
     if not is_written:
@@ -266,29 +238,35 @@ def put(
     writer.geterror()
 
 
+def _displayed(part: Part) -> NDArray[Any]:
+    """Return the values inside the display window."""
+    stored = part.picture.stored
+    x, y, width, height = stored.display
+    row, column = y - stored.origin[1], x - stored.origin[0]
+    return part.values[row : row + height, column : column + width]
+
+
 def spec_of(
-    oiio: ModuleType,
-    writer: OpenImageIO.ImageOutput,
-    shape: tuple[int, ...],
-    dtype: np.dtype[Any],
-    *,
-    picture: Picture,
-    target: Path,
-    attributes: Mapping[str, str | int],
+    oiio: ModuleType, writer: OpenImageIO.ImageOutput, part: Part, target: Path
 ) -> OpenImageIO.ImageSpec:
-    """Return the description of a file with values of this shape and dtype, as for `put`."""
-    stored = picture.stored
-    height, width, channels = shape
-    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(width, height, channels, PIXEL_TYPES[dtype.name])
-    if channels < 3:
+    """Return OpenImageIO's description of a part."""
+    stored = part.picture.stored
+    height, width, channels = part.values.shape
+    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
+        width, height, channels, PIXEL_TYPES[part.values.dtype.name]
+    )
+    if stored.channels == ("Z",):
+        spec.channelnames = stored.channels
+        spec.z_channel = 0
+    elif channels < 3:
         has_alpha = channels == 2
         spec.channelnames = ("Y", "A")[:channels]
         spec.alpha_channel = 1 if has_alpha else -1
     if writer.supports("displaywindow"):
         spec.x, spec.y = stored.origin
         spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
-    _describe(spec, picture, writer.format_name(), target)
-    for name, value in attributes.items():
+    _describe(spec, part.picture, writer.format_name(), target)
+    for name, value in part.attributes.items():
         spec.attribute(name, value)
     return spec
 
@@ -296,8 +274,6 @@ def spec_of(
 def chosen_layout(
     oiio: ModuleType,
     picture: Picture,
-    writer: OpenImageIO.ImageOutput,
-    temporary: Path,
     target: Path,
     *,
     is_hdr: bool,
@@ -311,9 +287,10 @@ def chosen_layout(
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
         wanted = BITS[bits]
+    writer = oiio.ImageOutput.create(f"image{target.suffix}")
     for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in wanted:
-            if safe_writing.holds(oiio, temporary, values.shape[2], numbers):
+            if safe_writing.holds(oiio, target.suffix, values.shape[2], numbers):
                 return values.shape[2], numbers
     raise ValueError(
         f"{target}: {writer.format_name()} cannot hold this picture; use another format"

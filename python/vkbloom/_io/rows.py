@@ -166,22 +166,15 @@ def written_rows(
         nonlocal layout, row
         picture = image_writing.in_colour(picture, saved)
         if layout is None:
-            is_hdr = displayed.is_hdr(saved)
             layout = image_writing.chosen_layout(
-                oiio, picture, writer, temporary, target, is_hdr=is_hdr, bits=bits
+                oiio, picture, target, is_hdr=displayed.is_hdr(saved), bits=bits
             )
         values, described, notes = image_writing.prepared(oiio, picture, layout, saved, target)
         if row == 0:
-            shape = height, *values.shape[1:]
-            spec = image_writing.spec_of(
-                oiio,
-                writer,
-                shape,
-                values.dtype,
-                picture=described,
-                target=target,
-                attributes=told,
-            )
+            # Of the size of the image, without its memory.
+            whole = np.broadcast_to(values[:1], (height, *values.shape[1:]))
+            part = image_writing.Part(whole, described, told)
+            spec = image_writing.spec_of(oiio, writer, part, target)
             check(writer.open(str(temporary), spec))
         top = picture.stored.origin[1] if writer.supports("displaywindow") else 0
         rows = np.ascontiguousarray(values)

@@ -1,25 +1,19 @@
 """Write image files safely: completely or not at all, in a format that keeps the values.
 
-A file is written to a temporary file beside it, which is renamed when it is complete:
-
-1. `check_extension` before anything is written
-2. `reserve` the temporary file; `holds` tests on it what the format supports
-3. write it; `write_error` converts a failure of OpenImageIO
-4. `check_complete`, then `put_in_place`
-5. `remove` the temporary file if it still exists
-
-`replacing` does steps 2, 4 and 5 for one file, and `writing` also closes a writer for it.
+Files are written to temporary files beside them (`replacing`), which are read again and renamed
+when all of them are complete. `writing` also opens and closes a writer of OpenImageIO.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
@@ -34,16 +28,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Steps",
-    "check_complete",
     "check_extension",
     "has_alpha",
     "holds",
     "is_stream",
     "is_temporary",
-    "put_in_place",
     "remove",
     "replacing",
-    "reserve",
     "write_error",
     "write_file",
     "writing",
@@ -99,26 +90,29 @@ def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
     return writer.supports("alpha") != 0 and writer.format_name() != "gif"
 
 
-def holds(oiio: ModuleType, temporary: Path, channels: int, numbers: str) -> bool:
+@functools.lru_cache
+def holds(oiio: ModuleType, suffix: str, channels: int, numbers: str) -> bool:
     """Return whether a format supports a number of channels and a number type.
 
     OpenImageIO knows this only for a complete file: a small one is written and opened again.
     """
-    spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
-    writer = oiio.ImageOutput.create(str(temporary))
-    is_kept = False
-    if writer.open(str(temporary), spec):
-        opened = writer.spec()
-        is_written = writer.write_image(np.zeros((_TRIED, _TRIED, channels), np.float32))
-        is_written = writer.close() and is_written
-        is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
-    # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
-    writer.geterror()
-    if is_kept:
-        reader = oiio.ImageInput.open(str(temporary))
-        # FITS takes halves for another type. OpenImageIO needs 128 bytes of JPEG XL.
-        is_kept = reader is None or str(reader.spec().format) == numbers
-        failure_of(oiio)
+    with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
+        name = f"{folder}/image{suffix}"
+        spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
+        writer = oiio.ImageOutput.create(name)
+        is_kept = False
+        if writer.open(name, spec):
+            opened = writer.spec()
+            is_written = writer.write_image(np.zeros((_TRIED, _TRIED, channels), np.float32))
+            is_written = writer.close() and is_written
+            is_kept = is_written and (str(opened.format), opened.nchannels) == (numbers, channels)
+        # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
+        writer.geterror()
+        if is_kept:
+            reader = oiio.ImageInput.open(name)
+            # FITS takes halves for another type. OpenImageIO needs 128 bytes of JPEG XL.
+            is_kept = reader is None or str(reader.spec().format) == numbers
+            failure_of(oiio)
     return is_kept
 
 
@@ -165,24 +159,30 @@ def put_in_place(temporary: Path, file: Path) -> None:
 
 
 @contextlib.contextmanager
-def replacing(oiio: ModuleType, file: Path, size: int) -> Iterator[Path]:
-    """Yield a temporary file to be written in place of a file.
+def replacing(oiio: ModuleType, sizes: Mapping[Path, int]) -> Iterator[list[Path]]:
+    """Yield temporary files to be written in place of files, whose pixels have these bytes.
 
-    At the end of the block it is checked and renamed. If the block raises, it is removed.
+    At the end of the block all are checked, then all are renamed. If the block raises, they are
+    removed.
     """
-    temporary = reserve(file, size)
+    temporaries: list[Path] = []
     try:
-        yield temporary
-        check_complete(oiio, temporary, file)
-        put_in_place(temporary, file)
+        for file, size in sizes.items():
+            temporaries.append(reserve(file, size))
+        yield temporaries
+        for temporary, file in zip(temporaries, sizes, strict=True):
+            check_complete(oiio, temporary, file)
+        for temporary, file in zip(temporaries, sizes, strict=True):
+            put_in_place(temporary, file)
     finally:
-        remove(temporary)
+        for temporary in temporaries:
+            remove(temporary)
 
 
 @contextlib.contextmanager
 def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
     """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it."""
-    with replacing(oiio, file, 0) as temporary:
+    with replacing(oiio, {file: 0}) as (temporary,):
         writer: Any = oiio.ImageOutput.create(str(temporary))
 
         def check(done: bool) -> None:

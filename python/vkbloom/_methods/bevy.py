@@ -35,11 +35,6 @@ class BevyBloom(Settings):
     **settings
         The other fields of `Settings`.
 
-    See Also
-    --------
-    presets : "bevy_natural" and others.
-    Pyramid : A chain with the same downsample.
-
     Notes
     -----
     ``down_0`` is `max_mip_dimension` high; its width follows from the aspect of the frame

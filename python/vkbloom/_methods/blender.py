@@ -92,11 +92,6 @@ class BlenderGlare(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
-    See Also
-    --------
-    presets : "blender_bloom" and the others.
-    Streaks, Ghosts : The same rays with any bloom.
-
     Notes
     -----
     All types start from the highlights. In "medium" and "low" a pixel of these is the mean of 2 x 2

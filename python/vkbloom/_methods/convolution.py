@@ -67,19 +67,6 @@ class Convolution(Settings):
     **settings
         The fields of `Settings`.
 
-    Raises
-    ------
-    ValueError
-        A field is out of its range. `Renderer.plan` and its callers raise it if `normalize` is
-        True and the sum of a channel is not above 0.
-    TypeError
-        A field has the wrong type.
-
-    See Also
-    --------
-    vkbloom.psf : The point-spread functions.
-    Pyramid : A wide blur that takes less time.
-
     Notes
     -----
     bloom[y, x] = sum over j, i of K[j, i] glow[y - (j - h // 2), x - (i - w // 2)]. The framebuffer
@@ -136,11 +123,6 @@ class Convolution(Settings):
         -------
         ndarray of float64, shape (h, w, 3)
             The kernel in pixels of the bloom buffers.
-
-        Raises
-        ------
-        ValueError
-            A channel's sum is not above 0, and `normalize` is True.
         """
         return _kernel(self._shape, frame, buffers or frame)
 

@@ -30,10 +30,6 @@ class FilamentBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
-    See Also
-    --------
-    presets : "filament".
-
     Notes
     -----
     The width of ``down_0`` follows from the aspect of the frame, floored to a multiple of 16, at

@@ -55,10 +55,6 @@ class GodotBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
-    See Also
-    --------
-    presets : "godot_4_5" and "godot_4_6".
-
     Notes
     -----
     Level i has the size floor(side / 2) >> i of the frame, at least 1. It is the image above it

@@ -28,10 +28,6 @@ class KinoBloom(Settings):
     **settings
         The other fields of `Settings`.
 
-    See Also
-    --------
-    presets : "kino".
-
     Notes
     -----
     ``bright`` has the size of the frame. It is m = median(median(c, left, right), up, down) after

@@ -35,11 +35,6 @@ class Pyramid(Settings):
     **settings
         The fields of `Settings`.
 
-    See Also
-    --------
-    DualKawase : A chain without additions.
-    BevyBloom, KinoBloom, FilamentBloom, UrpBloom, HdrpBloom : Pyramids of engines.
-
     Notes
     -----
     Weights of the downsample: centre 0.125; four diagonals 1 texel away 0.125 each; four axials
@@ -99,10 +94,6 @@ class DualKawase(Settings):
         Factor of the distances of all taps, 0 to 16.
     **settings
         The fields of `Settings`.
-
-    See Also
-    --------
-    Pyramid : A chain whose levels are added.
 
     Notes
     -----

@@ -30,10 +30,6 @@ class PygfxBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
-    See Also
-    --------
-    presets : "pygfx".
-
     Notes
     -----
     ``down_0`` has half the size of the frame, each next level half of the one before, floored, by

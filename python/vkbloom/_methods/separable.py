@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import INTEGER, NUMBER, checked_as
 from vkbloom._checks import as_float, check_floats
 from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
 from vkbloom._settings.settings import Settings
@@ -79,11 +79,6 @@ class Separable(Settings):
     **settings
         The fields of `Settings`.
 
-    See Also
-    --------
-    gaussian_weights : Makes `weights`.
-    Pyramid, DualKawase : Methods for wide blurs.
-
     Notes
     -----
     Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
@@ -111,7 +106,7 @@ class Separable(Settings):
     direct: bool = flag_field("direct")
 
 
-@checked
+@checked_as(sigma=NUMBER, radius=INTEGER)
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
     """Make a normalized Gaussian half-kernel.
 
@@ -127,17 +122,6 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     tuple of float
         w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
         w0 + 2 (w1 + ... + w_radius) = 1.
-
-    Raises
-    ------
-    ValueError
-        `sigma` or `radius` is out of range.
-    TypeError
-        `sigma` is not a number, or `radius` not an integer.
-
-    See Also
-    --------
-    Separable : Takes the weights.
 
     Examples
     --------

@@ -31,11 +31,6 @@ class UrpBloom(Settings):
     **settings
         The other fields of `Settings`.
 
-    See Also
-    --------
-    HdrpBloom : The bloom of Unity's other pipeline.
-    presets : "unity_urp".
-
     Notes
     -----
     ``down_0`` is one bilinear tap at half of the frame's size, floored. It is clamped; then the
@@ -91,11 +86,6 @@ class HdrpBloom(Settings):
         0 to 1. It is 2^i - 1 of the intensity i that HDRP shows, whose default is 0 (off).
     **settings
         The other fields of `Settings`; there is no knee.
-
-    See Also
-    --------
-    UrpBloom : The bloom of Unity's other pipeline.
-    presets : "unity_hdrp".
 
     Notes
     -----

@@ -31,10 +31,6 @@ class UnrealBloom(Settings):
     **settings
         The other fields of `Settings`; there is no knee.
 
-    See Also
-    --------
-    presets : "threejs_unreal".
-
     Notes
     -----
     ``bright`` is one bilinear tap at half of the frame's size, rounded, times

@@ -35,11 +35,6 @@ class AdapterInfo:
     summary : str
         Name, type, driver and Vulkan version on one line.
 
-    See Also
-    --------
-    adapters : Lists the adapters.
-    Renderer : Chooses an adapter by type or name.
-
     Examples
     --------
     >>> info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 25.0.7", "1.4.305")
@@ -117,16 +112,6 @@ def adapters() -> tuple[AdapterInfo, ...]:
     tuple of AdapterInfo
         First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
         driver works.
-
-    Raises
-    ------
-    Error
-        The Vulkan loader fails.
-
-    See Also
-    --------
-    AdapterInfo : Describes an adapter.
-    Renderer : Chooses an adapter by type or name.
 
     Examples
     --------

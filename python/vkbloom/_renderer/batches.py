@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["Batches"]
 
 #: The most bytes of images on the device, half of what the core keeps.
-BYTES = 128 << 20
+MAX_BYTES = 128 << 20
 #: The most layers, which every device has.
-LAYERS = 256
+MAX_LAYERS = 256
 #: With fewer, large images are taken one by one: each of them keeps the device busy.
-LEAST = 4
+MIN_LAYERS = 4
 #: Submissions that are pending while the caller takes the frames of another one.
 AHEAD = 2
 #: Between the results of images, whose arrays begin at multiples of it (vkb_layer_stride).
@@ -108,13 +108,13 @@ class Batches:
                     return
                 part = pending.popleft()
                 done = part.first + part.layers
-                end = self._pending.add(part.submission)
+                submission = self._pending.add(part.submission)
                 if not part.submission.ordered:
-                    end.come()
+                    submission.complete()
                 while part.frames:
                     # Yielded frames are not kept, so that the caller is their only owner.
                     layer = part.layers - len(part.frames)
-                    part.frames[-1]._finish_later(functools.partial(end.of_layer, layer))
+                    part.frames[-1]._finish_later(functools.partial(submission.of_layer, layer))
                     yield part.frames.pop()
                 del part
         finally:
@@ -123,14 +123,14 @@ class Batches:
     def _layers(self, batch: ImportedArray, settings: Settings) -> int:
         """Return how many images are taken together; 0: they are taken one by one."""
         count, kind = batch.shape[0], (batch.shape[1:], batch.dtype)
-        if settings._has_state or count < LEAST:
+        if settings._has_state or count < MIN_LAYERS:
             return 0
         if self._size is None or self._size[:2] != (settings, kind):
             one = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
             self._size = settings, kind, one.image_size
-        parts = math.ceil(count / max(1, min(LAYERS, BYTES // self._size[2])))
+        parts = math.ceil(count / max(1, min(MAX_LAYERS, MAX_BYTES // self._size[2])))
         layers = math.ceil(count / parts)
-        return layers if layers >= LEAST else 0
+        return layers if layers >= MIN_LAYERS else 0
 
     def _submit(
         self,

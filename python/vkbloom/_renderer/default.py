@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import threading
 from collections.abc import Mapping, Sequence
@@ -10,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from numpy.typing import NDArray
 
+from vkbloom import _core
 from vkbloom._argument_types import checked
 from vkbloom._renderer.device_arrays import Device
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
-from vkbloom._renderer.renderer import SCENE_SIZE, Renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.sources import SCENE_SIZE
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
@@ -25,22 +28,30 @@ __all__ = ["apply", "default_renderer", "render"]
 
 
 class _Default:
-    """The renderer that calls without one use; a forked child and a closed one get a new one."""
+    """The renderers of calls without one, by adapter.
+
+    A forked child opens its own. One that was closed, or whose device was lost, is replaced.
+    """
 
     def __init__(self) -> None:
-        self.renderer: Renderer | None = None
+        self.renderers: dict[str, Renderer] = {}
         self.lock = threading.Lock()
 
-    def get(self) -> Renderer:
+    def get(self, adapter: str) -> Renderer:
         with self.lock:
-            if self.renderer is None or self.renderer.closed:
-                self.renderer = Renderer()
-            return self.renderer
+            renderer = self.renderers.get(adapter)
+            if renderer is not None and renderer._core.lost:
+                # The error was raised by the call that lost the device.
+                with contextlib.suppress(_core.Error):
+                    renderer.close()
+            if renderer is None or renderer.closed:
+                renderer = self.renderers[adapter] = Renderer(adapter)
+            return renderer
 
     def close(self) -> None:
         with self.lock:
-            if self.renderer is not None:
-                self.renderer.close()
+            for renderer in self.renderers.values():
+                renderer.close()
 
 
 _DEFAULT: Final = _Default()
@@ -50,6 +61,11 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_DEFAULT.__init__)  # type: ignore[misc]
 
 
+def renderer_on(adapter: str) -> Renderer:
+    """Return the default renderer of an adapter; "auto" is that of `default_renderer`."""
+    return _DEFAULT.get(adapter)
+
+
 def default_renderer() -> Renderer:
     """Return the renderer that functions use where no renderer is given.
 
@@ -57,23 +73,14 @@ def default_renderer() -> Renderer:
     -------
     Renderer
         ``Renderer()``, opened at the first use and closed at exit. A forked child opens its own. If
-        it was closed, the next call opens another one.
-
-    Raises
-    ------
-    AdapterNotFoundError, Error, ValueError
-        As for `Renderer`.
-
-    See Also
-    --------
-    apply, render : Use it.
+        it was closed, or its device was lost, the next call opens another one.
 
     Examples
     --------
     >>> vkbloom.default_renderer() is vkbloom.default_renderer()
     True
     """
-    return _DEFAULT.get()
+    return renderer_on("auto")
 
 
 @checked
@@ -111,18 +118,6 @@ def apply(
     Frames
         As of `Renderer.apply`.
 
-    Raises
-    ------
-    ValueError, TypeError, Error
-        As for `Renderer.apply`; or the settings have no such field.
-    OSError
-        The file cannot be read.
-
-    See Also
-    --------
-    render : The same for a scene.
-    read : Reads a file.
-
     Examples
     --------
     >>> image = np.zeros((16, 16, 3), np.float32)
@@ -132,10 +127,9 @@ def apply(
     """
     if isinstance(image, str | os.PathLike):
         image, settings = _read(image, settings)
-    chosen = check_settings(settings, of_image=True)
     return (renderer or default_renderer()).apply(
         image,
-        chosen.replace(**fields) if fields else chosen,
+        _changed(settings, fields, of_image=True),
         mask=mask,
         emission=emission,
         framebuffers=framebuffers,
@@ -144,19 +138,27 @@ def apply(
     )
 
 
+def _changed(
+    settings: Settings | str | None, fields: dict[str, Any], *, of_image: bool = False
+) -> Settings:
+    chosen = check_settings(settings, of_image=of_image)
+    return chosen.replace(**fields) if fields else chosen
+
+
 def _read(
     path: str | os.PathLike[str], settings: Settings | str | None
 ) -> tuple[NDArray[Any], Settings | str | None]:
     """Return the image of a file, and the settings: by default those for its type."""
-    from vkbloom._io.array_files import read  # noqa: PLC0415  needs OpenImageIO
-    from vkbloom._io.expansion import PHOTO_EXPANSION, expanded  # noqa: PLC0415
+    from vkbloom._io import array_files, expansion  # noqa: PLC0415  costs start-up time
 
-    image, facts = read(path, metadata=True)
+    image, facts = array_files.read(path, metadata=True)
     if not facts["numbers"].startswith("uint"):
         return image, settings
     photo = presets["photo"]
     chosen = photo if settings is None else check_settings(settings)
-    return expanded(image, PHOTO_EXPANSION) if chosen == photo else image, chosen
+    return expansion.expanded(
+        image, expansion.PHOTO_EXPANSION
+    ) if chosen == photo else image, chosen
 
 
 @checked
@@ -191,25 +193,15 @@ def render(
     Frames
         As of `Renderer.render`.
 
-    Raises
-    ------
-    ValueError, TypeError, Error
-        As for `Renderer.render`; or the settings have no such field.
-
-    See Also
-    --------
-    apply : The same for an image.
-
     Examples
     --------
     >>> frames = vkbloom.render(vkbloom.Scene.ufo(), size=(64, 48), bloom_size=(32, 32))
     >>> frames["final"].shape
     (48, 64, 4)
     """
-    chosen = check_settings(settings)
     return (renderer or default_renderer()).render(
         scene,
-        chosen.replace(**fields) if fields else chosen,
+        _changed(settings, fields),
         size,
         shading=shading,
         time=time,

@@ -46,7 +46,7 @@ _FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
 # CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
 _LEGACY = 1
 # More elements than any memory has.
-_MOST = 1 << 48
+_MAX_ELEMENTS = 1 << 48
 
 
 class DeviceArray:
@@ -65,10 +65,6 @@ class DeviceArray:
     shape : tuple of int
         (H, W, C), or (H, W) for depth.
     dtype : numpy.dtype
-
-    See Also
-    --------
-    Renderer.apply : Its argument `device`.
 
     Examples
     --------
@@ -119,29 +115,7 @@ class DeviceArray:
         raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
 
     def numpy(self) -> NDArray[Any]:
-        """Return a copy in the host's memory.
-
-        Returns
-        -------
-        ndarray
-
-        Raises
-        ------
-        Error
-            CUDA failed.
-
-        See Also
-        --------
-        numpy.from_dlpack : A view, on a CPU adapter.
-
-        Examples
-        --------
-        >>> image = np.full((16, 24, 3), 0.5, np.float32)
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     final = renderer.apply(image, device="device")["final"]
-        >>> final.numpy().shape
-        (16, 24, 3)
-        """
+        """Return a copy in the host's memory."""
         if isinstance(self._memory, np.ndarray):
             return self._memory.copy()
         array = np.empty(self.shape, self.dtype)
@@ -368,11 +342,11 @@ def _check_dtype(name: str, code: int, bits: int, lanes: int) -> str:
     if (name, code, bits, lanes) == ("mask", _BOOL, 8, 1):
         return "bool"
     kind = {_BFLOAT: "bfloat", _COMPLEX: "complex", _UINT: "uint", _FLOAT: "float"}.get(code, "int")
-    cure = f"convert it: {name}.to(torch.float32) in PyTorch, {name}.astype('float32') elsewhere"
+    hint = f"convert it: {name}.to(torch.float32) in PyTorch, {name}.astype('float32') elsewhere"
     if code == _COMPLEX:
-        cure = f"take its real part or its absolute value: abs({name})"
+        hint = f"take its real part or its absolute value: abs({name})"
     raise TypeError(
-        f"{name}: dtype {kind}{bits} is not one of uint8, float16, float32 on the device; {cure}"
+        f"{name}: dtype {kind}{bits} is not one of uint8, float16, float32 on the device; {hint}"
     )
 
 
@@ -403,7 +377,7 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     dtype = _check_dtype(name, code, bits, lanes)
     size = np.dtype(dtype).itemsize
     elements = _contiguous(shape) if strides is None else strides
-    if any(abs(one) >= _MOST for one in elements):
+    if any(abs(one) >= _MAX_ELEMENTS for one in elements):
         # CuPy 14 divides negative strides as if they had no sign.
         if hasattr(image, "__cuda_array_interface__"):
             # The capsule has ordered our stream after the producer's work.

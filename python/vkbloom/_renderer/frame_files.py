@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
+import itertools
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -15,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra, native_order
+from vkbloom._checks import import_extra
 from vkbloom._framebuffers import Framebuffers, leading
 from vkbloom._io import image_reading, safe_writing
-from vkbloom._io.displayed import HDR_CURVES, with_names
-from vkbloom._io.images import PIXEL_TYPES, check_name, complete, is_exr
+from vkbloom._io.displayed import HDR_CURVES
+from vkbloom._io.image_writing import Part, described_as, put
+from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, complete, is_exr
 from vkbloom._settings.settings import Settings
 from vkbloom._version import installed_version
 
@@ -30,7 +33,7 @@ __all__ = ["facts_of", "load", "save", "settings_facts"]
 
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
-# Attributes that `_spec` writes in addition to the entries of `info`.
+# Attributes that `_attributes` writes in addition to the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
@@ -56,25 +59,16 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
             plan = {
                 target.with_name(f"{target.stem}_{name}{target.suffix}"): [name] for name in frames
             }
-    # (temporary file, final file) of every reserved file.
-    files: list[tuple[Path, Path]] = []
-    try:
-        for file, names in plan.items():
-            size = sum(frames[name].nbytes for name in names)
-            files.append((safe_writing.reserve(file, size), file))
-            if not is_exr(file):
-                if _write_image(oiio, frames, names[0], *files[-1]):
-                    continue
-                safe_writing.remove(files.pop()[0])
-                beside = file.with_suffix(".exr")
-                files.append((safe_writing.reserve(beside, size), beside))
-            _write_exr(oiio, frames, names, *files[-1])
-        for temporary, file in files:
-            safe_writing.put_in_place(temporary, file)
-    finally:
-        for temporary, _ in files:
-            safe_writing.remove(temporary)
-    return [file for _, file in files]
+    files: dict[Path, list[Part]] = {}
+    for planned, names in plan.items():
+        image = None if is_exr(planned) else _image_part(oiio, frames, names[0], planned)
+        file = planned if image or is_exr(planned) else planned.with_suffix(".exr")
+        files[file] = [image] if image else [_exr_part(frames, name, file) for name in names]
+    sizes = {file: sum(part.values.nbytes for part in parts) for file, parts in files.items()}
+    with safe_writing.replacing(oiio, sizes) as temporaries:
+        for temporary, (file, parts) in zip(temporaries, files.items(), strict=True):
+            put(oiio, parts, temporary, file)
+    return list(files)
 
 
 def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -85,10 +79,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
     for file in _files_of(target):
-        for index in range(_parts_of(file)):
-            pixels, said = _stored(file, index)
-            if not is_one and not _is_of(target, file, said):
-                continue
+        for pixels, said in _parts_of(file, None if is_one else target):
             try:
                 facts = {
                     "settings": Settings.from_json(said["settings"]),
@@ -113,9 +104,23 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     return {name: array for name, (_, array, _) in ordered}, facts
 
 
-def _parts_of(file: Path) -> int:
-    """Return the number of framebuffers in a file."""
-    return len(image_reading.load(file).parts)
+def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], dict[str, str]]]:
+    """Yield the pixels of each part without the padding of its window, and its attributes.
+
+    `target`: Parts that `save` of this path did not write are left out; None: there are none.
+    """
+    with image_reading.opened(file, "Frames.load") as reader:
+        for index in itertools.count():
+            if not reader.seek_subimage(index, 0):
+                return
+            spec = reader.spec()
+            said = _facts(spec)
+            if target is not None and not _is_of(target, file, said):
+                continue
+            image_reading.check_plausible(spec, file)
+            pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
+            pixels = complete(pixels, reader, file)
+            yield pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 
 def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
@@ -126,18 +131,6 @@ def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
     return file.stem == (name if target.is_dir() else f"{target.stem}_{name}") or (
         file.stem == target.stem
     )
-
-
-def _stored(file: Path, index: int) -> tuple[NDArray[Any], dict[str, str]]:
-    """Return the pixels of a part without the padding of its window, and its attributes."""
-    with image_reading.opened(file, "Frames.load") as reader:
-        reader.seek_subimage(index, 0)
-        spec = reader.spec()
-        image_reading.check_plausible(spec, file)
-        said = _facts(spec)
-        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
-        pixels = complete(pixels, reader, file)
-    return pixels.reshape(spec.height, spec.width, spec.nchannels), said
 
 
 def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
@@ -204,80 +197,45 @@ def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
     return made[:, :, 0] if made.shape[2] == 1 else made
 
 
-def _write_image(
-    oiio: ModuleType, frames: Framebuffers, name: str, temporary: Path, file: Path
-) -> bool:
-    """Write one framebuffer to a file of any format; False if the format cannot hold it."""
+def _image_part(oiio: ModuleType, frames: Framebuffers, name: str, file: Path) -> Part | None:
+    """Return a framebuffer for a file of any format; None if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
-    writer = oiio.ImageOutput.create(str(temporary))
+    writer = oiio.ImageOutput.create(file.name)
     if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
         opaque = 255 if pixels.dtype == np.uint8 else 1.0
         if not (pixels[:, :, 3] == opaque).all():
-            return False
+            return None
         pixels = pixels[:, :, :3]
-    if not safe_writing.holds(oiio, temporary, pixels.shape[2], PIXEL_TYPES[str(pixels.dtype)]):
-        return False
-    spec = _spec(oiio, frames, name, pixels, file)
-    # Otherwise OpenImageIO assumes premultiplied colours and divides them by alpha.
-    spec.attribute("oiio:UnassociatedAlpha", 1)
+    numbers = PIXEL_TYPES[pixels.dtype.name]
+    if not safe_writing.holds(oiio, file.suffix, pixels.shape[2], numbers):
+        return None
+    picture = Picture.of_values(pixels, numbers)
     encoding = frames.settings.encoding
     if name == "final" and encoding in HDR_CURVES and writer.supports("cicp"):
-        _, named = with_names(oiio, {}, file, ("rec709", encoding))
-        for attribute, (kind, value) in named.items():
-            spec.attribute(attribute, kind, value)
-    if not (
-        writer.open(str(temporary), spec)
-        and writer.write_image(np.ascontiguousarray(native_order(pixels)))
-        and writer.close()
-    ):
-        raise safe_writing.write_error(writer, temporary, file)
-    safe_writing.check_complete(oiio, temporary, file)
-    return True
+        picture = described_as(oiio, picture, file, ("rec709", encoding))
+    return Part(pixels, picture, _attributes(frames, name, file))
 
 
-def _write_exr(
-    oiio: ModuleType, frames: Framebuffers, names: Iterable[str], temporary: Path, file: Path
-) -> None:
-    parts: list[NDArray[Any]] = []
-    specs: list[Any] = []
+def _exr_part(frames: Framebuffers, name: str, file: Path) -> Part:
+    """Return a framebuffer for a part of an OpenEXR file, in the display window of the frame."""
+    pixels = np.atleast_3d(frames[name])
+    if pixels.dtype == np.uint8:
+        pixels = (pixels / np.float32(255)).astype(np.float16)
     height, width = frames[leading(frames)].shape[:2]
-    for name in names:
-        pixels = np.atleast_3d(frames[name])
-        if pixels.dtype == np.uint8:
-            pixels = (pixels / np.float32(255)).astype(np.float16)
-        spec = _spec(oiio, frames, name, pixels, file)
-        # The name of the OpenEXR part.
-        spec.attribute("oiio:subimagename", name)
-        spec.full_width, spec.full_height = width, height
-        if pixels.shape[2] == 1:
-            spec.channelnames = ("Z",)
-            spec.z_channel = 0
-        parts.append(pixels)
-        specs.append(spec)
-    writer = oiio.ImageOutput.create(str(temporary))
-    if not writer.open(str(temporary), specs):
-        raise safe_writing.write_error(writer, temporary, file)
-    for index, (pixels, spec) in enumerate(zip(parts, specs, strict=True)):
-        if index and not writer.open(str(temporary), spec, "AppendSubimage"):
-            raise safe_writing.write_error(writer, temporary, file)
-        if not writer.write_image(np.ascontiguousarray(native_order(pixels))):
-            raise safe_writing.write_error(writer, temporary, file)
-    if not writer.close():
-        raise safe_writing.write_error(writer, temporary, file)
+    picture = Picture.of_values(pixels, PIXEL_TYPES[pixels.dtype.name])
+    stored = replace(picture.stored, display=(0, 0, width, height))
+    if pixels.shape[2] == 1:
+        stored = replace(stored, channels=("Z",))
+    # The name of the OpenEXR part.
+    attributes = {**_attributes(frames, name, file), "oiio:subimagename": name}
+    return Part(pixels, replace(picture, stored=stored), attributes)
 
 
-def _spec(
-    oiio: ModuleType, frames: Framebuffers, name: str, pixels: NDArray[Any], file: Path
-) -> OpenImageIO.ImageSpec:
-    """Return OpenImageIO's description of an (H, W, C) array, with the origin of the frames."""
-    height, width, channels = pixels.shape
-    spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
-        width, height, channels, PIXEL_TYPES[str(pixels.dtype)]
-    )
+def _attributes(frames: Framebuffers, name: str, file: Path) -> dict[str, str | int]:
+    """Return what a file says of a framebuffer."""
     settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")
-    spec.attribute("Software", f"vkbloom {frames.info.get('version', '')}".rstrip())
-    said = {
+    facts = {
         **{key: str(value) for key, value in frames.info.items()},
         "settings": settings,
         "timings": json.dumps(dict(frames.timings)),
@@ -285,11 +243,12 @@ def _spec(
         "framebuffer": name,
         "place": str(list(frames).index(name)),
     }
-    for key, value in said.items():
-        spec.attribute(f"vkbloom:{key}", value)
     description = f"vkbloom on {adapter}, settings {settings}"
     # TIFF and JPEG cannot store attributes with other names.
     if file.suffix.lower() in (".tif", ".tiff", ".jpg", ".jpeg"):
-        description += _DESCRIBED + json.dumps(said)
-    spec.attribute("ImageDescription", description)
-    return spec
+        description += _DESCRIBED + json.dumps(facts)
+    return {
+        "Software": f"vkbloom {frames.info.get('version', '')}".rstrip(),
+        **{f"vkbloom:{key}": value for key, value in facts.items()},
+        "ImageDescription": description,
+    }

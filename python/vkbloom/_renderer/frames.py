@@ -51,17 +51,6 @@ class Frames(Mapping[str, NDArray[Any]]):
         "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input;
         "driver_sha256", where the driver is that of ``vkbloom-lavapipe``.
 
-    Raises
-    ------
-    TypeError
-        A framebuffer is not an ndarray, or its name is not a str.
-    ValueError
-        A name is not an identifier, or an array's shape or dtype is not one of the above.
-
-    See Also
-    --------
-    Renderer.apply, Renderer.render : Return Frames.
-
     Examples
     --------
     >>> image = np.full((16, 24, 3), 0.5, np.float32)
@@ -176,25 +165,6 @@ class Frames(Mapping[str, NDArray[Any]]):
             The coordinates of channels are "r", "g", "b" and, if there is alpha, "a". The
             attributes contain `info`, and the settings and timings as JSON, because netCDF and
             Zarr store only text and numbers. The variables share memory with the framebuffers.
-
-        Raises
-        ------
-        ModuleNotFoundError
-            xarray is missing: ``pip install vkbloom[grid]``.
-
-        See Also
-        --------
-        grid : A Dataset of many settings.
-
-        Examples
-        --------
-        >>> image = np.full((16, 16, 3), 0.5, np.float32)
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     dataset = renderer.apply(image, vkbloom.Separable()).to_xarray()
-        >>> dataset["bloom"].dims
-        ('y', 'x', 'glow_channel')
-        >>> float(dataset["final"].sel(channel="r").mean().round(3)) > 0.5
-        True
         """
         import json  # noqa: PLC0415  costs start-up time
 
@@ -255,29 +225,6 @@ class Frames(Mapping[str, NDArray[Any]]):
         -------
         list of Path
             The written files, in the order of the framebuffers.
-
-        Raises
-        ------
-        ValueError
-            The extension is unknown, the name is not UTF-8, or there is no framebuffer.
-        OSError
-            A file cannot be written; the error names it, and no partial file is left.
-        ModuleNotFoundError
-            OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-        See Also
-        --------
-        Frames.to_xarray : One Dataset, which netCDF and Zarr can store.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> image = np.full((16, 16, 3), 100, np.uint8)
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     frames = renderer.apply(image, vkbloom.Separable())
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     [path.name for path in frames.save(f"{folder}/out.png")]
-        ['out_glow.png', 'out_blur_vertical.png', 'out_bloom.png', 'out_final.png']
         """
         from vkbloom._renderer import frame_files  # noqa: PLC0415  costs start-up time
 
@@ -299,37 +246,10 @@ class Frames(Mapping[str, NDArray[Any]]):
             The framebuffers in their original order and dtypes, with their settings, timings and
             info.
 
-        Raises
-        ------
-        OSError
-            A file does not exist or cannot be opened. The error names it.
-        ValueError
-            A file is damaged; it has no settings, because `save` did not write it, or because its
-            format cannot store them (only OpenEXR, PNG, TIFF and JPEG can); or two files have the
-            same framebuffer, from two calls of `save`. The error names the file.
-        ModuleNotFoundError
-            OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-        See Also
-        --------
-        save : Writes the files.
-
         Notes
         -----
         Other files in a folder are ignored, and so are files with other names that start the same.
         JPEG compresses with loss, so its values differ from the saved ones.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> image = np.full((16, 16, 3), 0.5, np.float32)
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     files = frames.save(f"{folder}/out.png")
-        ...     again = vkbloom.Frames.load(f"{folder}/out.png")
-        >>> again.settings == frames.settings, np.array_equal(again["bloom"], frames["bloom"])
-        (True, True)
         """
         from vkbloom._renderer import frame_files  # noqa: PLC0415  costs start-up time
 

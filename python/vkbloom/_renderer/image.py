@@ -31,10 +31,6 @@ class Image:
     mask, emission : bool
         Whether it was uploaded with a mask or an emission, which are used in all calls.
 
-    See Also
-    --------
-    Renderer.upload : Returns an Image.
-
     Examples
     --------
     >>> array = np.zeros((90, 160, 3), np.float16)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -33,17 +34,6 @@ class Pass(NamedTuple):
     variant : str
         The variant that this class of devices runs instead of the method's own pass. "fragment":
         the pass itself, drawn by a fragment shader.
-
-    See Also
-    --------
-    Plan : Has the passes.
-
-    Examples
-    --------
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     plan = renderer.plan(np.zeros((16, 16, 4), np.uint8), vkbloom.Separable())
-    >>> plan.passes[0].writes
-    ('glow',)
     """
 
     name: str
@@ -78,10 +68,6 @@ class Plan:
     passes : tuple of Pass
         In the order in which they run on a new renderer. A renderer skips passes whose results are
         up to date.
-
-    See Also
-    --------
-    Renderer.plan
 
     Examples
     --------
@@ -128,32 +114,7 @@ class Plan:
         return f"{kind}, {width} x {height}, {self.settings.method}"
 
     def to_mermaid(self) -> str:
-        """Return the passes as a Mermaid flowchart.
-
-        Returns
-        -------
-        str
-            Framebuffers are boxes with their size and dtype, other images have round corners, and
-            passes are hexagons with their shader. GitHub, JupyterLab and many editors draw it.
-
-        See Also
-        --------
-        Renderer.plan : Returns a plan.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import vkbloom
-        >>> image = np.zeros((9, 16, 3), np.float32)
-        >>> with vkbloom.Renderer() as renderer:
-        ...     plan = renderer.plan(image, vkbloom.Separable(bloom=False))
-        >>> print(plan.to_mermaid())  # doctest: +ELLIPSIS
-        flowchart LR
-            image(image)
-            final["final<br>16 x 9, float32"]
-            pass0{{"final<br>composite_..."}}
-            image --> pass0 --> final
-        """
+        """Return the passes as a Mermaid flowchart."""
         images = dict.fromkeys(name for one in self.passes for name in (*one.reads, *one.writes))
         lines = ["flowchart LR"]
         for name in images:
@@ -170,8 +131,6 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        import html  # noqa: PLC0415  costs start-up time
-
         rows = "".join(
             "<tr>" + "".join(f"<td>{html.escape(_text(part))}</td>" for part in one) + "</tr>"
             for one in self.passes

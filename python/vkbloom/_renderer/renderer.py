@@ -24,15 +24,16 @@ from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness,
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.sources import (
+    SCENE_SIZE,
+    any_source,
     batch_sources,
     checked_inputs,
-    image_kind,
     image_source,
     is_image,
     scene_source,
     take_batch,
 )
-from vkbloom._settings.settings import Settings, Shading, check_settings, check_shading
+from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._suggestions import unknown
 from vkbloom._version import installed_version
 
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
 
-SCENE_SIZE = (1280, 720)
 # Stands for images that are not known yet. Larger ones have more levels, of the same names but for
 # the number.
 _ANY_IMAGE = np.zeros((64, 64, 4), np.float32)
@@ -93,8 +93,6 @@ def _arrays_for(
     """
     if out is None:
         return requests.new_arrays(core, plan, place)
-    if not isinstance(out, abc.Mapping):
-        raise TypeError(f"out: {type(out).__name__} is not a mapping of names to arrays")
     names = [name for name, _, _ in plan.outputs]
     for name in out:
         if name not in names:
@@ -140,15 +138,15 @@ def _paired(
     state: dict[Any, Any] = {}
     for source in sources:
         if isinstance(settings, Settings):
-            one = settings
+            chosen = settings
         elif count < len(settings):
-            one = settings[count]
+            chosen = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        work = requests.Request(source, one._in_sequence(count, state))
+        request = requests.Request(source, chosen._in_sequence(count, state))
         del source
-        yield work
-        del work
+        yield request
+        del request
         count += 1
     if not isinstance(settings, Settings) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
@@ -187,16 +185,16 @@ class Renderer:
         `adapter` is empty or the name of several equal GPUs, VKBLOOM_VARIANT or VKBLOOM_TIMEOUT is
         out of range, or VKBLOOM_VARIANT names variants that the adapter cannot run.
 
-    See Also
-    --------
-    adapters : Lists the adapters.
-    Frames : What the calls return.
-
     Notes
     -----
     A renderer is a context manager, and any thread can use it. Calls release the GIL while the
     device works, and wait for each other. Framebuffers own their memory and stay valid when the
     renderer is closed.
+
+    Calls raise TypeError for an argument of a wrong type, and ValueError for one that is out of
+    range or does not fit the others, or if the renderer is closed. If the device fails, they raise
+    `OutOfMemoryError`, `DeviceLostError`, `ValidationError` or another `Error`. The renderer can
+    be used again unless the device is lost.
 
     Ctrl-C, or any exception from a signal handler, ends a waiting call. The renderer can be used
     again; closing it waits until the device has finished. A device that takes longer than 300 s for
@@ -266,24 +264,7 @@ class Renderer:
         return self._core.closed
 
     def close(self) -> None:
-        """Release the device and everything on it. May be called twice.
-
-        Raises
-        ------
-        ValidationError
-            With validation: an object was not destroyed.
-
-        See Also
-        --------
-        closed : Whether it was called.
-
-        Examples
-        --------
-        >>> renderer = vkbloom.Renderer("software")
-        >>> renderer.close()
-        >>> renderer.closed
-        True
-        """
+        """Release the device and everything on it. May be called twice."""
         self._planned = self._kept = None
         self._batches.forget()
         try:
@@ -370,21 +351,6 @@ class Renderer:
             With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
             bloom buffers, and the glow mesh is left out.
 
-        Raises
-        ------
-        ValueError
-            An argument is out of range, an array of `out` does not fit, or the renderer is closed.
-        TypeError
-            An argument has the wrong type.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        sweep : Many settings.
-        apply : The same for an image.
-        plan : The framebuffers of a call.
-
         Notes
         -----
         A pass runs only if its inputs, its settings or its size have changed since its last run.
@@ -447,23 +413,6 @@ class Renderer:
             of the bloom buffers, and ``final``, which has the image's shape and dtype. With
             ``bloom=False`` there is only ``final``. ``info`` has the numbers of "nan" and "inf" in
             the image and the emission.
-
-        Raises
-        ------
-        ValueError
-            The image has another shape, masked values or more pixels than the adapter allows, the
-            mask or the emission do not fit it, an argument is out of range, an array of `out` does
-            not fit, or the renderer is closed.
-        TypeError
-            The image has another dtype, or an argument another type.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        sweep, map : Many settings, or many images.
-        upload : Keeps an image on the device.
-        render : The same for a scene.
 
         Notes
         -----
@@ -530,11 +479,6 @@ class Renderer:
         TypeError
             `images` is not iterable, or an argument has another type.
 
-        See Also
-        --------
-        sweep : One image with many settings.
-        upload : Keeps an image on the device.
-
         Notes
         -----
         The device works on the next images while the caller uses a frame. So after the first frame,
@@ -581,8 +525,8 @@ class Renderer:
         place = self._placed(device)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
             return self._run_batch(images, chosen, names, place)
-        work = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-        return self._run_work(work, names, place, alone=True)
+        sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        return self._run_requests(sequence, names, place, alone=True)
 
     @checked
     def upload(
@@ -605,31 +549,6 @@ class Renderer:
         -------
         Image
             This renderer accepts it in place of an array. Calls do not compare its bytes.
-
-        Raises
-        ------
-        ValueError
-            The image has another shape, or more pixels than the adapter allows, the mask or the
-            emission do not fit it; or the renderer is closed.
-        TypeError
-            The image has another dtype.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed. The renderer can be used again unless the device is lost.
-
-        See Also
-        --------
-        map : Many images, each copied while the device works on others.
-
-        Examples
-        --------
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     image = renderer.upload(np.full((90, 160, 4), 0.5, np.float32))
-        ...     dark, bright = (
-        ...         renderer.apply(image, vkbloom.Separable(exposure=exposure))["final"]
-        ...         for exposure in (-1.0, 1.0)
-        ...     )
-        >>> bool((dark < bright).all(axis=(0, 1))[:3].all())
-        True
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
@@ -681,16 +600,6 @@ class Renderer:
             One for each of the settings, in their order; only the passes that a change of settings
             puts out of date run.
 
-        Raises
-        ------
-        ValueError, TypeError
-            As for `render` and `apply`; or `settings` is not an iterable of settings.
-
-        See Also
-        --------
-        map : Many images.
-        vkbloom.grid : All combinations of settings.
-
         Notes
         -----
         The device works on the next settings while the caller uses a frame. So after the first
@@ -707,19 +616,7 @@ class Renderer:
         [0.5, 1.0]
         """
         self._pending.wait()
-        if is_image(source):
-            for name, given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-                ("time", time != 0),
-            ):
-                if given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            found = image_source(source, core=self._core, name="source")
-        else:
-            found = scene_source(
-                cast("Scene", source), SCENE_SIZE if size is None else size, shading, time, "source"
-            )
+        found = any_source(source, size, shading, time, self._core)
         return self._run_many(found, settings, check_framebuffers(framebuffers), device)
 
     @checked
@@ -753,32 +650,10 @@ class Renderer:
             The framebuffers that the call would return, with shapes and dtypes, and its passes in
             the variants that this renderer's device would run.
 
-        Raises
-        ------
-        ValueError
-            An argument is out of range, or does not belong to the source; or the renderer is
-            closed.
-        TypeError
-            An argument has the wrong type.
-        Error
-            The device does not support the settings.
-
-        See Also
-        --------
-        render, apply : Run the plan.
-
         Notes
         -----
         This makes no device call and does not wait for other threads' calls. A plan does not depend
         on the pixels of an image or on a scene's time.
-
-        Examples
-        --------
-        >>> import vkbloom
-        >>> with vkbloom.Renderer() as renderer:
-        ...     plan = renderer.plan(vkbloom.Scene.ufo(), vkbloom.Pyramid(levels=2), (640, 360))
-        >>> {name: shape for name, (shape, _) in plan.framebuffers.items() if name[:4] == "down"}
-        {'down_0': (128, 128, 4), 'down_1': (64, 64, 4)}
         """
         from vkbloom._renderer.plans import (  # noqa: PLC0415  costs start-up time
             Pass,
@@ -788,21 +663,15 @@ class Renderer:
 
         settings = check_settings(settings, of_image=is_image(source))
         names = check_framebuffers(framebuffers)
+        given = likeness(source) if on_cuda(source) else source
+        planned = any_source(given, size, shading, 0.0)
         kind: str = shading
         dtype = channels = None
         if is_image(source):
-            for name, is_given in (
-                ("size", size is not None),
-                ("shading", check_shading(shading) != "forward"),
-            ):
-                if is_given:
-                    raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-            kind, (shape, dtype) = "image", image_kind(source, "source")
-            height, width, channels = shape
-            planned = image_source(likeness(source) if on_cuda(source) else source)
+            (height, width, channels), name = planned.kind
+            kind, dtype = "image", np.dtype(name)
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
-            planned = scene_source(cast("Scene", source), (width, height), shading, 0.0, "source")
         plan = self._core.plan(planned, settings, names)
         passes = tuple(Pass(*row[:-1]) for row in plan.passes)
         return Plan(
@@ -853,8 +722,8 @@ class Renderer:
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
-            work = _paired(batch_sources(batch, first), settings)
-            return self._run_work(work, names, place, alone=True)
+            sequence = _paired(batch_sources(batch, first), settings)
+            return self._run_requests(sequence, names, place, alone=True)
 
         for frames in self._batches.run(batch, settings, names, self._frames, rest):
             self._save_pipelines()
@@ -905,7 +774,7 @@ class Renderer:
             settings = tuple(settings)
             if names:
                 self._check_names(source, settings, names)
-        return self._run_work(
+        return self._run_requests(
             (
                 requests.Request(source, check_settings(one, f"settings[{number}]"))
                 for number, one in enumerate(settings)
@@ -932,7 +801,7 @@ class Renderer:
             if found and _NUMBER.sub("#", name) not in kinds:
                 raise ValueError(unknown("framebuffers: unknown framebuffer", name, found))
 
-    def _run_work(
+    def _run_requests(
         self,
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,

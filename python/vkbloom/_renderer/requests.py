@@ -36,12 +36,12 @@ __all__ = [
 ]
 
 #: The most requests in one submission.
-REQUESTS = 32
+MAX_REQUESTS = 32
 #: The most bytes of framebuffers in one submission. A single request may have more.
-BYTES = 64 << 20
+MAX_BYTES = 64 << 20
 #: The longest time of one submission. A single request may take longer. A device cannot be stopped,
 #: so closing the renderer after an interruption waits for the pending submissions.
-SECONDS = 0.25
+MAX_SECONDS = 0.25
 #: Submissions that are pending while the caller takes the frames of another one.
 AHEAD = 2
 #: The same if each request has its own image, since the next one is copied while the device works.
@@ -53,7 +53,7 @@ LARGE_BYTES = 1 << 20
 
 
 class PendingSubmission:
-    """The end of a submission for which the host waits late, or never.
+    """A submission whose result is awaited when it is first read.
 
     Its arrays are on a GPU, whose streams wait for them.
     """
@@ -66,13 +66,13 @@ class PendingSubmission:
 
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, ...]]:
         """Return what the submission's `wait` returns, or raise what it raised."""
-        self.come()
+        self.complete()
         if self._results is None:
             assert self._error is not None
             raise self._error
         return self._results
 
-    def come(self) -> None:
+    def complete(self) -> None:
         """Wait, and raise what that raises, unless it was done before."""
         with self._lock:
             if (submission := self._submission) is None:
@@ -98,7 +98,7 @@ class PendingSubmission:
 
 
 class PendingSubmissions:
-    """The ends that are to come, the oldest first.
+    """The pending submissions, the oldest first.
 
     A call waits for them before it gives the GPU more to do. If CUDA copied the next image while
     Vulkan works, the GPU would change between both after slices of 2 ms: on an H100, calls in a row
@@ -109,17 +109,17 @@ class PendingSubmissions:
         self._pending: deque[PendingSubmission] = deque()
 
     def add(self, submission: _core.Submission) -> PendingSubmission:
-        """Return the end of a submission."""
-        end = PendingSubmission(submission)
-        self._pending.append(end)
-        return end
+        """Add a submission."""
+        pending = PendingSubmission(submission)
+        self._pending.append(pending)
+        return pending
 
     def wait(self) -> None:
-        """Wait until all have come."""
+        """Wait until all are complete."""
         # Another thread may take the last one between the comparison and this one's turn.
         with contextlib.suppress(IndexError):
             while self._pending:
-                self._pending.popleft().come()
+                self._pending.popleft().complete()
 
     def forget(self) -> None:
         """Drop them, as in a forked process, which cannot wait."""
@@ -176,15 +176,15 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Requ
     Images reuse the device memory of earlier ones whose submissions have finished.
     """
     kept: deque[_core.Source] = deque()
-    for work in sequence:
-        if work.source.resident or work.source.exported:
-            yield work
+    for request in sequence:
+        if request.source.resident or request.source.exported:
+            yield request
             continue
         spare = kept.popleft() if len(kept) == IMAGES_AHEAD else None
-        kept.append(core.upload(work.source, spare, True))
-        settings = work.settings
+        kept.append(core.upload(request.source, spare, True))
+        settings = request.settings
         # The iterable may overwrite the array when it makes the next image.
-        del work
+        del request
         yield Request(kept[-1], settings)
 
 
@@ -210,29 +210,29 @@ class Request(NamedTuple):
     settings: Settings
 
 
-class _Request(NamedTuple):
-    work: Request
+class _Planned(NamedTuple):
+    request: Request
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     place: Destination
 
 
 def _taken(
-    request: _Request, timings: dict[str, float], counts: tuple[int, int]
+    planned: _Planned, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
-    return request.work.settings, Result(
-        named(request.plan, request.arrays, request.place), timings, counts
+    return planned.request.settings, Result(
+        named(planned.plan, planned.arrays, planned.place), timings, counts
     )
 
 
 class _Submitted(NamedTuple):
     submission: _core.Submission
-    requests: list[_Request]
+    requests: list[_Planned]
     since: float
 
 
 class _Requests:
-    """Divides a sequence of work into submissions, in order.
+    """Divides a sequence of requests into submissions, in order.
 
     - `most`: The most requests in one submission.
     - `failure`: To be raised after the results of everything that was submitted.
@@ -254,17 +254,17 @@ class _Requests:
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
         self._alone = 0  # how many of these are submitted one by one
         self._limit = 1
-        self._most = most  # that fit into SECONDS, as far as is known
+        self._most = most  # that fit into MAX_SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
     def submit(self) -> _Submitted | None:
-        """Submit the next work. None: there is no more, or the next one failed."""
+        """Submit the next requests. None: there are no more, or the next one failed."""
         while requests := self._take():
-            plans = tuple(request.plan for request in requests)
+            plans = tuple(one.plan for one in requests)
             try:
                 submission = self._core.run(
-                    requests[0].work.source, plans, tuple(one.arrays for one in requests)
+                    requests[0].request.source, plans, tuple(one.arrays for one in requests)
                 )
             except Exception as error:
                 if not self._blames_one(error, requests):
@@ -272,43 +272,44 @@ class _Requests:
                     return None
                 # The requests before it are still submitted. The error is raised after their
                 # results.
-                self._waiting.extendleft(request.work for request in reversed(requests))
+                self._waiting.extendleft(planned.request for planned in reversed(requests))
                 self._alone = len(requests)
             else:
                 self._alone = max(0, self._alone - 1)
                 # Double the number, starting with one request. So the first frame waits for no
                 # other, and a caller that stops early wastes little work.
-                self._limit = min(2 * len(requests), REQUESTS)
+                self._limit = min(2 * len(requests), MAX_REQUESTS)
                 return _Submitted(submission, requests, time.perf_counter())
         return None
 
     def took(self, seconds: float, count: int) -> None:
         """Update the limit after a submission of `count` requests that took at most `seconds`."""
-        fit = int(SECONDS * count / max(seconds, SECONDS / REQUESTS))
+        fit = int(MAX_SECONDS * count / max(seconds, MAX_SECONDS / MAX_REQUESTS))
         self._most = min(max(1, fit), self._ever)
 
-    def _take(self) -> list[_Request]:
+    def _take(self) -> list[_Planned]:
         """Return the requests of the next submission."""
-        requests: list[_Request] = []
+        requests: list[_Planned] = []
         size = 0
         limit = 1 if self._alone else min(self._limit, self._most)
         while len(requests) < limit:
-            if requests and size + size // len(requests) > BYTES:
+            if requests and size + size // len(requests) > MAX_BYTES:
                 break
-            work = self._next()
-            if work is None:
+            request = self._next()
+            if request is None:
                 break
             try:
-                plan = self._core.plan(work.source, work.settings, self._names)
+                plan = self._core.plan(request.source, request.settings, self._names)
                 # Another source or other images need another submission.
                 if requests and not (
-                    work.source is requests[0].work.source and plan.shares_images(requests[0].plan)
+                    request.source is requests[0].request.source
+                    and plan.shares_images(requests[0].plan)
                 ):
-                    self._waiting.appendleft(work)
+                    self._waiting.appendleft(request)
                     break
-                place = self._place(work.source)
+                place = self._place(request.source)
                 arrays = new_arrays(self._core, plan, place)
-                requests.append(_Request(work, plan, arrays, place))
+                requests.append(_Planned(request, plan, arrays, place))
             except Exception as error:
                 self._fail(error)
                 break
@@ -334,7 +335,7 @@ class _Requests:
         self._waiting.clear()
 
     @staticmethod
-    def _blames_one(error: Exception, requests: list[_Request]) -> bool:
+    def _blames_one(error: Exception, requests: list[_Planned]) -> bool:
         """Whether one of several requests may have caused the error; then each runs alone."""
         general = _core.ValidationError, _core.DeviceLostError
         return (
@@ -357,7 +358,7 @@ def run(
 
     `names`: The requested framebuffers; None: all.
     """
-    waiting = _Requests(sequence, core, names, 1 if alone else REQUESTS, place)
+    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, place)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission ended

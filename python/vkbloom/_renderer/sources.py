@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from vkbloom import _core
 from vkbloom._checks import check_emission, check_image, check_mask, check_size, check_time
-from vkbloom._renderer.device_arrays import ImportedArray, likeness, on_cuda, take
+from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, take
 from vkbloom._renderer.image import Image
 from vkbloom._settings.settings import check_shading
 
@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from vkbloom._settings.settings import Shading
 
 __all__ = [
+    "SCENE_SIZE",
     "Inputs",
+    "any_source",
     "batch_sources",
     "checked_inputs",
-    "image_kind",
     "image_source",
     "is_image",
     "scene_arguments",
@@ -33,6 +34,10 @@ __all__ = [
     "take_batch",
     "uploaded_inputs",
 ]
+
+
+#: Width and height of a scene's frame, where none are given.
+SCENE_SIZE = (1280, 720)
 
 
 class Inputs(NamedTuple):
@@ -153,12 +158,25 @@ def is_image(source: object) -> bool:
     )
 
 
-def image_kind(image: object, name: str = "image") -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return shape and dtype of an image, which may be on the device."""
-    if on_cuda(image):
-        image = likeness(image)
-    checked = image if isinstance(image, Image) else check_image(image, name)
-    return checked.shape, checked.dtype
+def any_source(
+    source: Scene | NDArray[Any] | Image,
+    size: tuple[int, int] | None,
+    shading: Shading,
+    time: float,
+    core: _core.Renderer | None = None,
+) -> _core.Source:
+    """Return the core's Source of an image, or of a scene's frame of a size, shading and time."""
+    if not is_image(source):
+        wanted = SCENE_SIZE if size is None else size
+        return scene_source(cast("Scene", source), wanted, shading, time, "source")
+    for name, is_given in (
+        ("size", size is not None),
+        ("shading", check_shading(shading) != "forward"),
+        ("time", time != 0),
+    ):
+        if is_given:
+            raise ValueError(f"{name}: the source is not a scene; leave the argument out")
+    return image_source(source, core=core, name="source")
 
 
 def scene_source(
@@ -170,7 +188,7 @@ def scene_source(
     from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
 
     if not isinstance(scene, Scene):
-        raise TypeError(f"{name}: a Scene is needed, not {type(scene).__name__}")
+        raise TypeError(f"{name}: {type(scene).__name__} is not a Scene")
     return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
 
 

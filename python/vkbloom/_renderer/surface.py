@@ -70,21 +70,6 @@ class Surface:
     size : (int, int)
         Width and height in pixels; (0, 0) while a window is minimized.
 
-    Raises
-    ------
-    ValueError
-        The surface has no MAILBOX, the size is out of range, or the renderer is closed.
-    TypeError
-        An argument has the wrong type.
-    Error
-        The adapter's driver cannot present on this surface.
-    ModuleNotFoundError
-        glfw is missing.
-
-    See Also
-    --------
-    Renderer.render, Renderer.apply : Return the framebuffers as arrays.
-
     Notes
     -----
     A context manager. Close it before its window is destroyed; one that is not closed lives as
@@ -95,22 +80,6 @@ class Surface:
 
     Two frames are in flight: `present` waits for the device only if it has not finished the frame
     before the last one. Ctrl-C ends this wait.
-
-    Examples
-    --------
-    The scene in a window of glfw, until that is closed:
-
-    >>> def show(scene):
-    ...     import glfw
-    ...
-    ...     glfw.init()
-    ...     glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
-    ...     window = glfw.create_window(1280, 720, "bloom", None, None)
-    ...     with vkbloom.Renderer() as renderer, Surface(renderer, window) as surface:
-    ...         while not glfw.window_should_close(window):
-    ...             surface.present(scene, time=glfw.get_time() / 8)
-    ...             glfw.poll_events()
-    ...     glfw.terminate()
     """
 
     def __init__(
@@ -169,30 +138,12 @@ class Surface:
             False: nothing was shown, since the window is minimized or hidden, or its size
             changes faster than the frames.
 
-        Raises
-        ------
-        ValueError
-            An argument is out of range, or the surface or its renderer is closed.
-        TypeError
-            An argument has the wrong type.
-        OutOfMemoryError, DeviceLostError, ValidationError, Error
-            The device failed, or the window is gone.
-
-        See Also
-        --------
-        Renderer.render, Renderer.apply : Return the framebuffers as arrays.
-
         Notes
         -----
         Levels of uint8 are shown as they are. Floats are light: they are cut off at 0 and 1 and
         encoded as sRGB; a ``final`` that the settings have encoded already is only cut off. A
         frame of another size than the surface's is scaled, bilinearly, and gets black bars where
         its proportions differ. Framebuffers of other sizes are shown where ``final`` would be.
-
-        Examples
-        --------
-        >>> def play(surface, scene, settings):
-        ...     return [surface.present(scene, settings, time=step / 90) for step in range(90)]
         """
         settings = check_settings(settings, of_image=is_image(source))
         width, height = self.size
@@ -216,23 +167,7 @@ class Surface:
         return submission is not None
 
     def close(self) -> None:
-        """Wait for the device and give the surface back; may be called twice.
-
-        Raises
-        ------
-        ValidationError
-            With validation on: something was left behind.
-
-        See Also
-        --------
-        Renderer.close : Closes the renderer.
-
-        Examples
-        --------
-        >>> def show(surface, scene, settings):
-        ...     surface.present(scene, settings)
-        ...     surface.close()
-        """
+        """Wait for the device and give the surface back; may be called twice."""
         self._pending.clear()
         self._renderer._core.close_screen(self._screen)
         self._screen = 0

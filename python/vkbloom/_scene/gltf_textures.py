@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from vkbloom._io.image_reading import check_plausible, opened
 from vkbloom._io.images import failure_of
 from vkbloom._io.srgb import decode_srgb
+from vkbloom._scene.arrays import MAX_SIDE
 from vkbloom._scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
-from vkbloom._scene.textures import MAX_SIDE, AddressMode, Filter, Texture, mip_levels
+from vkbloom._scene.textures import AddressMode, Filter, Texture, mip_levels
 
 # The image formats of glTF (3.8.3), by their first bytes.
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.skybox import read_only
+from vkbloom._scene.arrays import read_only
 from vkbloom._scene.textures import WHITE, Surface
 
 __all__ = ["Mesh"]
@@ -39,14 +39,6 @@ class Mesh:
         before the first surface have no textures.
 
     Arrays are copied unless they are read-only, C-contiguous owners of their memory.
-
-    Raises
-    ------
-    TypeError
-        An array has another type or dtype, or a surface another type.
-    ValueError
-        An array has another shape or values out of range; surfaces cover more indices than there
-        are, or have no texture coordinates.
     """
 
     vertices: NDArray[np.float32]

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 import os
+import sys
 import weakref
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import PATH, checked_as
+from vkbloom._checks import check_above, check_floats, check_number
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
@@ -60,17 +59,6 @@ class Camera:
     near, far : float
         Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
 
-    Raises
-    ------
-    TypeError
-        A field is no number, or no three numbers.
-    ValueError
-        A field is not finite or out of range.
-
-    See Also
-    --------
-    Scene : Has a camera.
-
     Examples
     --------
     >>> camera = vkbloom.Camera(position=(0, 0, -5), rotation=(0, 90, 0), fov=60)
@@ -86,21 +74,15 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("position", "rotation"):
-            value: Any = getattr(self, name)
-            if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
-                raise TypeError(f"{name} must be three numbers, not {value!r}")
-            if len(value) != 3:
-                raise ValueError(f"{name} has {len(value)} entries; three are needed")
-            triple = tuple(_number(f"{name}[{i}]", entry) for i, entry in enumerate(value))
-            object.__setattr__(self, name, triple)
+            values = check_floats(name, getattr(self, name))
+            if len(values) != 3:
+                raise ValueError(f"{name}: {values!r} is not three numbers")
+            object.__setattr__(self, name, values)
         for name in ("fov", "near", "far"):
-            object.__setattr__(self, name, _number(name, getattr(self, name)))
-        if not 0.0 < self.fov < 180.0:
-            raise ValueError(f"fov is {self.fov}; over 0 and under 180 degrees is needed")
-        if not self.near > 0.0:
-            raise ValueError(f"near is {self.near}; over 0 is needed")
-        if not self.far > self.near:
-            raise ValueError(f"far is {self.far}; over near ({self.near}) is needed")
+            object.__setattr__(self, name, check_above(name, getattr(self, name)))
+        check_above("far", self.far, self.near)
+        if self.fov >= 180.0:
+            raise ValueError(f"fov: {self.fov} is out of range, above 0 and below 180")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,19 +106,6 @@ class Scene:
     ----------
     serial : int
         A number that no other scene of this process has.
-
-    Raises
-    ------
-    TypeError
-        A field has another type.
-    ValueError
-        `glow_intensity` is negative or not finite.
-
-    See Also
-    --------
-    Scene.ufo : The built-in scene.
-    Scene.from_gltf : Loads files.
-    Renderer.render : Renders a scene.
 
     Examples
     --------
@@ -166,10 +135,8 @@ class Scene:
             value = getattr(self, name)
             if not isinstance(value, kind) and not (optional and value is None):
                 needed = f"{kind.__name__} or None" if optional else kind.__name__
-                raise TypeError(f"{name} must be a {needed}, not {type(value).__name__}")
-        intensity = _number("glow_intensity", self.glow_intensity)
-        if intensity < 0.0:
-            raise ValueError(f"glow_intensity is {intensity}; 0 or more is needed")
+                raise TypeError(f"{name}: {type(value).__name__} is not a {needed}")
+        intensity = check_number("glow_intensity", self.glow_intensity, 0, sys.float_info.max)
         object.__setattr__(self, "glow_intensity", intensity)
         key = (id(self.body), id(self.glow), id(self.skybox))
         object.__setattr__(self, "_contents", _contents.setdefault(key, _Contents()))
@@ -187,15 +154,6 @@ class Scene:
     def ufo(cls) -> Scene:
         """Return the built-in scene: a saucer, its glow mesh and a field of stars.
 
-        Returns
-        -------
-        Scene
-            A new scene on every call; its arrays are read again. No extra is needed.
-
-        See Also
-        --------
-        Scene.from_gltf : Loads files.
-
         Examples
         --------
         >>> vkbloom.Scene.ufo().glow is not None
@@ -210,7 +168,7 @@ class Scene:
             return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
-    @checked
+    @checked_as(glow=PATH)
     def from_gltf(
         cls,
         base: str | os.PathLike[str],
@@ -241,21 +199,6 @@ class Scene:
         -------
         Scene
 
-        Raises
-        ------
-        TypeError
-            An argument has another type.
-        OSError
-            A file is missing or cannot be read.
-        ValueError
-            A file is damaged or has no triangles, or an argument is out of range.
-        ModuleNotFoundError
-            pygltflib, or OpenImageIO for an image, is not installed.
-
-        See Also
-        --------
-        Scene.ufo : The built-in scene.
-
         Examples
         --------
         >>> vkbloom.Scene.from_gltf("missing.glb")
@@ -266,9 +209,6 @@ class Scene:
         # Imported here, since other scenes do not need it.
         from vkbloom._scene import gltf  # noqa: PLC0415
 
-        for name, path in (("base", base), ("glow", "" if glow is None else glow)):
-            if not isinstance(path, str | os.PathLike):
-                raise TypeError(f"{name}: a path is needed, not {path!r}")
         return cls(
             body=gltf.load_mesh(base),
             glow=None if glow is None else gltf.load_mesh(glow),
@@ -281,29 +221,6 @@ class Scene:
         """Return this scene with another camera. They share all other data.
 
         `dataclasses.replace` does the same for any field.
-
-        Parameters
-        ----------
-        camera : Camera
-
-        Returns
-        -------
-        Scene
-
-        Raises
-        ------
-        TypeError
-            `camera` is not a Camera.
-
-        See Also
-        --------
-        Camera : The argument.
-
-        Examples
-        --------
-        >>> scene = vkbloom.Scene.ufo().with_camera(vkbloom.Camera(fov=30))
-        >>> scene.camera.fov
-        30.0
         """
         return dataclasses.replace(self, camera=camera)
 
@@ -340,15 +257,3 @@ class Scene:
         return display.scene_html(
             self._rows(), None if self.skybox is None else self.skybox.levels[0]
         )
-
-
-def _number(name: str, value: object) -> float:
-    if not isinstance(value, Real) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a number, not {value!r}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {number}; a finite number is needed")
-    return number

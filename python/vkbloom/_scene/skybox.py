@@ -17,25 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._scene import ktx
+from vkbloom._scene.arrays import MAX_SIDE, checked_levels
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
-# Far above the 4096 that every Vulkan device supports. It rejects the sizes of damaged images. The
-# device's own limit is checked at upload.
-MAX_SIDE: Final = 16384
-
-
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return `array` as a C-contiguous array that cannot be changed.
-
-    An array that is read-only, C-contiguous and owns its memory is returned itself. Any other is
-    copied, because the base of a read-only view can still be changed.
-    """
-    flags = array.flags
-    if flags.writeable or not flags.c_contiguous or not flags.owndata:
-        array = array.copy(order="C")
-        array.flags.writeable = False
-    return array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,41 +34,12 @@ class Cubemap:
         +y, -y, +z, -z, top row first, RGBA. n is halved and rounded down from level to level, but
         at least 1. The chain may end before 1. Arrays are copied unless they are read-only and own
         their memory.
-
-    Raises
-    ------
-    TypeError
-        A level is not an array of one of these dtypes.
-    ValueError
-        The shapes are not a mip chain.
     """
 
     levels: tuple[NDArray[Any], ...]
 
     def __post_init__(self) -> None:
-        levels = tuple(self.levels)
-        if not levels:
-            raise ValueError("levels is empty; at least one level is needed")
-        for index, level in enumerate(levels):
-            if not isinstance(level, np.ndarray) or level.dtype not in DTYPES:
-                kind = level.dtype if isinstance(level, np.ndarray) else type(level).__name__
-                raise TypeError(
-                    f"levels[{index}] is {kind}; an array of uint8, float16 or float32 is needed"
-                )
-            if index == 0:
-                _check_faces("levels[0]", level, channels=(4,))
-            side = max(1, levels[0].shape[1] >> index)
-            if level.shape != (6, side, side, 4) or level.dtype != levels[0].dtype:
-                raise ValueError(
-                    f"levels[{index}] is {level.shape} {level.dtype}; "
-                    f"{(6, side, side, 4)} {levels[0].dtype} is needed"
-                )
-        if len(levels) > level_limit(levels[0].shape[1]):
-            raise ValueError(
-                f"levels has {len(levels)} entries; a face of {levels[0].shape[1]} has at most "
-                f"{level_limit(levels[0].shape[1])}"
-            )
-        object.__setattr__(self, "levels", tuple(read_only(level) for level in levels))
+        object.__setattr__(self, "levels", checked_levels(self.levels, (6,), DTYPES))
 
     def __reduce__(self) -> tuple[type[Cubemap], tuple[tuple[NDArray[Any], ...]]]:
         # Through the constructor, because NumPy pickles do not keep arrays read-only.
@@ -106,11 +62,6 @@ class Cubemap:
 SkyboxSource: TypeAlias = (
     str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | NDArray[Any] | Cubemap
 )
-
-
-def level_limit(side: int) -> int:
-    """Return the number of levels from `side` to 1, each half of the one before, rounded down."""
-    return side.bit_length()
 
 
 def load(source: SkyboxSource) -> Cubemap:
@@ -147,8 +98,13 @@ def from_array(faces: NDArray[Any]) -> Cubemap:
     of two.
     """
     if faces.dtype.newbyteorder("=") not in DTYPES:
-        raise TypeError(f"skybox is {faces.dtype}; uint8, float16 or float32 is needed")
-    _check_faces("skybox", faces, channels=(3, 4))
+        raise TypeError(f"skybox: {faces.dtype} is not uint8, float16 or float32")
+    shape = faces.shape
+    is_cube = faces.ndim == 4 and shape[0] == 6 and shape[1] == shape[2] and shape[3] in (3, 4)
+    if not is_cube or not 1 <= shape[1] <= MAX_SIDE:
+        raise ValueError(
+            f"skybox: shape {shape} is not (6, N, N, 3) or (6, N, N, 4) with N of 1 to {MAX_SIDE}"
+        )
     return _with_levels(_with_alpha(faces.astype(faces.dtype.newbyteorder("="))))
 
 
@@ -290,22 +246,6 @@ def _with_levels(faces: NDArray[Any]) -> Cubemap:
         # So that the cubemap takes the level itself.
         level.flags.writeable = False
     return Cubemap(levels)
-
-
-def _check_faces(field: str, faces: NDArray[Any], *, channels: tuple[int, ...]) -> None:
-    shape = faces.shape
-    if (
-        len(shape) != 4
-        or shape[0] != 6
-        or shape[1] != shape[2]
-        or not 1 <= shape[1] <= MAX_SIDE
-        or shape[3] not in channels
-    ):
-        needed = " or ".join(map(str, channels))
-        raise ValueError(
-            f"{field} has shape {shape}; (6, N, N, C) with N in 1..{MAX_SIDE} and C {needed} "
-            "is needed"
-        )
 
 
 def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:

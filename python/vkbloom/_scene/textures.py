@@ -8,15 +8,11 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.skybox import read_only
+from vkbloom._scene.arrays import checked_levels
 
 #: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
 Filter = Literal["nearest", "linear"]
-
-#: The longest side, far above the 4096 that every Vulkan device supports. The device's own limit is
-#: checked at upload.
-MAX_SIDE: Final = 16384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,25 +36,10 @@ class Texture:
     mipmap_filter: Filter = "linear"
 
     def __post_init__(self) -> None:
-        levels = tuple(self.levels)
-        if not levels:
-            raise ValueError("levels is empty; at least one level is needed")
+        levels = checked_levels(self.levels, (), (np.dtype(np.float16),))
         for index, level in enumerate(levels):
-            if not isinstance(level, np.ndarray) or level.dtype != np.float16:
-                kind = level.dtype if isinstance(level, np.ndarray) else type(level).__name__
-                raise TypeError(f"levels[{index}] is {kind}; an array of float16 is needed")
-            if level.ndim != 3 or level.shape[2] != 4 or 0 in level.shape:
-                raise ValueError(f"levels[{index}] has shape {level.shape}; (h, w, 4) is needed")
-            needed = tuple(max(1, side >> index) for side in levels[0].shape[:2])
-            if level.shape[:2] != needed or max(needed) > MAX_SIDE:
-                raise ValueError(
-                    f"levels[{index}] is {level.shape[1]} x {level.shape[0]}; "
-                    f"{needed[1]} x {needed[0]}, {MAX_SIDE} a side at the most, is needed"
-                )
             if not np.isfinite(level).all():
-                raise ValueError(f"levels[{index}] holds NaN or infinity")
-        if len(levels) > max(levels[0].shape[:2]).bit_length():
-            raise ValueError(f"levels has {len(levels)} entries, beyond the level of 1 x 1")
+                raise ValueError(f"levels[{index}]: NaN and infinity are not texels")
         modes = tuple(self.address_mode)
         if len(modes) != 2:
             raise ValueError(f"address_mode is {self.address_mode!r}; two modes are needed")
@@ -71,7 +52,7 @@ class Texture:
         ):
             if value not in get_args(possible):
                 raise ValueError(f"{name}: {value!r} is not one of {', '.join(get_args(possible))}")
-        object.__setattr__(self, "levels", tuple(read_only(level) for level in levels))
+        object.__setattr__(self, "levels", levels)
         object.__setattr__(self, "address_mode", modes)
 
     def __reduce__(self) -> tuple[type[Texture], tuple[Any, ...]]:

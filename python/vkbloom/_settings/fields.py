@@ -315,20 +315,6 @@ class Record:
         dict
             Values that JSON can represent. The name of the class has the key "method" for settings,
             "stage" for stages of glare and "psf" for point-spread functions.
-
-        See Also
-        --------
-        from_dict : Makes the object from the result.
-        to_json : Returns the result as text.
-
-        Examples
-        --------
-        >>> vkbloom.Pyramid(levels=3).to_dict()["levels"]
-        3
-        >>> vkbloom.Streaks(directions=4).to_dict()["stage"]
-        'streaks'
-        >>> vkbloom.psf.gaussian(sigma=2).to_dict()
-        {'psf': 'gaussian', 'sigma': 2.0}
         """
         values = {name: plain_value(getattr(self, name)) for name in fields_of(type(self))}
         return {self._class_key: self._class_name(), **values}
@@ -347,18 +333,6 @@ class Record:
         -------
         Settings, Glare or PSF
             Of the named class.
-
-        Raises
-        ------
-        ValueError
-            There is no such class or field, the named class is not that of the call, a field
-            without a default has no value, or a value is out of range.
-        TypeError
-            `fields` is not a mapping, or a value has the wrong type.
-
-        See Also
-        --------
-        to_dict : Returns the fields by name.
 
         Examples
         --------
@@ -394,49 +368,14 @@ class Record:
         return made
 
     def to_json(self) -> str:
-        """Return `to_dict` as JSON text.
-
-        See Also
-        --------
-        from_json : Makes the object from the result.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=2).to_json()
-        '{"psf": "gaussian", "sigma": 2.0}'
-        """
+        """Return `to_dict` as JSON text."""
         import json  # noqa: PLC0415  costs start-up time
 
         return json.dumps(self.to_dict())
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Make an object from the result of `to_json`.
-
-        Parameters
-        ----------
-        text : str
-            An object with the keys of `from_dict`.
-
-        Returns
-        -------
-        Settings, Glare or PSF
-
-        Raises
-        ------
-        ValueError, TypeError
-            The text is not a JSON object, or as for `from_dict`.
-
-        See Also
-        --------
-        to_json : Returns the text.
-
-        Examples
-        --------
-        >>> from vkbloom import Settings
-        >>> Settings.from_json('{"method": "pyramid", "levels": 3}').levels
-        3
-        """
+        """Make an object from the result of `to_json`."""
         import json  # noqa: PLC0415  costs start-up time
 
         try:

@@ -23,18 +23,6 @@ class Glare(Record):
     i b + sum of i_k g_k instead of i b. Here b is the bloom and i its intensity; g_k and i_k are
     the framebuffer and the intensity of stage k. `Dirt` multiplies this sum.
 
-    Raises
-    ------
-    ValueError
-        A field is out of its range.
-    TypeError
-        A field has the wrong type.
-
-    See Also
-    --------
-    Ghosts, Halo, Streaks, Dirt : The stages.
-    Settings : Takes stages as `glare`.
-
     Examples
     --------
     >>> settings = vkbloom.Pyramid(glare=(vkbloom.Streaks(), vkbloom.Streaks(directions=1)))
@@ -76,10 +64,6 @@ class GlareLight(Glare):
     halvings : int
         Number of times that the stage's input is halved, 0 to 4, by the 13 taps of `Pyramid`. Each
         halving makes the stage four times as fast, and its light coarser.
-
-    See Also
-    --------
-    Ghosts, Halo, Streaks : The stages.
 
     Notes
     -----

@@ -49,6 +49,12 @@ class Registry(Named[type[Any]]):
         """Set the classes of a package: "module:Class" by name."""
         self.fill(lambda: {name: f"{package}.{place}" for name, place in places.items()})
 
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (name, one if isinstance(one, str) else one.__name__, "")
+            for name, one in self._entries.items()
+        ]
+
     def is_added(self, name: str) -> bool:
         """Return whether the class was added at run time."""
         return isinstance(self._entries.get(name), type)

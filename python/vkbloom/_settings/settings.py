@@ -11,7 +11,6 @@ import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self, get_args
 
-from vkbloom._argument_types import HINTS
 from vkbloom._settings.fields import (
     FieldInfo,
     Record,
@@ -119,13 +118,6 @@ class Settings(Record):
         a framebuffer of its name, with a number if there are several of a kind. In ``final``,
         i b + sum of i_k g_k stands in place of i b, with framebuffer g_k and intensity i_k of each.
 
-    Raises
-    ------
-    ValueError
-        A field is out of its range; the message names the field, the value and the range.
-    TypeError
-        A field has the wrong type.
-
     See Also
     --------
     Separable, Pyramid, DualKawase : The methods.
@@ -185,27 +177,6 @@ class Settings(Record):
         **changes
             New values by field. Those of a stage of `glare` have names such as
             "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``.
-
-        Returns
-        -------
-        Settings
-            Settings of the same method.
-
-        Raises
-        ------
-        ValueError
-            A value is out of its field's range.
-        TypeError
-            The method has no such field, or a value has the wrong type.
-
-        See Also
-        --------
-        to_dict : The fields by name.
-
-        Examples
-        --------
-        >>> vkbloom.Separable(loops=2).replace(blur_scale=4).blur_scale
-        4.0
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
@@ -214,17 +185,7 @@ class Settings(Record):
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:
-        """Return the value of a field, or of a stage's field, such as "glare.0.intensity".
-
-        See Also
-        --------
-        replace : Takes the same names.
-
-        Examples
-        --------
-        >>> vkbloom.Pyramid(glare=vkbloom.Streaks(fade=0.9)).value_of("glare.0.fade")
-        0.9
-        """
+        """Return the value of a field, or of a stage's field, such as "glare.0.intensity"."""
         if "." not in name:
             return getattr(self, name)
         place, field = stage_field_of(self.glare, name)
@@ -307,6 +268,3 @@ def _hint(settings: object) -> str:
     if isinstance(settings, Mapping):
         return "; give vkbloom.Settings.from_dict(...) of it"
     return ""
-
-
-HINTS["a Settings"] = _hint

@@ -72,13 +72,6 @@ class PSF(Record, abc.ABC):
         ndarray of float64, shape (height, width, 3)
             Linear RGB. The point is at [height // 2, width // 2]. The values are integrals over
             the pixels, not samples at their centres.
-
-        Examples
-        --------
-        >>> vkbloom.psf.gaussian(sigma=1).array((3, 3))[:, :, 0].round(3)
-        array([[0.058, 0.093, 0.058],
-               [0.093, 0.147, 0.093],
-               [0.058, 0.093, 0.058]])
         """
 
     @abc.abstractmethod

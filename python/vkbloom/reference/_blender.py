@@ -14,7 +14,7 @@ import numpy as np
 from ._blender_lights import FACTORS, GAINS, LIGHTS
 from ._image import BlurInput, Storage, finite, storage
 from ._levels import halved
-from ._pyramid import downsample
+from ._pyramid import GROUPS, downsample
 from ._sampling import Array, sample, weighted_mean
 from ._tape import value_of
 from ._threshold import brightest, masked
@@ -24,15 +24,6 @@ if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
 
 __all__ = ["gain", "passes", "saturated"]
-
-# (x, y) in texels, and the share, of the 13 taps' five groups.
-_GROUPS = (
-    (((-1, -1), (1, -1), (-1, 1), (1, 1)), 0.5),
-    (((-2, -2), (0, -2), (-2, 0), (0, 0)), 0.125),
-    (((0, -2), (2, -2), (0, 0), (2, 0)), 0.125),
-    (((-2, 0), (0, 0), (-2, 2), (0, 2)), 0.125),
-    (((0, 0), (2, 0), (0, 2), (2, 2)), 0.125),
-)
 
 
 def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
@@ -187,9 +178,9 @@ def _smooth_extreme(sign: int, values: Array, end: float, width: float) -> Array
 def _weighted_taps(image: Array, size: tuple[int, int]) -> Array:
     """Return the 13 taps of half the size; 0 where negative weights make it undefined."""
     result: Any = 0.0
-    for places, group_share in _GROUPS:
-        taps = [sample(image, size, [(float(x), 1.0)], [(float(y), 1.0)]) for x, y in places]
+    for share, columns, rows in GROUPS:
+        taps = [sample(image, size, [(x, 1.0)], [(y, 1.0)]) for y in rows for x in columns]
         with np.errstate(divide="ignore", invalid="ignore"):
             mean = weighted_mean((1 / (1 + brightest(tap)), tap) for tap in taps)
-        result = result + group_share * mean
+        result = result + share * mean
     return finite(result)

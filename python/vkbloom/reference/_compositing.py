@@ -3,59 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import ANY, SETTINGS, checked_as
 
 from ._image import as_float, format_of, storage
 from ._sampling import Array
 from ._tape import joined
 from ._tone_map import ENCODINGS, TONE_MAPS
 
-__all__ = ["check_settings", "composite", "composite_checked"]
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
+
+__all__ = ["composite", "composite_checked"]
 
 
-class CompositeSettings(Protocol):
-    """The settings that the last pass reads. For Godot it also reads `white`."""
-
-    @property
-    def method(self) -> str: ...
-    @property
-    def bloom(self) -> bool: ...
-    @property
-    def alpha(self) -> str: ...
-    @property
-    def composite(self) -> str: ...
-    @property
-    def intensity(self) -> float: ...
-    @property
-    def exposure(self) -> float: ...
-    @property
-    def tonemap(self) -> str: ...
-    @property
-    def encoding(self) -> str: ...
-    @property
-    def reference_white(self) -> float: ...
-    @property
-    def dither(self) -> bool: ...
-    @property
-    def dither_seed(self) -> int: ...
-
-
-def check_settings(settings: object) -> None:
-    """Raise TypeError for an object without the fields that all settings have."""
-    if not hasattr(settings, "composite"):
-        raise TypeError(f"settings must be vkbloom.Settings, not {settings!r}")
-
-
-@checked
+@checked_as(bloom=ANY, settings=SETTINGS)
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,
-    settings: CompositeSettings,
+    settings: Settings,
     dtype: DTypeLike | None = None,
     *,
     share: float | Array = 1.0,
@@ -113,17 +83,16 @@ def composite(
     >>> reference.composite(scene, bloom, settings)[0, 0]
     array([0.375, 0.375, 0.375])
     """
-    check_settings(settings)
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else dtype
     if not settings.bloom:
         return composite_checked(image, None, settings, stored)
     if bloom is None:
-        raise TypeError("bloom must be an array where settings.bloom is True, not None")
+        raise TypeError("bloom: None is not an array; settings.bloom is True")
     light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else settings.intensity)
     if light.shape[:2] != image.shape[:2]:
         raise ValueError(
-            f"bloom must have the scene's height and width {image.shape[:2]}, not {light.shape[:2]}"
+            f"bloom: height and width {light.shape[:2]} are not the scene's {image.shape[:2]}"
         )
     return composite_checked(image, light, settings, stored, share)
 
@@ -131,7 +100,7 @@ def composite(
 def composite_checked(
     image: Array,
     light: Array | None,
-    settings: CompositeSettings,
+    settings: Settings,
     dtype: DTypeLike,
     share: float | Array = 1.0,
 ) -> Array:
@@ -170,7 +139,7 @@ def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
         return larger
     if mode == "blur":
         if light.shape[2] == 3:
-            raise ValueError('bloom must have 4 channels where settings.alpha is "blur", not 3')
+            raise ValueError('bloom: 3 channels are not the 4 that settings.alpha "blur" needs')
         return 1 - (1 - alpha) * (1 - np.clip(light[..., 3:], 0, 1))
     return alpha
 
@@ -183,13 +152,13 @@ def _blend(scene: Array, light: Array, mode: str, intensity: float, share: float
         return scene + light - intensity * share * scene
     if mode == "screen":
         return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(light, 0, 1))
-    raise ValueError(f'composite must be "add", "mix" or "screen", not {mode!r}')
+    raise ValueError(f'composite: {mode!r} is not "add", "mix" or "screen"')
 
 
 def _godots(
     scene: Array,
     glow: Array,
-    settings: CompositeSettings,
+    settings: Settings,
     curve: Callable[[Array], Array],
     share: float | Array,
 ) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,20 +11,13 @@ from ._sampling import Array, sample
 from ._tape import joined, operation, value_of
 from ._threshold import luminance
 
+if TYPE_CHECKING:
+    from vkbloom._methods.convolution import Convolution
+
 __all__ = ["convolve", "gain", "passes", "prefiltered"]
 
 
-class ConvolutionSettings(Protocol):
-    """What this method reads of its settings."""
-
-    @property
-    def boundary(self) -> str: ...
-    @property
-    def prefilter(self) -> tuple[float, float, float]: ...
-    def kernel(self, frame: tuple[int, int], buffers: tuple[int, int] | None = None) -> Array: ...
-
-
-def passes(source: BlurInput, settings: ConvolutionSettings) -> dict[str, Array]:
+def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
     """Return "kernel" and "bloom".
 
     Three channels are convolved with the channels of the kernel. A fourth channel is convolved with
@@ -39,7 +32,7 @@ def passes(source: BlurInput, settings: ConvolutionSettings) -> dict[str, Array]
     return {"kernel": kernel, "bloom": source.store(sample(spread, source.size))}
 
 
-def gain(settings: ConvolutionSettings, size: tuple[int, int]) -> Array:
+def gain(settings: Convolution, size: tuple[int, int]) -> Array:
     """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
     one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
     sums: Array = one * settings.kernel(size).sum(axis=(0, 1))

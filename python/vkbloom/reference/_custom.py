@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compositing import CompositeSettings, composite
+from ._compositing import composite
 from ._sampling import Array
+
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
 
 Twin = Callable[[Array, Any], Mapping[str, NDArray[Any]]]
 
 
 def framebuffers(
-    twin: Twin, scene: Array, settings: CompositeSettings, dtype: np.dtype[Any]
+    twin: Twin, scene: Array, settings: Settings, dtype: np.dtype[Any]
 ) -> dict[str, Array]:
     """Return the framebuffers of a twin.
 

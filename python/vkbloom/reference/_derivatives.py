@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Final
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import SETTINGS, checked_as
 from vkbloom._settings.fields import fields_of
 
 from ._framebuffers import checked_image, framebuffers
 from ._sampling import Array
 from ._tape import Traced, gradients, value_of
 
-__all__ = ["DISCRETE", "Gradients", "check_cotangents", "check_shape", "differentiable", "vjp"]
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
+
+__all__ = [
+    "DISCRETE",
+    "Gradients",
+    "check_cotangents",
+    "check_known",
+    "check_shape",
+    "differentiable",
+    "vjp",
+]
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
@@ -27,13 +38,20 @@ class Gradients(dict[str, Array]):
     """Derivatives by name. A name without a derivative raises ValueError."""
 
     def __missing__(self, name: str) -> Array:
-        raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(self)}")
+        check_known(name, self)
+        raise KeyError(name)
 
 
-@checked
+def check_known(name: str, names: Collection[str]) -> None:
+    """Raise ValueError for a name without a derivative."""
+    if name not in names:
+        raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(names)}")
+
+
+@checked_as(settings=SETTINGS)
 def vjp(
     image: NDArray[Any],
-    settings: Any,
+    settings: Settings,
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,

@@ -3,45 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import SETTINGS, checked_as
 from vkbloom._settings.registry import METHODS, Reference
 
-from . import _custom as own
+from . import _custom as custom
 from . import _glare as glare
-from ._compositing import CompositeSettings, check_settings, composite_checked
+from ._compositing import composite_checked
 from ._image import BlurInput, as_array, as_float, as_mask, finite, format_of, storage
 from ._sampling import Array, sample
 from ._threshold import apply_threshold, masked
 
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
+
 __all__ = ["apply", "blur", "gain", "passes"]
 
 
-class Settings(CompositeSettings, Protocol):
-    """The settings that the reference reads for all methods; each method also has its own."""
-
-    method: ClassVar[str]
-    published: ClassVar[bool]
-
-    @property
-    def threshold(self) -> float | None: ...
-    @property
-    def knee(self) -> float: ...
-    @property
-    def bloom_size(self) -> tuple[int, int] | None: ...
-    @property
-    def bloom_scale(self) -> float: ...
-    @property
-    def format(self) -> str | None: ...
-    @property
-    def glare(self) -> tuple[Any, ...]: ...
-
-
-@checked
+@checked_as(settings=SETTINGS)
 def apply(
     image: NDArray[Any],
     settings: Settings,
@@ -107,7 +90,7 @@ def apply(
     """
     if (twin := getattr(settings, "twin", None)) is not None:
         scene = as_float(image, "image", (3, 4))
-        return own.framebuffers(twin, scene, settings, np.asarray(image).dtype)
+        return custom.framebuffers(twin, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     return framebuffers(
@@ -133,7 +116,7 @@ def checked_image(
     height, width, channels = scene.shape
     format = format_of(image, settings.format)
     if settings.alpha != "keep" and (channels == 3 or format == "rg11b10ufloat"):
-        raise ValueError(f'alpha must be "keep" without a fourth channel, not {settings.alpha!r}')
+        raise ValueError(f'alpha: {settings.alpha!r} is not "keep"; there is no fourth channel')
     source = scene if emission is None else _emission(image, emission)
     return scene, source, None if mask is None else as_mask(mask, (width, height)), format
 
@@ -182,7 +165,7 @@ def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
     return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def passes(
     glow: NDArray[Any],
     settings: Settings,
@@ -235,7 +218,7 @@ def passes(
     values = finite(as_float(glow, "glow"))
     height, width, channels = values.shape
     if size is not None and min(size) < 1:
-        raise ValueError(f"size must be (width, height) of at least 1, not {size}")
+        raise ValueError(f"size: {size} is not (width, height) of at least 1")
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
@@ -249,7 +232,7 @@ def passes(
     return _with_alphas(framebuffers)
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def blur(
     glow: NDArray[Any],
     settings: Settings,
@@ -283,7 +266,7 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-@checked
+@checked_as(settings=SETTINGS)
 def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
@@ -315,7 +298,6 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
 
 
 def _method(settings: Settings) -> Reference:
-    check_settings(settings)
     try:
         return METHODS.reference(settings.method)
     except KeyError:
@@ -340,9 +322,7 @@ def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
         (part.shape, part.dtype) for part in (np.asarray(image), as_array(emission, "emission"))
     ]
     if kinds[0] != kinds[1]:
-        raise ValueError(
-            f"emission must have the image's shape and dtype {kinds[0]}, not {kinds[1]}"
-        )
+        raise ValueError(f"emission: shape and dtype {kinds[1]} are not the image's {kinds[0]}")
     return values
 
 

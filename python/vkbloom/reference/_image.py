@@ -31,14 +31,14 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
     array = as_array(image, name)
     if array.dtype.name not in _FORMATS:
         raise TypeError(
-            f"{name} must be uint8, float16, float32 or float64, not {array.dtype}"
+            f"{name}: {array.dtype} is not uint8, float16, float32 or float64"
             + f"; convert it: ({name} / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         )
     if array.ndim != 3 or 0 in array.shape:
-        raise ValueError(f"{name} must have the shape (H, W, C), not {array.shape}")
+        raise ValueError(f"{name}: shape {array.shape} is not (H, W, C)")
     if channels is not None and array.shape[2] not in channels:
         wanted = " or ".join(map(str, channels))
-        raise ValueError(f"{name} must have {wanted} channels, not {array.shape[2]}")
+        raise ValueError(f"{name}: {array.shape[2]} channels are not {wanted}")
     real = array.astype(np.float64)
     return real / 255 if array.dtype == np.uint8 else real
 
@@ -48,7 +48,7 @@ def as_array(values: object, name: str) -> NDArray[Any]:
     try:
         return np.asarray(values)
     except (TypeError, ValueError) as error:
-        raise type(error)(f"{name} must be an array; NumPy: {error}") from None
+        raise type(error)(f"{name}: not an array; NumPy: {error}") from None
 
 
 def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
@@ -58,12 +58,12 @@ def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
     """
     array = as_array(mask, "mask")
     if array.dtype.kind not in "buf":
-        raise TypeError(f"mask must be of numbers, not {array.dtype}")
+        raise TypeError(f"mask: {array.dtype} is not a dtype of numbers")
     if array.shape != size[::-1]:
-        raise ValueError(f"mask must have the image's shape {size[::-1]}, not {array.shape}")
+        raise ValueError(f"mask: shape {array.shape} is not the image's {size[::-1]}")
     values = array.astype(np.float64) / (255 if array.dtype == np.uint8 else 1)
     if not ((values >= 0) & (values <= 1)).all():
-        raise ValueError("mask must have values of 0 to 1")
+        raise ValueError("mask: its values are not in 0..1")
     return values[..., np.newaxis]
 
 
@@ -186,5 +186,5 @@ def storage(format: str) -> Storage:
     """Return the effect of storing values in a bloom buffer of a format."""
     if format not in _STORAGES:
         names = ", ".join(map(repr, _STORAGES))
-        raise ValueError(f"format must be one of {names}, not {format!r}")
+        raise ValueError(f"format: {format!r} is not one of {names}")
     return _STORAGES[format]

@@ -15,13 +15,13 @@ from ._upsampling import combine, tent
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import Pyramid
 
-__all__ = ["downsample", "gain", "groups", "passes"]
+__all__ = ["GROUPS", "downsample", "gain", "groups", "passes"]
 
-# The 13 taps are five 2 x 2 groups: (share of the group, x offsets, y offsets), in texels of the
-# source. The four outer groups overlap: all have the centre tap, and each tap on an axis belongs
-# to two of them. From Jimenez, "Next Generation Post Processing in Call of
-# Duty: Advanced Warfare", SIGGRAPH 2014.
-_GROUPS = (
+#: The 13 taps are five 2 x 2 groups: (share of the group, x offsets, y offsets), in texels of the
+#: source. The four outer groups overlap: all have the centre tap, and each tap on an axis belongs
+#: to two of them. From Jimenez, "Next Generation Post Processing in Call of
+#: Duty: Advanced Warfare", SIGGRAPH 2014.
+GROUPS = (
     (0.5, (-1.0, 1.0), (-1.0, 1.0)),
     (0.125, (-2.0, 0.0), (-2.0, 0.0)),
     (0.125, (0.0, 2.0), (-2.0, 0.0)),
@@ -78,7 +78,7 @@ def groups(
 
     `scale` multiplies the taps' distances along x and y.
     """
-    for share, x_offsets, y_offsets in _GROUPS:
+    for share, x_offsets, y_offsets in GROUPS:
         x_taps = [(scale[0] * x, 0.5) for x in x_offsets]
         y_taps = [(scale[1] * y, 0.5) for y in y_offsets]
         yield share, sample(image, size, x_taps, y_taps)

@@ -80,8 +80,8 @@ def shade(
     for name, array in given.items():
         if array.shape[:2] != colour.shape[:2]:
             raise ValueError(
-                f"{name} must have the albedo's height and width {colour.shape[:2]}, "
-                f"not {array.shape[:2]}"
+                f"{name}: height and width {array.shape[:2]} are not the albedo's "
+                f"{colour.shape[:2]}"
             )
     is_surface = normals.any(axis=-1, keepdims=True)
     n, to_light, to_camera = _unit(normals), _unit(_LIGHT - places), _unit(-places)

@@ -1,6 +1,9 @@
 """Tests of bloom: laws that every blur or bloom should obey, and comparisons with references.
 
-The laws need no reference picture. They take any callable that maps an image to an image.
+The laws need no reference picture. They take any callable that maps an image to an image. What
+measures one raises AssertionError if a law does not hold or a result is not finite, and TypeError
+or ValueError if the callable returns something else, an argument is out of range, or light reaches
+the border of an image that is too small.
 `FrameRegression` is the type of the pytest fixture `frame_regression`.
 """
 

@@ -37,22 +37,6 @@ def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
         The file is damaged or not such an image; the error names it.
     ModuleNotFoundError
         OpenImageIO is missing: ``pip install vkbloom[images]``.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from vkbloom import testing
-    >>> frames = vkbloom.Frames(
-    ...     {"final": np.full((8, 8, 3), 0.5, np.float16)},
-    ...     timings={},
-    ...     settings=vkbloom.Separable(),
-    ...     info={},
-    ... )
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     (path,) = frames.save(f"{folder}/frame.exr")
-    ...     frame = testing.read_frame(path)
-    >>> frame.shape, frame.dtype
-    ((8, 8, 3), dtype('float16'))
     """
     stored = image_reading.load(path)
     try:

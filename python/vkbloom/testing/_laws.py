@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
@@ -45,13 +45,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     probe : Probe
         The kind of test image, and the allowed errors.
 
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -80,7 +73,7 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     )
 
 
-@checked
+@checked_as(glow=FUNCTION)
 def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
@@ -105,21 +98,6 @@ def assert_additive(
         Factor of the bloom, 0 or more.
     probe : Probe
         With integers, `value` must be low enough that image plus bloom is not clamped.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `intensity` is out of range.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(blur_strength=1.0)
-    >>> def bloom(image):
-    ...     return reference.blur(image, settings)
-    >>> testing.assert_additive(lambda image: image + 0.5 * bloom(image), bloom, intensity=0.5)
     """
     __tracebackhide__ = True
     check_number("intensity", intensity, 0.0, math.inf)
@@ -162,13 +140,6 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         With integers, `value` times `gain` must be at most 1.
     border : int
         Pixels at each side that are ignored, for methods that read black outside the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
     """
     __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
@@ -186,7 +157,7 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         )
 
 
-@checked
+@checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
     probe: Probe = _DEFAULT,
@@ -205,13 +176,6 @@ def assert_symmetric(
     probe : Probe
     axes : sequence of {"x", "y", "xy"}
         "x" swaps left and right, "y" top and bottom, "xy" rows and columns.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an axis is unknown.
     """
     __tracebackhide__ = True
     image = probe.noise(0, probe.value)
@@ -246,13 +210,6 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
     probe : Probe
     border : int
         Pixels at each side that are ignored, for methods that read black outside the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `border` is out of range.
     """
     __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
@@ -316,13 +273,6 @@ def assert_bounded_fireflies(
     period : int
         The law is tested at period x period positions of the pixel, because the result of a chain
         of halved images depends on the position. Use 2 for one halving and 4 for two.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
     """
     __tracebackhide__ = True
     if probe.dtype.kind == "u":

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, check_number
 from vkbloom.testing._deviations import fail, is_within
-from vkbloom.testing._point_spread import border_share, check_inside, point_spread
+from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
 __all__ = [
@@ -163,13 +163,6 @@ def stability(
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
 
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the path leaves the image.
-
     Examples
     --------
     A pyramid whose first reduction drops every second pixel loses a small light half of the time:
@@ -197,9 +190,11 @@ def stability(
             for direction in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
         ]
     )
-    measure = _in_order if temporal else _one_by_one
-    spread = _of_a_pixel(bloom, probe, settle if temporal else None)
-    rows = [measure(bloom, probe, path, settle, spread) for path in positions]
+    if not callable(bloom):
+        raise TypeError(f"bloom: {bloom!r} is not callable")
+    moving: Any = bloom if temporal else lambda images: map(bloom, images)
+    spread = _of_a_pixel(moving, probe, settle)
+    rows = [_along(moving, probe, path, settle, spread) for path in positions]
     energy, across, down, peak, ideal, radius, border = np.moveaxis(np.array(rows), -1, 0)
     faint = ~(energy > _DIM * energy.max())
     shift = np.where(faint[..., np.newaxis], math.nan, np.stack([across, down], axis=-1))
@@ -245,20 +240,6 @@ def assert_stable(
         Allowed distance of the centroids in pixels.
     texel, steps, temporal, settle, probe
         As for `stability`. The image must be large enough that no light reaches the border.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, there is no light, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(3.0), blur_strength=1.0)
-    >>> testing.assert_stable(lambda image: reference.blur(image, settings), texel=1)
     """
     __tracebackhide__ = True
     limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
@@ -341,27 +322,12 @@ def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
     return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
 
 
-def _one_by_one(
-    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
+def _along(
+    bloom: MovingBloom, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
 ) -> list[tuple[float, ...]]:
-    """Return the figures of each position, for a bloom of single images."""
+    """Return the figures of each position."""
     __tracebackhide__ = True
-    dark = probe.apply(bloom, probe.flat(0.0))[0][:, :, 0]
-    found = []
-    for place in path:
-        given = _light(probe, place)
-        result = probe.values(bloom(given), given)[0][:, :, 0]
-        found.append(_figures(result - dark, probe, given, spread))
-    return found
-
-
-def _in_order(
-    bloom: Any, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
-) -> list[tuple[float, ...]]:
-    """Return the figures of each position, for a bloom of a sequence."""
-    __tracebackhide__ = True
-    black = probe.given(probe.flat(0.0))
-    dark = _results(bloom, probe, [black])[0]
+    (dark,) = _results(bloom, probe, [probe.given(probe.flat(0.0))])
     still = [_light(probe, path[0])] * settle
     images = still + [_light(probe, place) for place in path]
     results = _results(bloom, probe, images)
@@ -369,13 +335,9 @@ def _in_order(
     return [_figures(result - dark, probe, given, spread) for result, given in pairs]
 
 
-def _of_a_pixel(bloom: Any, probe: Probe, settle: int | None) -> Image:
-    """Return the first channel of the point spread; `settle` is None for single images."""
+def _of_a_pixel(bloom: MovingBloom, probe: Probe, settle: int) -> Image:
+    """Return the first channel of the point spread."""
     __tracebackhide__ = True
-    if not callable(bloom):
-        raise TypeError(f"bloom: {bloom!r} is not callable")
-    if settle is None:
-        return point_spread(bloom, probe)[:, :, 0]
     images = [probe.given(probe.point(probe.centre, value)) for value in (0.0, probe.value)]
     dark, lit = (_results(bloom, probe, [image] * (settle + 1))[-1] for image in images)
     return (lit - dark) / probe.value
@@ -390,16 +352,14 @@ def _convolved_peak(spread: Image, image: Image) -> float:
     return peak if peak > 0 else 1.0
 
 
-def _results(bloom: Any, probe: Probe, images: list[NDArray[Any]]) -> list[Image]:
-    """Return the first channel of each result of a temporal bloom."""
+def _results(bloom: MovingBloom, probe: Probe, images: list[NDArray[Any]]) -> list[Image]:
+    """Return the first channel of each result."""
     __tracebackhide__ = True
-    results = [np.array(result) for result in bloom(list(images))]
+    # Copied one by one, since a bloom may reuse the memory of its results.
+    results = [probe.values(result, images[0])[0][:, :, 0] for result in bloom(list(images))]
     if len(results) != len(images):
         raise ValueError(f"bloom: it returns {len(results)} images for {len(images)}")
-    return [
-        probe.values(result, given)[0][:, :, 0]
-        for result, given in zip(results, images, strict=True)
-    ]
+    return results
 
 
 def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:

@@ -57,13 +57,6 @@ def point_spread(
     ndarray of float64, shape (H, W, C)
         h around the pixel `at`; it is not shifted to the middle.
 
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `at` is outside the image.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -95,13 +88,6 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         bloom is a sum of two layers and fails.
     probe : Probe
         `value` must be low enough that nothing is clamped.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     spread, error = measured_spread(bloom, probe, None)
@@ -150,14 +136,6 @@ def assert_centroid_kept(
     within : float
         Allowed distance along each axis in pixels, in addition to the effect of the errors of
         single values.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
     """
     __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
@@ -207,21 +185,6 @@ def assert_spread(
     rtol : float
         Allowed relative difference. The default allows for a Gaussian that is cut off at three
         sigma, whose standard deviation is 1.3 % smaller.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, an argument is out of range, or the light reaches the
-        border.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> weights = vkbloom.gaussian_weights(2.0)
-    >>> settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
-    >>> testing.assert_spread(lambda image: reference.blur(image, settings), 2.0)
     """
     __tracebackhide__ = True
     pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
@@ -330,13 +293,6 @@ def response(
     Returns
     -------
     Response
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or `values` is empty.
 
     Examples
     --------

@@ -57,11 +57,6 @@ class Probe:
     seed : int
         Seed of the noise images.
 
-    Raises
-    ------
-    ValueError, TypeError
-        A field is out of range or of another type.
-
     Examples
     --------
     >>> from vkbloom import testing
@@ -141,15 +136,6 @@ class Probe:
         result : ndarray of float64, shape (H, W, C)
             The result in real units, without alpha.
         error : float
-
-        Raises
-        ------
-        TypeError
-            The bloom is not callable, or does not return an array of numbers.
-        ValueError
-            The result has another height, width or number of channels.
-        AssertionError
-            The result is not finite.
         """
         __tracebackhide__ = True
         if not callable(bloom):

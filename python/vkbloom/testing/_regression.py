@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,20 @@ __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
 class FrameDifferenceWarning(UserWarning):
     """An image passed, but differs by more than ``warn``."""
+
+
+class Limits(TypedDict, total=False):
+    """The fields of `Tolerances`."""
+
+    atol: float | None
+    rtol: float | None
+    fail_percent: float
+    hard_fail: float | None
+    warn: float | None
+    ssim: float | None
+    psnr: float | None
+    flip: float | None
+    allow_nan: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,16 +111,9 @@ class FrameRegression:
         frames: Frames | Mapping[str, NDArray[Any]] | NDArray[Any],
         name: str | None = None,
         *,
-        atol: float | None = None,
-        rtol: float | None = None,
-        fail_percent: float = 0.0,
-        hard_fail: float | None = None,
-        ssim: float | None = None,
-        flip: float | None = None,
-        warn: float | None = None,
-        allow_nan: bool = False,
         exact: bool = False,
         info: Mapping[str, str] | None = None,
+        **limits: Unpack[Limits],
     ) -> None:
         """Compare frames with their reference, and fail if they differ.
 
@@ -123,14 +130,6 @@ class FrameRegression:
             uint16, float16 or float32, top row first.
         name : str, optional
             Name of the reference within the test's module. Default: the test's name.
-        atol, rtol, fail_percent, hard_fail, warn
-            See `vkbloom.testing.Tolerances`; integers are scaled to 0..1. A difference above
-            `warn` that passes issues a `FrameDifferenceWarning`.
-        ssim, flip : float, optional
-            Smallest SSIM (scikit-image) and largest mean FLIP (OpenImageIO), in addition to the
-            tolerances. With ``atol=math.inf`` only these decide.
-        allow_nan : bool, default False
-            Whether NaN and infinity pass if the reference has the same.
         exact : bool, default False
             Whether every value must be equal to the reference's. The reference must have been made
             by a driver with the same hash, whose results are bit-equal on every CPU. `Frames` of
@@ -138,6 +137,9 @@ class FrameRegression:
         info : mapping of str to str, optional
             "adapter", "driver" and "driver_sha256" that made the images, stored with a new
             reference. `Frames` have their own.
+        **limits
+            Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
+            decide. A difference above `warn` that passes issues a `FrameDifferenceWarning`.
 
         Raises
         ------
@@ -149,33 +151,15 @@ class FrameRegression:
             frames has no hash, or no reference has the same one.
         OSError
             A file cannot be read or written.
-
-        See Also
-        --------
-        compare : With frames of the same test as the reference.
-        Tolerances : The limits.
         """
         __tracebackhide__ = True
         if exact:
-            _check_alone(
-                atol=atol,
-                rtol=rtol,
-                fail_percent=fail_percent or None,
-                hard_fail=hard_fail,
-                ssim=ssim,
-                flip=flip,
-                warn=warn,
-            )
-        tolerances = Tolerances(
-            atol=0.0 if exact else atol,
-            rtol=rtol,
-            fail_percent=fail_percent,
-            hard_fail=hard_fail,
-            ssim=ssim,
-            flip=flip,
-            warn=warn,
-            allow_nan=allow_nan,
-        )
+            if given_limits := [name for name in limits if name != "allow_nan"]:
+                raise ValueError(
+                    f"exact: True excludes tolerances; leave out {', '.join(given_limits)}"
+                )
+            limits["atol"] = 0.0
+        tolerances = Tolerances(**limits)
         given = _Given(
             self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
         )
@@ -198,16 +182,9 @@ class FrameRegression:
         expected: Frames | Mapping[str, NDArray[Any]] | NDArray[Any],
         name: str | None = None,
         *,
-        atol: float | None = None,
-        rtol: float | None = None,
-        fail_percent: float = 0.0,
-        hard_fail: float | None = None,
-        ssim: float | None = None,
-        flip: float | None = None,
-        warn: float | None = None,
-        allow_nan: bool = False,
         info: Mapping[str, Any] | None = None,
         expected_info: Mapping[str, Any] | None = None,
+        **limits: Unpack[Limits],
     ) -> None:
         """Compare frames with others of the same test, and report as `check` does.
 
@@ -217,11 +194,11 @@ class FrameRegression:
             As for `check`; `expected` replaces the reference files.
         name : str, optional
             Name in messages and the report.
-        atol, rtol, fail_percent, hard_fail, ssim, flip, warn, allow_nan
-            As for `check`.
         info, expected_info : mapping of str to object, optional
             "adapter" and "driver" that made `actual` and `expected`, for messages and the report:
             an engine's name, or `Frames.info`. `Frames` have their own.
+        **limits
+            As for `check`.
 
         Raises
         ------
@@ -229,31 +206,9 @@ class FrameRegression:
             The frames differ.
         TypeError, ValueError
             An argument is wrong.
-
-        See Also
-        --------
-        check : With reference files.
-        read_frame : Reads frames of an engine.
-
-        Examples
-        --------
-        >>> def test_two_passes(bloom_renderer, frame_regression):
-        ...     image = np.full((16, 16, 4), 0.5, np.float32)
-        ...     one = bloom_renderer.apply(image, vkbloom.Separable(direct=True))["bloom"]
-        ...     two = bloom_renderer.apply(image, vkbloom.Separable())["bloom"]
-        ...     frame_regression.compare(two, one, atol=1e-3)
         """
         __tracebackhide__ = True
-        tolerances = Tolerances(
-            atol=atol,
-            rtol=rtol,
-            fail_percent=fail_percent,
-            hard_fail=hard_fail,
-            ssim=ssim,
-            flip=flip,
-            warn=warn,
-            allow_nan=allow_nan,
-        )
+        tolerances = Tolerances(**limits)
         if name is not None:
             check_name(name)
         given = _Given(
@@ -410,14 +365,6 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
             raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
         images[name] = native_order(image)
     return images
-
-
-def _check_alone(**tolerances: float | None) -> None:
-    """Raise ValueError if a tolerance is given."""
-    __tracebackhide__ = True
-    given = [name for name, value in tolerances.items() if value is not None]
-    if given:
-        raise ValueError(f"exact: True excludes tolerances; leave out {', '.join(given)}")
 
 
 def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:

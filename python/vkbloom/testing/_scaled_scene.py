@@ -90,13 +90,6 @@ def resolution_response(
     -------
     ResolutionResponse
 
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
     Examples
     --------
     The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
@@ -150,23 +143,6 @@ def assert_resolution_independent(
     radius, peak : float
         Allowed difference of the largest and the smallest value, relative to the mean, for both
         radii and for the peak.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, there is no light, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     sigma = image.shape[0] / 16
-    ...     weights = vkbloom.gaussian_weights(sigma)
-    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
-    ...     return reference.blur(image, settings)
-    >>> testing.assert_resolution_independent(bloom, scales=(0.5, 1))
     """
     __tracebackhide__ = True
     check_number("radius", radius, 0.0, math.inf)

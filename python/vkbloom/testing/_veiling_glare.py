@@ -42,13 +42,6 @@ def veiling_glare_index(
         0 without glare; the bloom's share of the light far from the patch is near 100 times its
         gain.
 
-    Raises
-    ------
-    AssertionError
-        The result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or an argument is out of range.
-
     Examples
     --------
     >>> from vkbloom import reference, testing

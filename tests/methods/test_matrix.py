@@ -1,0 +1,121 @@
+"""Every method and preset in every variant, dtype and kind of size, against the reference."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
+
+from tests.exhaustive import by_turns
+from tests.images import hdr_picture
+from tests.methods.cases import (
+    DTYPES,
+    GIVEN,
+    METHODS,
+    OTHERS,
+    WHOLE,
+    presets_of_low_levels,
+)
+from tests.tolerance import assert_matches_reference
+from vkbloom import Convolution, Renderer, Separable, Settings, UnrealBloom, UrpBloom
+
+Image = NDArray[Any]
+
+VARIANTS = ("fragment", "cpu", "gpu")
+# Of the convolutions one: they have the same passes.
+PRESETS = {
+    name: one
+    for name, one in presets_of_low_levels(64).items()
+    if name == "camera_lens" or not isinstance(one, Convolution)
+}
+CASES: dict[str, tuple[Settings, tuple[str, ...]]] = {
+    **{name: (one, ()) for name, one in (METHODS | WHOLE | OTHERS | PRESETS).items()},
+    **GIVEN,
+}
+# Sides that are multiples of the variants' strips and tiles, and some that are not; levels of
+# exactly half the size, and others; less than a kernel.
+SIZES = ((97, 61), (72, 64), (1, 1), (64, 48), (7, 1), (260, 24), (1, 9), (13, 7))
+# These have all three variants, the others two by turns.
+COMPLETE = {*METHODS, *WHOLE, *PRESETS, *itertools.islice(GIVEN, 4)}
+
+
+def has_equal_bits(settings: Settings) -> bool:
+    """Whether variants add in one order: not in blurs into another size and in transforms."""
+    if isinstance(settings, Separable):
+        is_resized = settings.bloom_size is not None or settings.bloom_scale != 1
+        return not is_resized and min(settings.weights) >= 0
+    is_transformed = isinstance(settings, Convolution) or settings == PRESETS["blender_fog_glow"]
+    return not is_transformed and not isinstance(settings, UrpBloom | UnrealBloom)
+
+
+def image_of(size: tuple[int, int], dtype: str, settings: Settings, channels: int) -> Image:
+    """Return a picture; if its alpha counts, a part of it is transparent black."""
+    if settings.alpha == "keep":
+        return hdr_picture(*size, channels, dtype)
+    image = hdr_picture(*size, 4, dtype)
+    if dtype != "uint8":
+        image[..., 3] = np.clip(image[..., 3] / 8, 0, 1)
+    image[:, size[0] - size[0] // 4 :] = 0
+    return image
+
+
+def given_of(names: tuple[str, ...], image: Image) -> dict[str, Any]:
+    mask = np.random.default_rng(3).random(image.shape[:2], np.float32)
+    mask[:9, :9] = 0
+    every = {"mask": mask, "emission": image[::-1].copy()}
+    return {name: every[name] for name in names}
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[dict[str, Renderer]]:
+    """A renderer for each column of the table of variants."""
+    renderers = {}
+    with pytest.MonkeyPatch.context() as patch:
+        for variant in VARIANTS:
+            patch.setenv("VKBLOOM_VARIANT", variant)
+            renderers[variant] = Renderer(validation=True)
+    yield renderers
+    for renderer in renderers.values():
+        renderer.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "dtype", "number"),
+    [
+        (name, *kind, number)
+        for number, (name, kind) in enumerate(
+            by_turns(
+                [*CASES, *(name for name in PRESETS if "lens" not in name)],
+                turns=itertools.product(SIZES, DTYPES),
+            )
+        )
+    ],
+)
+def test_every_variant(
+    opened: dict[str, Renderer], name: str, size: tuple[int, int], dtype: str, number: int
+) -> None:
+    """Against the reference and the bits of the others; `final` alone is the `final` of all."""
+    settings, names = CASES[name]
+    image = image_of(size, dtype, settings, 3 + number // 2 % 2)
+    given = given_of(names, image)
+    expected = opened["fragment"].apply(image, settings, **given)
+    if not settings.dither:
+        # (It makes two levels of a value that differs in its last bit.)
+        assert_matches_reference(expected, image, settings, **given)
+    for variant in VARIANTS if name in COMPLETE else ("fragment", VARIANTS[1 + number % 2]):
+        renderer = opened[variant]
+        frames = renderer.apply(image, settings, **given)
+        if has_equal_bits(settings):
+            for framebuffer, values in expected.items():
+                assert_array_equal(frames[framebuffer], values, f"{variant}: {framebuffer}")
+        else:
+            assert_matches_reference(frames, image, settings, **given)
+        # Another image in between, so that no result of the first call is cached.
+        renderer.apply(image[::-1], settings, framebuffers=("final",), **given)
+        alone = renderer.apply(image, settings, framebuffers=("final",), **given)
+        assert_array_equal(alone["final"], frames["final"], f"{variant}: final alone")
