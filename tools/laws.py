@@ -1,4 +1,4 @@
-"""Test blurs and blooms of other packages, and our own, against the laws of `vkbloom.testing`.
+"""Test blurs and blooms of other packages against the laws of `vkbloom.testing`.
 
 ``python -m tools.laws`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
 Vulkan driver, as pygfx's bloom runs through wgpu.
@@ -27,8 +27,6 @@ SIGMA = 2.0
 # Small kernels end far from the border; the widest level of a chain does not.
 SMALL = Probe(size=(65, 65))
 CHAIN = Probe(size=(256, 256))
-# The methods of engines have thresholds and chains with more levels.
-ENGINE = Probe(size=(512, 512), value=16.0)
 # For methods whose result has half floats for every input.
 HALF = dataclasses.replace(CHAIN, dtype="float16")
 
@@ -148,64 +146,6 @@ def pygfx(adapter: str) -> Iterator[Subject]:
     )
 
 
-def ours(renderer: vkbloom.Renderer) -> Iterator[Subject]:
-    """Yield this package's methods."""
-
-    def bloom(settings: vkbloom.Settings, name: str = "bloom") -> Bloom:
-        return lambda image: renderer.apply(image, settings, framebuffers=(name,))[name]
-
-    name = f"vkbloom {vkbloom.__version__}"
-    gaussian = vkbloom.Separable(weights=vkbloom.gaussian_weights(SIGMA, 8), blur_strength=1.0)
-    yield Subject(f"{name} `Separable`, Gaussian", bloom(gaussian), SMALL, 1.0, SIGMA)
-    # Two axes of taps: sum over i of w_i i^2, times 2 and the strength, over the sum of weights.
-    tutorial = vkbloom.Separable()
-    centre, *sides = tutorial.weights
-    share = [2 * tutorial.blur_strength * weight for weight in sides]
-    variance = sum(w * i * i for i, w in enumerate(share, 1)) / (centre + sum(share))
-    yield Subject(
-        f"{name} `Separable`",
-        bloom(tutorial),
-        SMALL,
-        vkbloom.reference.gain(tutorial),
-        variance**0.5,
-    )
-    for settings, text in (
-        (vkbloom.Pyramid(levels=4), "`Pyramid`, 4 levels"),
-        (vkbloom.Pyramid(levels=4, firefly_filter=True), "`Pyramid`, `firefly_filter`"),
-        (vkbloom.DualKawase(levels=3), "`DualKawase`, 3 levels"),
-    ):
-        yield Subject(f"{name} {text}", bloom(settings), CHAIN, vkbloom.reference.gain(settings))
-    glare = vkbloom.Convolution(vkbloom.psf.gaussian(SIGMA), boundary="edge", kernel_size=(25, 25))
-    kernel = glare.kernel(SMALL.size)[..., 0].sum(axis=0)
-    variance = float(kernel @ (np.arange(25) - 12) ** 2)
-    text = f"{name} `Convolution`, Gaussian"
-    yield Subject(text, bloom(glare), SMALL, 1.0, variance**0.5)
-    for preset, settings in vkbloom.presets.items():
-        if isinstance(settings, vkbloom.Convolution):
-            # Edges are continued, and each channel of the kernel has the sum 1.
-            kept = settings.normalize and settings.boundary == "edge"
-            yield Subject(f"{name} `{preset}`", bloom(settings), ENGINE, 1.0 if kept else None)
-    for method in (
-        vkbloom.BevyBloom,
-        vkbloom.FilamentBloom,
-        vkbloom.UrpBloom,
-        vkbloom.HdrpBloom,
-        vkbloom.UnrealBloom,
-        vkbloom.KinoBloom,
-        vkbloom.GodotBloom,
-        vkbloom.BlenderGlare,
-        vkbloom.PygfxBloom,
-    ):
-        yield Subject(f"{name} `{method.__name__}`", bloom(method()), ENGINE)
-    yield Subject(
-        f"{name} `Separable`, the picture with it",
-        bloom(tutorial, "final"),
-        SMALL,
-        1.0 + vkbloom.reference.gain(tutorial),
-        picture=True,
-    )
-
-
 Law = Callable[[Subject], None]
 
 
@@ -300,13 +240,13 @@ def page(subjects: list[Subject], device: str) -> str:
 
 TEXT = """# Which laws blurs and blooms keep
 
-Written by `tools/laws.py`. It tests blurs and blooms of other packages, and of this one, against
+Written by `tools/laws.py`. It tests blurs and blooms of other packages against
 the assertions of `vkbloom.testing` (see [testing.md](testing.md)). The adapter, where one is used:
 {device}.
 
 Gaussians have a sigma of {sigma:g} pixels. Images are float32 of 65 x 65 pixels with values up to
-1. Chains of halved images have 256 x 256 pixels. Published methods of engines have 512 x 512
-pixels with values up to 16, because most of them have a threshold. Tolerances are the defaults.
+1. Chains of halved images have 256 x 256 pixels. Tolerances are the defaults. The presets of this
+package are tested by [`vkbloom check`](check.md).
 An empty cell means that the law does not apply. A question mark means that the premise of the law
 does not hold. "Mirrored" is `assert_symmetric` for left and right and for top and bottom;
 "transposed" is `assert_symmetric` for rows and columns. The limit for fireflies is 1: a bright
@@ -345,7 +285,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=TARGET)
     target = parser.parse_args().out
     with vkbloom.Renderer("software") as renderer:
-        subjects = [*opencv(), *scipy(), *skimage(), *pygfx(renderer.info.name), *ours(renderer)]
+        subjects = [*opencv(), *scipy(), *skimage(), *pygfx(renderer.info.name)]
         target.write_text(page(subjects, renderer.info.summary), encoding="utf-8")
     print(target)
 

@@ -1,5 +1,5 @@
 // Determines without a device which passes a sequence of plans would run: the planner that
-// run/frame.c uses, with images that consist of descriptions of their content only.
+// execute/frame.c uses, with images that consist of descriptions of their content only.
 #ifndef VKB_DRY_RUN_H
 #define VKB_DRY_RUN_H
 

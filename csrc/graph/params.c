@@ -23,23 +23,6 @@ const struct vkb_value_row vkb_glare_rows[] = {GLARE_SETTING_ROWS(GLARE_SETTING_
                                                    GLARE_COUNT_ROWS(GLARE_COUNT_ROW)};
 const size_t vkb_glare_row_count = sizeof vkb_glare_rows / sizeof vkb_glare_rows[0];
 
-void vkb_value_store(void *values, const struct vkb_value_row *row, double number)
-{
-    char *place = (char *)values + row->offset;
-
-    switch (row->type) {
-    case VKB_VALUE_FLOAT:
-        *(float *)place = (float)number;
-        break;
-    case VKB_VALUE_INT:
-        *(int *)place = (int)number;
-        break;
-    case VKB_VALUE_DOUBLE:
-        *(double *)place = number;
-        break;
-    }
-}
-
 #define SPELLING(name, value, spelling) [value] = #spelling,
 #define SPELLINGS(choice, NAMES) static const char *const choice##_spellings[] = {NAMES(SPELLING)};
 CHOICES(SPELLINGS)

@@ -92,9 +92,6 @@ extern const size_t vkb_value_row_count;
 extern const struct vkb_value_row vkb_glare_rows[];
 extern const size_t vkb_glare_row_count;
 
-// Sets the member of the row in the struct that it is of.
-void vkb_value_store(void *values, const struct vkb_value_row *row, double number);
-
 // A setting that is one of a list of names; the names' values count from 0.
 struct vkb_choice_row {
     const char *name;

@@ -16,7 +16,7 @@ static uint32_t find_read(const struct vkb_bloom_source *source, const struct vk
                                      : vkb_graph_find(graph, name);
 }
 
-static bool add_pass(const struct vkb_own_pass *pass, const char *name,
+static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
                      const struct vkb_bloom_source *source, struct vkb_graph *graph,
                      uint32_t *image, struct vkb_error *error)
 {
@@ -52,7 +52,7 @@ static bool add_pass(const struct vkb_own_pass *pass, const char *name,
     return vkb_graph_add_pass(graph, &row, error);
 }
 
-static bool has_size(const struct vkb_own_pass *pass, struct vkb_size size)
+static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
 {
     return pass->width == size.width && pass->height == size.height;
 }
@@ -64,7 +64,7 @@ bool vkb_add_own(const struct vkb_settings *settings, const struct vkb_bloom_sou
 
     *bloom = VKB_NO_IMAGE;
     for (uint32_t i = 0; i < settings->pass_count; ++i) {
-        const struct vkb_own_pass *pass = &settings->passes[i];
+        const struct vkb_custom_pass *pass = &settings->passes[i];
         const bool enlarged = strcmp(pass->name, BLOOM) == 0 && !has_size(pass, source->final);
         uint32_t image;
         if (!add_pass(pass, enlarged ? "bloom_own" : pass->name, source, graph, &image, error)

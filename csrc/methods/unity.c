@@ -14,7 +14,7 @@ static const float urp_weights[] = {0.22702703f, 0.19459459f, 0.12162162f, 0.054
 enum { WEIGHT_COUNT = 5 };
 
 // HDRP treats frames below this size as small.
-enum { HDRP_LEAST_WIDTH = 800, HDRP_LEAST_HEIGHT = 450 };
+enum { HDRP_MIN_WIDTH = 800, HDRP_MIN_HEIGHT = 450 };
 
 // u_k = lerp(d_k, U(u_k+1), s): both pipelines map the scatter to the range 0.05 to 0.95.
 static struct vkb_combination scattered(const struct vkb_settings *settings, enum vkb_mode kernel)
@@ -98,8 +98,8 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const struct vkb_size frame = source->buffers;
     // In small frames the bicubic filter is too wide for the last levels.
-    const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_LEAST_WIDTH
-                    && frame.height >= HDRP_LEAST_HEIGHT;
+    const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_MIN_WIDTH
+                    && frame.height >= HDRP_MIN_HEIGHT;
     struct vkb_combination combination =
         scattered(settings, cubic ? UPSAMPLE_INSET_CUBIC : UPSAMPLE_INSET_LINEAR);
     const uint32_t count = level_count(frame.width, frame.height, 2.0, MAX_LEVELS);

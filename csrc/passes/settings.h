@@ -67,7 +67,7 @@ struct vkb_stage {
 
 // A pass of a method that was given at run time (methods/own.c). The owner of the settings keeps
 // the shader as long as there are rows of it.
-struct vkb_own_pass {
+struct vkb_custom_pass {
     char name[VKB_NAME_SIZE];  // of the image that it writes
     const struct vkb_shader *shader;
     uint32_t width, height;
@@ -87,7 +87,7 @@ struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
     int choices[VKB_CHOICE_COUNT];
-    bool thresholded;                    // false: threshold and knee have no effect
+    int thresholded;                     // 0: threshold and knee have no effect
     uint32_t bloom_width, bloom_height;  // 0: by bloom_scale
     enum vkb_format format;              // VKB_FORMAT_NONE: by the source
     float weights[MAX_WEIGHTS];
@@ -95,14 +95,15 @@ struct vkb_settings {
     struct vkb_layer layers[MAX_LAYERS];
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
-    uint32_t level_weight_count;  // 0: none are given
-    float tint[3];                // of Blender's glare, and the position of its sun
-    float sun_position[2];        // as shares of the sides from the lower left
-    struct vkb_kernel_data kernel;
+    uint32_t level_weight_count;          // 0: none are given
+    float tint[3];                        // of Blender's glare, and the position of its sun
+    float sun_position[2];                // as shares of the sides from the lower left
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
-    struct vkb_kernel_data dirt;        // the picture of the stage of dirt
-    const struct vkb_own_pass *passes;  // of VKB_METHOD_OWN
+    // Python packs what is before here.
+    struct vkb_kernel_data kernel;
+    struct vkb_kernel_data dirt;           // the picture of the stage of dirt
+    const struct vkb_custom_pass *passes;  // of VKB_METHOD_OWN
     uint32_t pass_count;
 };
 

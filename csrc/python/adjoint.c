@@ -17,7 +17,7 @@ PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!OO!p:adjoint", state->source_type, &source,
                           &settings_object, &PyTuple_Type, &names, &sums)
-        || !vkb_read_settings(state, settings_object, &settings)
+        || !vkb_read_settings(settings_object, &settings)
         || !vkb_read_names(names, cotangents.names, &cotangents.count))
         return NULL;
     cotangents.sums = sums;

@@ -1,307 +1,186 @@
-// Python's settings as the core's struct. All functions return false with an exception set.
+// Settings as Python packs them: the members of struct vkb_settings before its pointers, by the
+// tables that this file gives. All functions return false with an exception set.
 #include "python/arguments.h"
 #include "python/values.h"
 
-#include <float.h>
-#include <math.h>
+#include <stddef.h>
 #include <string.h>
 
-// The attributes of a settings object that are read here; the values' rows come last.
-enum attribute {
-    ATTRIBUTE_METHOD,
-    ATTRIBUTE_THRESHOLD,
-    ATTRIBUTE_FORMAT,
-    ATTRIBUTE_BLOOM_SIZE,
-    ATTRIBUTE_WEIGHTS,
-    ATTRIBUTE_LAYERS,
-    ATTRIBUTE_LEVEL_WEIGHTS,
-    ATTRIBUTE_TINT,
-    ATTRIBUTE_SUN_POSITION,
-    ATTRIBUTE_CHOICES,
-    ATTRIBUTE_VALUES = ATTRIBUTE_CHOICES + VKB_CHOICE_COUNT,
+enum { BLOCK_SIZE = offsetof(struct vkb_settings, kernel) };
+
+// A member that no table of numbers has: the code of its elements in NumPy, whose last character is
+// their size, and their number.
+struct member {
+    const char *name, *code;
+    size_t offset, size;
 };
 
-static const char *attribute_name(size_t attribute)
-{
-    static const char *const names[ATTRIBUTE_CHOICES] = {
-        [ATTRIBUTE_METHOD] = "method",
-        [ATTRIBUTE_THRESHOLD] = "threshold",
-        [ATTRIBUTE_FORMAT] = "format",
-        [ATTRIBUTE_BLOOM_SIZE] = "bloom_size",
-        [ATTRIBUTE_WEIGHTS] = "weights",
-        [ATTRIBUTE_LAYERS] = "layers",
-        [ATTRIBUTE_LEVEL_WEIGHTS] = "level_weights",
-        [ATTRIBUTE_TINT] = "tint",
-        [ATTRIBUTE_SUN_POSITION] = "sun_position",
-    };
+#define MEMBER(of, name, code) {#name, code, offsetof(struct of, name), sizeof((struct of){0}.name)}
 
-    return attribute < ATTRIBUTE_CHOICES ? names[attribute]
-         : attribute < ATTRIBUTE_VALUES  ? vkb_choice_rows[attribute - ATTRIBUTE_CHOICES].name
-                                         : vkb_value_rows[attribute - ATTRIBUTE_VALUES].name;
-}
-
-bool vkb_make_attributes(struct vkb_module_state *state)
-{
-    const size_t count = ATTRIBUTE_VALUES + vkb_value_row_count;
-
-    state->attributes = PyTuple_New((Py_ssize_t)count);
-    for (size_t i = 0; state->attributes && i < count; ++i) {
-        PyObject *name = PyUnicode_InternFromString(attribute_name(i));
-        if (!name || PyTuple_SetItem(state->attributes, (Py_ssize_t)i, name) < 0)
-            return false;
-    }
-    return state->attributes;
-}
-
-// A settings object that is being read.
-struct reader {
-    const struct vkb_module_state *state;
-    PyObject *object;
-    PyObject *fields;  // of a dataclass, by name; NULL: it is none
+static const struct member settings_members[] = {
+    MEMBER(vkb_settings, method, "i4"),
+    MEMBER(vkb_settings, thresholded, "i4"),
+    MEMBER(vkb_settings, bloom_width, "u4"),
+    MEMBER(vkb_settings, bloom_height, "u4"),
+    MEMBER(vkb_settings, format, "i4"),
+    MEMBER(vkb_settings, weights, "f4"),
+    MEMBER(vkb_settings, weight_count, "u4"),
+    MEMBER(vkb_settings, layers, "f4"),
+    MEMBER(vkb_settings, layer_count, "u4"),
+    MEMBER(vkb_settings, level_weights, "f4"),
+    MEMBER(vkb_settings, level_weight_count, "u4"),
+    MEMBER(vkb_settings, tint, "f4"),
+    MEMBER(vkb_settings, sun_position, "f4"),
+    // Structs, which the other table describes.
+    MEMBER(vkb_settings, stages, ""),
+    MEMBER(vkb_settings, stage_count, "u4"),
+    {"", "", 0, BLOCK_SIZE},
 };
 
-// The attribute, or NULL: without an exception where the object lacks it. One that its type has,
-// such as a property, is not lacking, whatever reading it raises.
-static PyObject *optional_attribute(const struct reader *reader, size_t attribute)
+static const struct member stage_members[] = {
+    MEMBER(vkb_stage, kind, "i4"),
+    MEMBER(vkb_stage, ghosts, "f4"),
+    MEMBER(vkb_stage, ghost_count, "u4"),
+    {"", "", 0, sizeof(struct vkb_stage)},
+};
+
+static bool add_member(PyObject *table, const struct member *member)
 {
-    PyObject *name = PyTuple_GetItem(reader->state->attributes, (Py_ssize_t)attribute);
+    const size_t size = *member->code ? (size_t)(member->code[1] - '0') : 1;
+    PyObject *entry = Py_BuildValue("(nsn)", (Py_ssize_t)member->offset, member->code,
+                                    (Py_ssize_t)(member->size / size));
+    const bool done = entry && PyDict_SetItemString(table, member->name, entry) == 0;
 
-    // An AttributeError takes ten times as long as this look-up, and most methods lack most fields.
-    if (reader->fields && PyDict_Contains(reader->fields, name) == 0)
-        return NULL;
-    PyObject *value = PyObject_GetAttr(reader->object, name);
-    if (value || !PyErr_ExceptionMatches(PyExc_AttributeError))
-        return value;
-    PyObject *type, *error, *traceback;
-    PyErr_Fetch(&type, &error, &traceback);
-    if (PyObject_HasAttr((PyObject *)Py_TYPE(reader->object), name)) {
-        PyErr_Restore(type, error, traceback);
-        return NULL;
-    }
-    Py_XDECREF(type);
-    Py_XDECREF(error);
-    Py_XDECREF(traceback);
-    return NULL;
-}
-
-// None keeps the default.
-static bool read_value(const struct reader *reader, size_t index, struct vkb_values *values)
-{
-    const struct vkb_value_row *row = &vkb_value_rows[index];
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_VALUES + index);
-
-    vkb_value_store(values, row, row->initial);
-    if (!value)
-        return !PyErr_Occurred();
-    const bool done = value == Py_None || vkb_read_number(value, row, values);
-    Py_DECREF(value);
+    Py_XDECREF(entry);
     return done;
 }
 
-static bool read_choice(const struct reader *reader, int index, int *choice)
+// {name: (offset, code, number of elements)}; under "" the size of the struct.
+static PyObject *block_table(const struct member *members, size_t count,
+                             const struct vkb_value_row *rows, size_t row_count, size_t offset)
 {
-    const struct vkb_choice_row *row = &vkb_choice_rows[index];
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_CHOICES + (size_t)index);
+    PyObject *table = PyDict_New();
+    bool done = table;
 
-    *choice = 0;
-    if (!value)
-        return !PyErr_Occurred();
-    *choice = vkb_read_name(value, row->spellings, row->count, row->name, "value");
-    Py_DECREF(value);
-    return *choice >= 0;
+    for (size_t i = 0; done && i < count; ++i)
+        done = add_member(table, &members[i]);
+    for (size_t i = 0; done && i < row_count; ++i) {
+        static const char *const codes[] = {
+            [VKB_VALUE_FLOAT] = "f4", [VKB_VALUE_INT] = "i4", [VKB_VALUE_DOUBLE] = "f8"};
+        const char *code = codes[rows[i].type];
+        done = add_member(table, &(struct member){rows[i].name, code, offset + rows[i].offset,
+                                                  (size_t)(code[1] - '0')});
+    }
+    if (!done)
+        Py_CLEAR(table);
+    return table;
 }
 
-static bool read_format(const struct reader *reader, enum vkb_format *format)
+PyObject *vkb_stage_block_table(void)
 {
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_FORMAT);
-
-    *format = VKB_FORMAT_NONE;
-    if (!value)
-        return !PyErr_Occurred();
-    if (value != Py_None) {
-        PyObject *text = PyUnicode_Check(value) ? PyUnicode_AsUTF8String(value) : NULL;
-        if (text)
-            *format = vkb_format_by_name(PyBytes_AsString(text));
-        Py_XDECREF(text);
-        if (!PyErr_Occurred() && (*format == VKB_FORMAT_NONE || vkb_formats[*format].channels == 1))
-            PyErr_Format(PyExc_ValueError, "format: %R is not a format of bloom buffers", value);
-    }
-    Py_DECREF(value);
-    return !PyErr_Occurred();
+    return block_table(stage_members, sizeof stage_members / sizeof stage_members[0],
+                       vkb_glare_rows, vkb_glare_row_count, offsetof(struct vkb_stage, values));
 }
 
-static bool read_size(const struct reader *reader, struct vkb_settings *settings)
+PyObject *vkb_settings_block_table(void)
 {
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_BLOOM_SIZE);
-    bool done = true;
+    PyObject *table =
+        block_table(settings_members, sizeof settings_members / sizeof settings_members[0],
+                    vkb_value_rows, vkb_value_row_count, offsetof(struct vkb_settings, values));
 
-    if (!value)
-        return !PyErr_Occurred();
-    if (value != Py_None) {
-        done = vkb_require_tuple(value, "bloom_size")
-            && PyArg_ParseTuple(value, "O&O&;bloom_size must be (width, height)", vkb_read_uint32,
-                                &settings->bloom_width, vkb_read_uint32, &settings->bloom_height);
-        if (done && (settings->bloom_width == 0 || settings->bloom_height == 0)) {
-            PyErr_Format(PyExc_ValueError, "bloom_size: %R is out of range, sides of at least 1",
-                         value);
-            done = false;
-        }
+    for (size_t i = 0; table && i < VKB_CHOICE_COUNT; ++i) {
+        const struct member member = {vkb_choice_rows[i].name, "i4",
+                                      offsetof(struct vkb_settings, choices) + i * sizeof(int),
+                                      sizeof(int)};
+        if (!add_member(table, &member))
+            Py_CLEAR(table);
     }
-    Py_DECREF(value);
-    return done;
+    return table;
 }
 
-static bool read_method(const struct reader *reader, enum vkb_method *method)
+static double as_stored(const struct vkb_value_row *row, double number)
 {
-#define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
-    static const char *const names[VKB_METHOD_COUNT] = {VKB_METHODS(METHOD_NAME)};
-#undef METHOD_NAME
-    PyObject *value = PyObject_GetAttr(
-        reader->object, PyTuple_GetItem(reader->state->attributes, ATTRIBUTE_METHOD));
-    const int found =
-        value ? vkb_read_name(value, names, VKB_METHOD_COUNT, "method", "method") : -1;
-
-    Py_XDECREF(value);
-    *method = (enum vkb_method)found;
-    return found >= 0;
+    return row->type == VKB_VALUE_FLOAT ? (float)number : number;
 }
 
-// From 1 to `most` numbers; None leaves them out.
-static bool read_numbers(const struct reader *reader, size_t attribute, Py_ssize_t most,
-                         float *numbers, uint32_t *number_count)
+// A default may be out of the range.
+static bool has_values(const struct vkb_value_row *rows, size_t count, const void *values)
 {
-    PyObject *value = optional_attribute(reader, attribute);
+    bool valid = true;
 
-    if (!value)
-        return !PyErr_Occurred();
-    if (value == Py_None) {
-        Py_DECREF(value);
-        return true;
+    for (size_t i = 0; valid && i < count; ++i) {
+        const struct vkb_value_row *row = &rows[i];
+        const char *at = (const char *)values + row->offset;
+        const double number = row->type == VKB_VALUE_DOUBLE ? *(const double *)at
+                            : row->type == VKB_VALUE_INT    ? *(const int *)at
+                                                            : *(const float *)at;
+        valid = number == as_stored(row, row->initial)
+             || (number >= as_stored(row, row->low) && number <= as_stored(row, row->high));
     }
-    Py_ssize_t count = PySequence_Size(value);
-    if (count < 1 || count > most) {
-        const char *name = attribute_name(attribute);
-        if (!PyErr_Occurred())
-            PyErr_Format(PyExc_ValueError, "%s: %zd weights are out of range, 1 to %zd", name,
-                         count, most);
-        Py_DECREF(value);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
-        PyObject *item = PySequence_GetItem(value, i);
-        const double weight = item ? PyFloat_AsDouble(item) : 0.0;
-        if (!PyErr_Occurred() && !(fabs(weight) <= FLT_MAX))
-            vkb_out_of_range(attribute_name(attribute), item, -FLT_MAX, FLT_MAX);
-        else
-            numbers[i] = (float)weight;
-        Py_XDECREF(item);
-    }
-    *number_count = (uint32_t)count;
-    Py_DECREF(value);
-    return !PyErr_Occurred();
+    return valid;
 }
 
 // What a kernel's taps are found by must be neither negative nor NaN.
-static bool is_layer_number(float number)
+static bool has_layers(const struct vkb_settings *settings)
 {
-    return number >= 0.0f && number <= (float)LAYER_LIMIT;
-}
+    bool valid = settings->layer_count <= MAX_LAYERS;
 
-static bool read_layers(const struct reader *reader, struct vkb_settings *settings)
-{
-    PyObject *value = optional_attribute(reader, ATTRIBUTE_LAYERS);
-
-    if (!value)
-        return !PyErr_Occurred();
-    Py_ssize_t count = PySequence_Size(value);
-    if (count < 1 || count > MAX_LAYERS) {
-        if (!PyErr_Occurred())
-            PyErr_Format(PyExc_ValueError, "layers: %zd layers are out of range, 1 to %d", count,
-                         MAX_LAYERS);
-        Py_DECREF(value);
-        return false;
+    for (uint32_t i = 0; valid && i < settings->layer_count; ++i) {
+        const struct vkb_layer *layer = &settings->layers[i];
+        valid = layer->scale >= 0.0f && layer->scale <= (float)LAYER_LIMIT
+             && layer->strength >= 0.0f && layer->strength <= (float)LAYER_LIMIT;
     }
-    for (Py_ssize_t i = 0; i < count && !PyErr_Occurred(); ++i) {
-        PyObject *item = PySequence_GetItem(value, i);
-        struct vkb_layer *layer = &settings->layers[i];
-        if (item && vkb_require_tuple(item, "layers")
-            && PyArg_ParseTuple(item, "ff;layers must hold (scale, strength)", &layer->scale,
-                                &layer->strength)
-            && !(is_layer_number(layer->scale) && is_layer_number(layer->strength)))
-            vkb_out_of_range("layers", item, 0.0, LAYER_LIMIT);
-        Py_XDECREF(item);
-    }
-    settings->layer_count = (uint32_t)count;
-    Py_DECREF(value);
-    return !PyErr_Occurred();
+    return valid;
 }
 
-// A separable blur has a kernel and a layer; whatever else the object lacks has a default.
-static bool require_kernel(const struct vkb_settings *settings)
+static bool has_stages(const struct vkb_settings *settings)
 {
-    if (settings->method != VKB_METHOD_SEPARABLE
-        || (settings->weight_count > 0 && settings->layer_count > 0))
-        return true;
-    PyErr_Format(PyExc_ValueError, "%s: a separable blur needs them",
-                 settings->weight_count ? "layers" : "weights");
-    return false;
+    bool valid = settings->stage_count <= MAX_STAGES;
+
+    for (uint32_t i = 0; valid && i < settings->stage_count; ++i)
+        valid = settings->stages[i].kind < VKB_STAGE_COUNT
+             && settings->stages[i].ghost_count <= MAX_GHOSTS
+             && has_values(vkb_glare_rows, vkb_glare_row_count, &settings->stages[i].values);
+    return valid;
 }
 
-static bool read_all(const struct reader *reader, struct vkb_settings *settings)
+static bool has_choices(const struct vkb_settings *settings)
 {
-    uint32_t count;
+    bool valid = settings->method < VKB_METHOD_COUNT && settings->format < VKB_FORMAT_COUNT
+              && vkb_formats[settings->format].channels != 1;
 
+    for (int i = 0; valid && i < VKB_CHOICE_COUNT; ++i)
+        valid = settings->choices[i] >= 0 && settings->choices[i] < vkb_choice_rows[i].count;
+    return valid;
+}
+
+// Whether no number leads out of a table or an array. (Python names the value that is wrong.)
+static bool is_valid(const struct vkb_settings *settings)
+{
+    const bool needs_kernel = settings->method == VKB_METHOD_SEPARABLE;
+
+    return has_choices(settings) && has_layers(settings) && has_stages(settings)
+        && has_values(vkb_value_rows, vkb_value_row_count, &settings->values)
+        && !settings->bloom_width == !settings->bloom_height
+        && settings->weight_count <= MAX_WEIGHTS && settings->level_weight_count <= MAX_LEVELS
+        && (!needs_kernel || (settings->weight_count && settings->layer_count));
+}
+
+bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
+{
+    PyObject *block = PyObject_CallMethod(object, "_core_block", NULL);
+    bool done = block && PyBytes_Check(block) && PyBytes_Size(block) == BLOCK_SIZE;
+
+    if (block && !done)
+        PyErr_Format(PyExc_TypeError, "settings: a block of %d bytes is needed, not %R",
+                     (int)BLOCK_SIZE, block);
     memset(settings, 0, sizeof *settings);
-    for (size_t i = 0; i < vkb_value_row_count; ++i)
-        if (!read_value(reader, i, &settings->values))
-            return false;
-    for (int i = 0; i < VKB_CHOICE_COUNT; ++i)
-        if (!read_choice(reader, i, &settings->choices[i]))
-            return false;
-
-    PyObject *threshold = optional_attribute(reader, ATTRIBUTE_THRESHOLD);
-    settings->thresholded = threshold && threshold != Py_None;
-    Py_XDECREF(threshold);
-    return !PyErr_Occurred() && read_method(reader, &settings->method)
-        && read_format(reader, &settings->format) && read_size(reader, settings)
-        && read_numbers(reader, ATTRIBUTE_WEIGHTS, MAX_WEIGHTS, settings->weights,
-                        &settings->weight_count)
-        && read_layers(reader, settings)
-        && read_numbers(reader, ATTRIBUTE_LEVEL_WEIGHTS, MAX_LEVELS, settings->level_weights,
-                        &settings->level_weight_count)
-        && read_numbers(reader, ATTRIBUTE_TINT, 3, settings->tint, &count)
-        && read_numbers(reader, ATTRIBUTE_SUN_POSITION, 2, settings->sun_position, &count)
-        && require_kernel(settings) && vkb_read_glare(reader->object, settings);
-}
-
-static bool read_fields(const struct vkb_module_state *state, PyObject *object,
-                        struct vkb_settings *settings)
-{
-    PyObject *type = (PyObject *)Py_TYPE(object);
-    struct reader reader = {.state = state, .object = object};
-
-    if (PyObject_HasAttrString(type, "__dataclass_fields__")) {
-        reader.fields = PyObject_GetAttrString(type, "__dataclass_fields__");
-        if (!reader.fields)
-            return false;
-        if (!PyDict_Check(reader.fields))
-            Py_CLEAR(reader.fields);
+    if (done) {
+        memcpy(settings, PyBytes_AsString(block), BLOCK_SIZE);
+        done = is_valid(settings);
+        if (!done)
+            PyErr_SetString(PyExc_ValueError, "settings: the block has values out of their ranges");
     }
-    const bool done = read_all(&reader, settings);
-    Py_XDECREF(reader.fields);
-    return done;
-}
-
-bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
-                       struct vkb_settings *settings)
-{
-    static const char VIEW[] = "core_view";
-
-    // Fields of a method that was loaded at run time may have the names of other methods' fields.
-    if (!PyObject_HasAttrString((PyObject *)Py_TYPE(object), VIEW))
-        return read_fields(state, object, settings);
-    PyObject *view = PyObject_GetAttrString(object, VIEW);
-    const bool done = view && read_fields(state, view, settings);
-    Py_XDECREF(view);
+    Py_XDECREF(block);
     return done;
 }

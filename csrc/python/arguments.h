@@ -5,19 +5,16 @@
 #include "python/objects.h"
 
 #include "methods/source.h"
-#include "run/exports.h"
-#include "run/upload.h"
+#include "share/exported_memory.h"
+#include "transfer/upload.h"
 
-// Creates the names that vkb_read_settings reads; false with an exception set.
-bool vkb_make_attributes(struct vkb_module_state *state);
+// The members of the blocks of a settings object and of a stage of glare, by name: offset, code of
+// the elements and their number. New references; NULL with an exception set.
+PyObject *vkb_settings_block_table(void);
+PyObject *vkb_stage_block_table(void);
 
-// Reads the attributes of a settings object; missing ones have their defaults. False with an
-// exception set.
-bool vkb_read_settings(const struct vkb_module_state *state, PyObject *object,
-                       struct vkb_settings *settings);
-
-// Reads the stages of glare of a settings object; without the attribute there are none.
-bool vkb_read_glare(PyObject *object, struct vkb_settings *settings);
+// Asks a settings object for its block; false with an exception set.
+bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 
 // The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
 struct vkb_held_kernel {
@@ -74,7 +71,7 @@ struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **ex
 // called on a zeroed one. The tuple keeps their shaders, to which the rows of a graph refer.
 struct vkb_held_passes {
     PyObject *tuple;
-    struct vkb_own_pass *rows;
+    struct vkb_custom_pass *rows;
 };
 
 // Asks the settings of such a method for its passes.

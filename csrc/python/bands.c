@@ -107,7 +107,7 @@ PyObject *vkb_renderer_bands(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!OO&:bands", state->source_type, &source, &settings_object,
                           vkb_read_uint32, &height)
-        || !vkb_read_settings(state, settings_object, &settings))
+        || !vkb_read_settings(settings_object, &settings))
         return NULL;
     struct vkb_source complete = ((struct vkb_source_object *)source)->source;
     PyObject *result = NULL;

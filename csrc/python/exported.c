@@ -1,59 +1,14 @@
 // The Exported type: memory of a renderer's device that CUDA shares, as other libraries take it.
-// DLPack's structs: https://dmlc.github.io/dlpack/latest/c_api.html
 #include "python/arguments.h"
+#include "python/dlpack.h"
 #include "python/module.h"
 #include "python/renderer.h"
-
-enum { DEVICE_CUDA = 2 };  // kDLCUDA
 
 struct exported_object {
     PyObject_HEAD
     struct vkb_exports *exports;
     struct vkb_export *run;
     long process;  // the process that opened the renderer
-};
-
-struct tensor {
-    void *data;
-    struct {
-        int32_t type, id;
-    } device;
-    int32_t ndim;
-    struct {
-        uint8_t code, bits;
-        uint16_t lanes;
-    } dtype;
-    int64_t *shape, *strides;
-    uint64_t byte_offset;
-};
-
-struct managed {
-    struct tensor tensor;
-    void *context;
-    void (*deleter)(struct managed *self);
-};
-
-struct versioned {
-    struct {
-        uint32_t major, minor;
-    } version;
-    void *context;
-    void (*deleter)(struct versioned *self);
-    uint64_t flags;
-    struct tensor tensor;
-};
-
-#define NAME           "dltensor"
-#define VERSIONED_NAME "dltensor_versioned"
-
-enum { MAX_DIMENSIONS = 4 };
-
-// What an exported capsule owns.
-struct shared {
-    PyObject *owner;
-    int64_t shape[MAX_DIMENSIONS], strides[MAX_DIMENSIONS];
-    struct managed managed;
-    struct versioned versioned;
 };
 
 static struct exported_object *exported_of(PyObject *object)
@@ -229,29 +184,6 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
     return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
-// A producer that knows no versions of DLPack raises TypeError for `max_version`.
-static PyObject *call_dlpack(PyObject *image, void *stream)
-{
-    PyObject *method = PyObject_GetAttrString(image, "__dlpack__");
-    PyObject *nothing = PyTuple_New(0);
-    PyObject *options =
-        Py_BuildValue("{sNs(ii)}", "stream", PyLong_FromVoidPtr(stream), "max_version", 1, 0);
-    PyObject *capsule = NULL;
-
-    if (method && nothing && options) {
-        capsule = PyObject_Call(method, nothing, options);
-        if (!capsule && PyErr_ExceptionMatches(PyExc_TypeError)) {
-            PyErr_Clear();
-            if (PyDict_DelItemString(options, "max_version") == 0)
-                capsule = PyObject_Call(method, nothing, options);
-        }
-    }
-    Py_XDECREF(method);
-    Py_XDECREF(nothing);
-    Py_XDECREF(options);
-    return capsule;
-}
-
 PyObject *vkb_renderer_dlpack(PyObject *object, PyObject *image)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
@@ -266,7 +198,7 @@ PyObject *vkb_renderer_dlpack(PyObject *object, PyObject *image)
     bool done = vkb_cuda_require_no_capture(exports->cuda, NULL, &error)
              && vkb_cuda_enter(exports->cuda, &error);
     if (done) {
-        capsule = call_dlpack(image, vkb_cuda_stream(exports->cuda));
+        capsule = vkb_call_dlpack(image, vkb_cuda_stream(exports->cuda));
         vkb_cuda_leave(exports->cuda);
         // A producer whose stream is captured takes this one into the capture.
         done = !capsule || vkb_cuda_require_no_capture(exports->cuda, NULL, &error);
@@ -322,77 +254,6 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
     return vkb_raise(state, &error);
 }
 
-static PyObject *numbers(const int64_t *values, int32_t count)
-{
-    PyObject *tuple = PyTuple_New(count);
-
-    for (int32_t i = 0; tuple && i < count; ++i) {
-        PyObject *number = PyLong_FromLongLong(values[i]);
-        if (!number || PyTuple_SetItem(tuple, i, number) < 0)
-            Py_CLEAR(tuple);
-    }
-    return tuple;
-}
-
-PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule)
-{
-    const struct tensor *tensor;
-
-    (void)module;
-    if (PyCapsule_IsValid(capsule, VERSIONED_NAME)) {
-        struct versioned *versioned = PyCapsule_GetPointer(capsule, VERSIONED_NAME);
-        if (versioned->version.major != 1) {
-            PyErr_Format(PyExc_BufferError, "DLPack: version %u is not 1",
-                         versioned->version.major);
-            return NULL;
-        }
-        tensor = &versioned->tensor;
-    } else {
-        struct managed *managed = PyCapsule_GetPointer(capsule, NAME);
-        if (!managed)
-            return NULL;
-        tensor = &managed->tensor;
-    }
-    return Py_BuildValue(
-        "(K(ii)(iii)NN)", (unsigned long long)(uintptr_t)tensor->data + tensor->byte_offset,
-        (int)tensor->device.type, (int)tensor->device.id, (int)tensor->dtype.code,
-        (int)tensor->dtype.bits, (int)tensor->dtype.lanes, numbers(tensor->shape, tensor->ndim),
-        tensor->strides ? numbers(tensor->strides, tensor->ndim) : Py_NewRef(Py_None));
-}
-
-// Consumers call these in any thread, with or without the GIL, and maybe after Python has ended.
-static void release_shared(struct shared *shared)
-{
-    if (!Py_IsInitialized())
-        return;
-    const PyGILState_STATE state = PyGILState_Ensure();
-    Py_DECREF(shared->owner);
-    vkb_free(shared);
-    PyGILState_Release(state);
-}
-
-static void delete_managed(struct managed *self)
-{
-    release_shared(self->context);
-}
-
-static void delete_versioned(struct versioned *self)
-{
-    release_shared(self->context);
-}
-
-// A capsule that was consumed has another name.
-static void destroy_capsule(PyObject *capsule)
-{
-    if (PyCapsule_IsValid(capsule, NAME)) {
-        struct managed *managed = PyCapsule_GetPointer(capsule, NAME);
-        managed->deleter(managed);
-    } else if (PyCapsule_IsValid(capsule, VERSIONED_NAME)) {
-        struct versioned *versioned = PyCapsule_GetPointer(capsule, VERSIONED_NAME);
-        versioned->deleter(versioned);
-    }
-}
-
 // Orders a stream of CUDA, NULL: the renderer's, after what the device draws to the memory.
 static bool order_stream(const struct exported_object *self, void *stream, struct vkb_error *error)
 {
@@ -423,27 +284,10 @@ static PyObject *complete(PyObject *object, PyObject *unused)
     return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
-static bool read_shape(PyObject *shape, struct shared *shared)
-{
-    const Py_ssize_t count = PyTuple_Size(shape);
-    int64_t stride = 1;
-
-    if (count < 0 || count > MAX_DIMENSIONS) {
-        if (!PyErr_Occurred())
-            PyErr_SetString(PyExc_ValueError, "shape: too many dimensions");
-        return false;
-    }
-    for (Py_ssize_t i = count - 1; i >= 0; --i) {
-        shared->shape[i] = PyLong_AsLongLong(PyTuple_GetItem(shape, i));
-        shared->strides[i] = stride;
-        stride *= shared->shape[i];
-    }
-    return !PyErr_Occurred();
-}
-
 static PyObject *make_capsule(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
+    struct vkb_dlpack_array array = {.owner = object};
     PyObject *shape;
     int code, bits, versioned;
     Py_ssize_t offset;
@@ -455,30 +299,11 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
         return NULL;
     if (!order_stream(self, (void *)(uintptr_t)stream, &error))
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
-    if (!shared)
-        return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    if (!read_shape(shape, shared)) {
-        vkb_free(shared);
-        return NULL;
-    }
-    shared->owner = Py_NewRef(object);
-    const struct tensor tensor = {
-        .data = (void *)(uintptr_t)(self->run->memory.address + (vkb_cuda_address)offset),
-        .device = {DEVICE_CUDA, vkb_cuda_ordinal(self->exports->cuda)},
-        .ndim = (int32_t)PyTuple_Size(shape),
-        .dtype = {(uint8_t)code, (uint8_t)bits, 1},
-        .shape = shared->shape,
-        .strides = shared->strides,
-    };
-    shared->managed = (struct managed){tensor, shared, delete_managed};
-    shared->versioned = (struct versioned){{1, 0}, shared, delete_versioned, 0, tensor};
-    PyObject *capsule = versioned
-                          ? PyCapsule_New(&shared->versioned, VERSIONED_NAME, destroy_capsule)
-                          : PyCapsule_New(&shared->managed, NAME, destroy_capsule);
-    if (!capsule)
-        release_shared(shared);
-    return capsule;
+    array.address = (uintptr_t)(self->run->memory.address + (vkb_cuda_address)offset);
+    array.ordinal = vkb_cuda_ordinal(self->exports->cuda);
+    array.code = (uint8_t)code;
+    array.bits = (uint8_t)bits;
+    return vkb_dlpack_capsule(&array, shape, versioned);
 }
 
 // Whether the memory holds so many bytes from `offset` on.

@@ -1,4 +1,4 @@
-// The kernels of convolutions, which are Python's arrays.
+// The kernels of convolutions and the picture of dirt, which are Python's arrays.
 #include "python/arguments.h"
 #include "python/values.h"
 
@@ -63,4 +63,25 @@ void vkb_release_kernel(struct vkb_held_kernel *held)
     if (held->held)
         PyBuffer_Release(&held->view);
     held->held = false;
+}
+
+bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_settings *settings)
+{
+    const struct vkb_size any = {0};
+    bool done = true;
+
+    for (uint32_t i = 0; done && i < settings->stage_count; ++i) {
+        if (settings->stages[i].kind != VKB_STAGE_DIRT)
+            continue;
+        if (held->held) {
+            PyErr_SetString(PyExc_ValueError, "glare: there is more than one stage dirt");
+            return false;
+        }
+        PyObject *tuple = PyObject_GetAttrString(object, "glare");
+        PyObject *stage = tuple ? PySequence_GetItem(tuple, (Py_ssize_t)i) : NULL;
+        done = stage && vkb_read_kernel(stage, any, any, held, &settings->dirt);
+        Py_XDECREF(stage);
+        Py_XDECREF(tuple);
+    }
+    return done;
 }

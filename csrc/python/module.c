@@ -107,6 +107,20 @@ static PyObject *name_tuple(const char *const *names, Py_ssize_t count)
     return tuple;
 }
 
+#define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
+static const char *const methods[] = {VKB_METHODS(METHOD_NAME)};
+#define STAGE_NAME(constant, name) [VKB_STAGE_##constant] = #name,
+static const char *const stages[] = {VKB_STAGES(STAGE_NAME)};
+
+static PyObject *format_tuple(void)
+{
+    const char *names[VKB_FORMAT_COUNT];
+
+    for (int i = 0; i < VKB_FORMAT_COUNT; ++i)
+        names[i] = vkb_formats[i].name;
+    return name_tuple(names, VKB_FORMAT_COUNT);
+}
+
 // {name: (spelling, ...)}
 static PyObject *choice_table(void)
 {
@@ -202,11 +216,15 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_shader_spec, "Shader", &state->shader_type)
                 && add_type(module, &vkb_resource_spec, "Resource", &state->resource_type)
                 && add_type(module, &vkb_exported_spec, "Exported", &state->exported_type)
-                && vkb_make_attributes(state)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
                              value_table(vkb_glare_rows, vkb_glare_row_count))
                 && add_steal(module, "CHOICES", choice_table())
+                && add_steal(module, "METHODS", name_tuple(methods, VKB_METHOD_COUNT))
+                && add_steal(module, "STAGES", name_tuple(stages, VKB_STAGE_COUNT))
+                && add_steal(module, "FORMATS", format_tuple())
+                && add_steal(module, "SETTINGS_BLOCK", vkb_settings_block_table())
+                && add_steal(module, "STAGE_BLOCK", vkb_stage_block_table())
                 && PyModule_AddIntMacro(module, MAX_WEIGHTS) == 0
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
                 && PyModule_AddIntMacro(module, MAX_STAGES) == 0
@@ -227,7 +245,6 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->shader_type);
     Py_VISIT(state->resource_type);
     Py_VISIT(state->exported_type);
-    Py_VISIT(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
     return 0;
@@ -245,7 +262,6 @@ static int clear(PyObject *module)
     Py_CLEAR(state->shader_type);
     Py_CLEAR(state->resource_type);
     Py_CLEAR(state->exported_type);
-    Py_CLEAR(state->attributes);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);
     return 0;

@@ -12,7 +12,6 @@ struct vkb_module_state {
     PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type,
         *resource_type, *exported_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
-    PyObject *attributes;                   // tuple of the names that vkb_read_settings reads
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);

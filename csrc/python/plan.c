@@ -285,7 +285,7 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!OO|O:plan", state->source_type, &source, &settings_object,
                           &names, &given)
-        || !vkb_read_settings(state, settings_object, &settings)
+        || !vkb_read_settings(settings_object, &settings)
         || (given && !vkb_read_part(given, (struct vkb_source_object *)source, names, &part)))
         return NULL;
     if (!vkb_require_open(renderer, &error))
@@ -308,7 +308,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!OO|s:plan", state->source_type, &source, &settings_object,
                           &names, &name)
-        || !vkb_read_settings(state, settings_object, &settings))
+        || !vkb_read_settings(settings_object, &settings))
         return NULL;
     if (!vkb_variants_by_name(name, &device, &variants, &error))
         return vkb_raise(state, &error);

@@ -4,8 +4,8 @@
 
 #include "python/objects.h"
 
+#include "execute/frame.h"
 #include "python/guard.h"
-#include "run/frame.h"
 #include "variants/variants.h"
 #include "vulkan/process.h"
 

@@ -38,39 +38,6 @@ int vkb_read_serial(PyObject *object, void *number)
     return serial != 0;
 }
 
-bool vkb_out_of_range(const char *name, PyObject *value, double low, double high)
-{
-    PyObject *from = PyFloat_FromDouble(low), *to = PyFloat_FromDouble(high);
-
-    if (from && to)
-        PyErr_Format(PyExc_ValueError, "%s: %R is out of range, %R to %R", name, value, from, to);
-    Py_XDECREF(from);
-    Py_XDECREF(to);
-    return false;
-}
-
-bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values)
-{
-    const double number = PyFloat_AsDouble(value);
-
-    if (PyErr_Occurred())
-        return false;
-    if (!(number >= row->low && number <= row->high))
-        return vkb_out_of_range(row->name, value, row->low, row->high);
-    vkb_value_store(values, row, number);
-    return true;
-}
-
-int vkb_read_name(PyObject *value, const char *const *names, int count, const char *what,
-                  const char *noun)
-{
-    for (int i = 0; PyUnicode_Check(value) && i < count; ++i)
-        if (PyUnicode_CompareWithASCIIString(value, names[i]) == 0)
-            return i;
-    PyErr_Format(PyExc_ValueError, "%s: unknown %s %R", what, noun, value);
-    return -1;
-}
-
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
 {
     return item && PyTuple_SetItem(tuple, index, item) == 0;

@@ -7,17 +7,6 @@
 #include "graph/graph.h"
 #include "graph/params.h"
 
-// Stores a number in the member of the row; false with an exception set.
-bool vkb_read_number(PyObject *value, const struct vkb_value_row *row, void *values);
-
-// Returns the index of a str among `count` names; otherwise -1 with the ValueError "what: unknown
-// noun 'value'" set.
-int vkb_read_name(PyObject *value, const char *const *names, int count, const char *what,
-                  const char *noun);
-
-// Sets the ValueError of a number that is out of its range; returns false.
-bool vkb_out_of_range(const char *name, PyObject *value, double low, double high);
-
 // Whether the object is a tuple, which PyArg_ParseTuple requires; otherwise sets a TypeError.
 bool vkb_require_tuple(PyObject *object, const char *what);
 

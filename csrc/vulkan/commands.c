@@ -60,7 +60,7 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
 }
 
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         const struct vkb_order *order, struct vkb_error *error)
+                         const struct vkb_sync *order, struct vkb_error *error)
 {
     return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
         && vkb_device_submit(device, commands->buffer, order, commands->fence, error);

@@ -21,7 +21,7 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
                         struct vkb_error *error);
 // Ends the recording and submits it. The device runs submissions in order. `order` may be NULL.
 bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         const struct vkb_order *order, struct vkb_error *error);
+                         const struct vkb_sync *order, struct vkb_error *error);
 // Waits for the last submission, which contains `frames` frames.
 bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
                        struct vkb_error *error);

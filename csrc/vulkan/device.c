@@ -429,30 +429,30 @@ static bool remember_loss(struct vkb_device *device, bool done, const struct vkb
 }
 
 // Appends the points that there are to the semaphores and values of a submission.
-static uint32_t add_points(const struct vkb_point points[VKB_NEIGHBOUR_COUNT],
-                           VkSemaphore semaphores[VKB_NEIGHBOUR_COUNT],
-                           uint64_t values[VKB_NEIGHBOUR_COUNT],
-                           VkPipelineStageFlags stages[VKB_NEIGHBOUR_COUNT])
+static uint32_t add_points(const struct vkb_sync_point points[VKB_EXTERNAL_COUNT],
+                           VkSemaphore semaphores[VKB_EXTERNAL_COUNT],
+                           uint64_t values[VKB_EXTERNAL_COUNT],
+                           VkPipelineStageFlags stages[VKB_EXTERNAL_COUNT])
 {
     uint32_t count = 0;
 
-    for (int neighbour = 0; neighbour < VKB_NEIGHBOUR_COUNT; ++neighbour) {
-        if (!points[neighbour].semaphore)
+    for (int other = 0; other < VKB_EXTERNAL_COUNT; ++other) {
+        if (!points[other].semaphore)
             continue;
-        semaphores[count] = points[neighbour].semaphore;
-        values[count] = points[neighbour].value;
-        stages[count++] = neighbour == VKB_NEIGHBOUR_SCREEN ? vkb_access_stages(VKB_ACCESS_ACQUIRED)
-                                                            : VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+        semaphores[count] = points[other].semaphore;
+        values[count] = points[other].value;
+        stages[count++] = other == VKB_EXTERNAL_SCREEN ? vkb_access_stages(VKB_ACCESS_ACQUIRED)
+                                                       : VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
     }
     return count;
 }
 
 bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_order *order, VkFence fence, struct vkb_error *error)
+                       const struct vkb_sync *order, VkFence fence, struct vkb_error *error)
 {
-    VkSemaphore waits[VKB_NEIGHBOUR_COUNT], signals[VKB_NEIGHBOUR_COUNT];
-    uint64_t wait_values[VKB_NEIGHBOUR_COUNT], signal_values[VKB_NEIGHBOUR_COUNT];
-    VkPipelineStageFlags stages[VKB_NEIGHBOUR_COUNT], unused[VKB_NEIGHBOUR_COUNT];
+    VkSemaphore waits[VKB_EXTERNAL_COUNT], signals[VKB_EXTERNAL_COUNT];
+    uint64_t wait_values[VKB_EXTERNAL_COUNT], signal_values[VKB_EXTERNAL_COUNT];
+    VkPipelineStageFlags stages[VKB_EXTERNAL_COUNT], unused[VKB_EXTERNAL_COUNT];
     const uint32_t wait_count = order ? add_points(order->waits, waits, wait_values, stages) : 0;
     const uint32_t signal_count =
         order ? add_points(order->signals, signals, signal_values, unused) : 0;

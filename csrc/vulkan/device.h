@@ -65,7 +65,7 @@ VkBufferUsageFlags vkb_device_export_usage(void);
 // and all earlier submissions. The commands wait for a screen before VKB_ACCESS_ACQUIRED, and for
 // CUDA before anything. `order` may be NULL. Device loss is stored in the device.
 bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
-                       const struct vkb_order *order, VkFence fence, struct vkb_error *error);
+                       const struct vkb_sync *order, VkFence fence, struct vkb_error *error);
 // Waits for the fence and resets it. If the wait takes longer than `frames` frames may take, the
 // device counts as lost. Device loss is stored in the device. After a failure the device may still
 // be busy.

@@ -3,39 +3,6 @@
 
 #include "vulkan/parts.h"
 
-#ifdef _WIN32
-
-uint32_t vkb_core_count(void)
-{
-    return VKB_MAX_PARTS;  // unknown
-}
-
-struct vkb_workers {
-    char unused;
-};
-
-struct vkb_workers *vkb_workers_create(struct vkb_error *error)
-{
-    return vkb_alloc(error, 1, sizeof(struct vkb_workers));
-}
-
-void vkb_workers_destroy(struct vkb_workers *workers)
-{
-    vkb_free(workers);
-}
-
-void vkb_in_parts(struct vkb_workers *workers, vkb_rows *rows, vkb_rows_done *done, void *context,
-                  uint32_t first, uint32_t end, size_t size)
-{
-    (void)workers;
-    (void)size;
-    rows(context, 0, first, end);
-    if (done)
-        done(context, end);
-}
-
-#else
-
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
@@ -282,5 +249,3 @@ void vkb_in_parts(struct vkb_workers *workers, vkb_rows *rows, vkb_rows_done *do
     if (done)
         done(context, end);
 }
-
-#endif

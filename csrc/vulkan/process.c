@@ -1,18 +1,5 @@
 #include "vulkan/process.h"
 
-#ifdef _WIN32
-
-long vkb_current_process(void)
-{
-    return 1;  // this platform has no fork
-}
-
-static void yield(void)
-{
-}
-
-#else
-
 #include <pthread.h>
 #include <sched.h>
 #include <stdbool.h>
@@ -41,13 +28,6 @@ long vkb_current_process(void)
     return counts ? atomic_load(&current) : (long)getpid();
 }
 
-static void yield(void)
-{
-    sched_yield();
-}
-
-#endif
-
 void vkb_lock_acquire(struct vkb_lock *lock)
 {
     const long process = vkb_current_process();
@@ -55,7 +35,7 @@ void vkb_lock_acquire(struct vkb_lock *lock)
 
     while (!atomic_compare_exchange_weak(&lock->holder, &holder, process))
         if (holder == process) {
-            yield();
+            sched_yield();
             holder = 0;
         }
 }

@@ -9,15 +9,15 @@
 
 struct vkb_device;
 
-struct vkb_point {
+struct vkb_sync_point {
     VkSemaphore semaphore;  // VK_NULL_HANDLE: none
     uint64_t value;         // 0: the semaphore is binary
 };
 
 // Between a submission and others: a screen, and CUDA.
-enum vkb_neighbour { VKB_NEIGHBOUR_SCREEN, VKB_NEIGHBOUR_CUDA, VKB_NEIGHBOUR_COUNT };
-struct vkb_order {
-    struct vkb_point waits[VKB_NEIGHBOUR_COUNT], signals[VKB_NEIGHBOUR_COUNT];
+enum vkb_external_access { VKB_EXTERNAL_SCREEN, VKB_EXTERNAL_CUDA, VKB_EXTERNAL_COUNT };
+struct vkb_sync {
+    struct vkb_sync_point waits[VKB_EXTERNAL_COUNT], signals[VKB_EXTERNAL_COUNT];
 };
 
 // Creates a timeline semaphore at 0. *descriptor is a new descriptor of it, which belongs to the

@@ -114,10 +114,6 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
 
     It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
 
-    See Also
-    --------
-    frame_regression : Compares what the renderer returns.
-
     Examples
     --------
     >>> import numpy as np
@@ -140,10 +136,6 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
 @pytest.fixture
 def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
     """Compare frames with references: see `vkbloom.testing.FrameRegression.check`.
-
-    See Also
-    --------
-    vkbloom.testing.FrameRegression : What the fixture gives.
 
     Examples
     --------

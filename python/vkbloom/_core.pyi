@@ -7,6 +7,11 @@ from numpy.typing import NDArray
 VALUES: dict[str, tuple[float, float, float]]
 GLARE_VALUES: dict[str, tuple[float, float, float]]
 CHOICES: dict[str, tuple[str, ...]]
+METHODS: tuple[str, ...]
+STAGES: tuple[str, ...]
+FORMATS: tuple[str, ...]
+SETTINGS_BLOCK: dict[str, tuple[int, str, int]]
+STAGE_BLOCK: dict[str, tuple[int, str, int]]
 MAX_WEIGHTS: int
 MAX_LAYERS: int
 MAX_STAGES: int

@@ -2,6 +2,30 @@
 // words, since llvmpipe loads a word nearly as fast as one channel. Otherwise it is a storage image.
 // Include storage.glsl before this file.
 //
+// What llvmpipe does, and what follows (Mesa 22.3.6 and 25.0.7; benchmarks/image.py shows the effect):
+// - Mesa 25 does not unroll a loop without [[unroll]], and arrays indexed by its counter are then memory: it
+//   stands before every loop but the outermost one. An inner loop needs constant ends: one whose ends depend
+//   on an outer counter is not unrolled by Mesa 22.3, and makes the pass five times slower.
+// - Variables that live over an iteration are loaded, masked and stored once for each vector. So a blur goes
+//   along rows (strip.glsl): it keeps 8 sums for each row there, and down columns 8 for each pixel.
+// - A load of a word is a call of 60 to 80 instructions for 8 invocations, before which registers move to
+//   memory: the loads of an iteration come first, and a word that is needed again is kept.
+// - A store is a loop over the invocations, in which each integer is one move. So runs are of 64-bit integers,
+//   and as long as rows allow: images have a pitch of whole runs (VKB_STORE_SIZE), and of the caller's arrays
+//   only those with such rows are stored directly. The index of a store is computed in that loop if it has a
+//   constant operand; one that follows from that of the store before is computed once (store_at).
+// - A loop whose rounds depend on data runs until no invocation goes on: its condition comes last. Both sides of
+//   an `if` run: what the format of a target decides is a constant (STORED, CHANNEL_BYTES).
+// - A pass of a short line costs most when it is compiled: there the loop over pixels stays one (ROLLED). Its
+//   number of rounds is a parameter, since Mesa 22.3 unrolls every loop whose rounds it knows. Parameters are
+//   read before the loop: in a loop or after a return, Mesa 22.3 loads them for each invocation.
+// - A float becomes an integer by a sum with 2^23, and a stored word is the maximum of itself and a zero that
+//   the compiler does not know. Else Mesa 25 converts, and LLVM packs, lane by lane.
+// - What is used after a store is copied to variables before the first (read_words): it would be loaded again.
+// - Minima and maxima are of integers: of floats they take three operations, because of NaN. A half float is
+//   rounded and packed in one (nearest_half_bits): packHalf2x16 takes forty operations.
+// - A storage buffer reaches maxStorageBufferRange bytes: a larger target takes several dispatches.
+//
 // A `raw` pixel has its channels as bits: with WORDS the bits of CHANNEL_BYTES bytes for each
 // channel, otherwise the bits of single floats. load.glsl and store.glsl define the functions.
 

@@ -59,9 +59,9 @@ ERRORS = """
 2 : render -o out.png --size 0x8 => size: (0, 8) is out of range
 2 : render -o out.png --time nan => time: nan is out of range
 2 : render -o out.png --frames 0 => '--frames': 0 is not in the range x>=1
-2 : render -o out.png --camera-fov 180 => fov is 180.0; over 0 and under 180
-2 : render -o out.png --camera-position 1,2 => position has 2 entries; three are needed
-2 : render -o out.png --glow-intensity -1 => glow_intensity is -1.0; 0 or more
+2 : render -o out.png --camera-fov 180 => fov: 180.0 is out of range, above 0 and below 180
+2 : render -o out.png --camera-position 1,2 => position: (1.0, 2.0) is not three numbers
+2 : render -o out.png --glow-intensity -1 => glow_intensity: -1.0 is out of range
 2 : render -o out.png --shading flat => '--shading': 'flat' is not one of 'forward', 'deferred'
 2 : render -o out.png --skybox a.png --skybox b.png => --skybox: given 2 times
 2 : render -o out.foo => '.foo'

@@ -1,6 +1,6 @@
 // Changes modules of SPIR-V at random and lets the core read them, in memory of exactly their size.
 // Arguments: a file of modules, each after its number of bytes; how many changes of each; a seed.
-#include "graph/specialize.h"
+#include "spirv/specialize.h"
 
 #include <stdio.h>
 #include <stdlib.h>

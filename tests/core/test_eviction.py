@@ -15,7 +15,7 @@ from tests.images import picture
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
 from vkbloom._settings.fields import fields_of
 
-#: The core's bounds (csrc/run/age.h, pipeline.h, image_cache.h).
+#: The core's bounds (csrc/execute/age.h, pipeline.h, image_cache.h).
 MIN_AGE = 64
 PIPELINES = 256
 IMAGE_BYTES = 256 << 20

@@ -1,4 +1,4 @@
-"""Modules whose constants are folded before a driver sees them: csrc/graph/specialize.c."""
+"""Modules whose constants are folded before a driver sees them: csrc/spirv/specialize.c."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ SOURCES = (
     "vulkan/error",
     "vulkan/process",
     "graph/params",
-    "graph/specialize",
-    "graph/module",
-    "graph/instructions",
+    "spirv/specialize",
+    "spirv/module",
+    "spirv/instructions",
 )
 Specialize = Callable[[bytes, list[int]], bytes]
 

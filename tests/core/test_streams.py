@@ -18,7 +18,7 @@ def test_every_place_and_length(tmp_path: Path, options: tuple[str, ...]) -> Non
     library = tmp_path / "streams.so"
     flags = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-Icsrc", *options)
     subprocess.run(
-        [*compiler(), *flags, "csrc/run/streams.c", "-o", str(library)], cwd=ROOT, check=True
+        [*compiler(), *flags, "csrc/transfer/streams.c", "-o", str(library)], cwd=ROOT, check=True
     )
     core = ctypes.CDLL(str(library))
     core.vkb_stream.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)

@@ -69,6 +69,12 @@ HELD = [
     "grey",
     "channels",
     "stability",
+    "border",
+    "sizes",
+    "round",
+    "alpha",
+    "jitter",
+    "history",
     "finite",
 ]
 

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vkbloom import Renderer, _core
+from vkbloom._settings.blocks import settings_block
 
 compiler = shutil.which("glslangValidator") or shutil.which("glslang")
 pytestmark = pytest.mark.skipif(compiler is None, reason="needs glslang")
@@ -46,13 +47,13 @@ Image = NDArray[np.float32]
 class Own:
     """Settings of a method whose passes are given."""
 
-    method = "own"
-    format = "rgba32float"
-
     def __init__(self, *passes: tuple[Any, ...], **fields: Any) -> None:
         self.passes = passes
         self.asked: list[Any] = []
-        vars(self).update(fields)
+        self.fields = {"format": "rgba32float", **fields}
+
+    def _core_block(self) -> bytes:
+        return settings_block("own", self.fields)
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> Any:
         self.asked.append((frame, buffers))

@@ -49,7 +49,7 @@ def row(report: LawReport, name: str) -> LawRow:
 
 
 def broken(report: LawReport) -> list[str]:
-    return [each.name for each in report.rows if not each.held]
+    return [each.name for each in report.rows if each.applies and not each.held]
 
 
 def test_a_gaussian() -> None:
@@ -61,6 +61,8 @@ def test_a_gaussian() -> None:
     assert found.gain == pytest.approx(1)
     found.assert_held("superposition", "gain", "symmetric", "centroid_kept", "separable")
     for each in found.rows:
+        if not each.applies:
+            continue
         assert each.held == (each.off <= each.limit)
         assert bool(each.message) == (not each.held)
         assert each.figures[max(each.figures, key=lambda name: each.figures[name] == each.off)] >= 0
@@ -115,7 +117,7 @@ FAULTS: dict[str, tuple[Bloom, Bloom, set[str]]] = {
     "every other pixel": (
         every_other_pixel,
         lambda a: gaussian(a, 4.0),
-        {*OF_A_GRID, "stability", "energy"},
+        {*OF_A_GRID, "stability", "energy", "border", "jitter"},
     ),
 }
 
@@ -125,12 +127,13 @@ def test_a_fault_is_named(name: str) -> None:
     fault, twin, laws = FAULTS[name]
     found, right = (testing.report(bloom, size=(64, 64)) for bloom in (fault, twin))
     new = set(broken(found)) - set(broken(right))
-    assert new - {"bounded_fireflies"} == laws, found
+    # Some of these functions mix alpha with colours, too.
+    assert new - {"bounded_fireflies", "alpha"} == laws, found
 
 
 PACKAGES: dict[str, Callable[[Any, Image, float], Image]] = {
-    "scipy.ndimage": lambda ndi, a, s: ndi.gaussian_filter(a, (s, s, 0)),
-    "cv2": lambda cv2, a, s: cv2.GaussianBlur(a, (0, 0), s),
+    "scipy.ndimage": lambda ndi, a, s: ndi.gaussian_filter(a, (s, s, 0), mode="nearest"),
+    "cv2": lambda cv2, a, s: cv2.GaussianBlur(a, (0, 0), s, borderType=cv2.BORDER_REPLICATE),
     "skimage.filters": lambda filters, a, s: filters.gaussian(a, s, channel_axis=-1),
 }
 

@@ -19,6 +19,8 @@ import vkbloom
 from tests.framebuffers import decode, make, mixed
 from tests.images import noise
 from vkbloom import Separable
+from vkbloom._explorer.fast_pictures import picture_of
+from vkbloom._io.srgb import encode_srgb
 from vkbloom._renderer.frames import Frames
 from vkbloom._views.pictures import contact_sheet_png, picture
 
@@ -296,3 +298,17 @@ def test_the_sheet_says_where_glow_is_not_thresholded(
     frames = renderer.apply(image, settings, framebuffers=["glow"])
     is_frame = settings.threshold is not None and bool(frames["glow"].min(initial=1.0) > 0.2)
     assert ("the frame before its threshold" in frames._repr_html_()) == is_frame
+
+
+@pytest.mark.parametrize("dtype", ["float16", "float32"])
+@pytest.mark.parametrize("stops", [0.0, -0.5])
+def test_colours_above_1_keep_their_hue(dtype: str, stops: float, tmp_path: Path) -> None:
+    """In notebooks and in the explorer, as in files of integers."""
+    limit = 2.0**-stops
+    image = np.array([[[4, 2, 1], [0.5, 0.25, 0.125]]], dtype)
+    kept = np.array([[[limit, limit / 2, limit / 4], [0.5, 0.25, 0.125]]], np.float32)
+    expected = np.rint(255 * encode_srgb(kept * np.float32(2.0**stops)))
+    shown = picture(image, "bloom", stops=stops)
+    page = decode(picture_of(image, "bloom", is_encoded=False, stops=stops), tmp_path)
+    assert np.abs(shown - expected).max() <= 1
+    assert np.abs(page.astype(int) - shown).max() <= 1

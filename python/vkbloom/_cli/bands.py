@@ -306,8 +306,8 @@ class _Work:
             core.run(source, (plan,), ((array,),), False, top, len(array)).wait()
             yield array
 
-    def _bands(self, told: dict[str, None] | None = None) -> Generator[Band]:
-        """Yield bands from the top to the bottom; add notes to `told` at the end."""
+    def _bands(self, collected: dict[str, None] | None = None) -> Generator[Band]:
+        """Yield bands from the top to the bottom; add notes to `collected` at the end."""
         options = self._options
         files = (self._source, options.emission, options.mask)
         notes = [_Notes(file or "") for file in files]
@@ -336,8 +336,8 @@ class _Work:
                     notes[2].add(read)
                     values = check_mask(grey_mask(read.pixels, notes[2].file), image.shape[:2])
                 yield Band(image, glow, values)
-        if told is not None:
-            told.update(dict.fromkeys(text for one in notes for text in one.lines()))
+        if collected is not None:
+            collected.update(dict.fromkeys(text for one in notes for text in one.lines()))
 
     def _decoded(self, stored: StoredImage, notes: _Notes) -> Picture:
         is_picture = notes.file == self._source

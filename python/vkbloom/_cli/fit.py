@@ -68,7 +68,7 @@ def command(
     files: tuple[str, ...],
     framebuffer: str,
     search: dict[str, Any],
-    told: Callable[[Sequence[vkbloom.FitResult]], int],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], int],
     input_colour: Any,
     layer: str | None,
     adapter: str,
@@ -100,7 +100,7 @@ def command(
                 image_of, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
             )
         ]
-    return told(sorted(found, key=lambda one: one.loss))
+    return show_results(sorted(found, key=lambda one: one.loss))
 
 
 def _searches(

@@ -127,16 +127,16 @@ def read_picture(
     if raw and stored.pixels.dtype != np.uint8:
         raise not_of_bytes(source, stored.numbers[0])
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
-    for told in part_notes(stored, layer):
-        note(f"{source}: {told}")
+    for text in part_notes(stored, layer):
+        note(f"{source}: {text}")
     counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
-    if (text := image_reading.non_finite_note(*counts)) is not None:
-        note(f"{source} {text}")
+    if (not_finite := image_reading.non_finite_note(*counts)) is not None:
+        note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]
     detail(f"{source}: {width} x {height}, {picture.numbers}")
     hidden = 0.0 if is_blended else picture.hidden
-    for told in (*picture.notes, *hidden_notes(hidden, picture.visible)):
-        note(f"{source}: {told}")
+    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
+        note(f"{source}: {text}")
     return picture
 
 

@@ -23,7 +23,6 @@ from vkbloom._cli.sequences import check_drawing
 from vkbloom._cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
 from vkbloom._cli.terminal import hides_progress, note, say, show, tell_device
 from vkbloom._io import safe_writing
-from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.settings import Settings
@@ -222,5 +221,4 @@ def _reduced(image: NDArray[Any]) -> NDArray[Any]:
 
 def _tile(final: NDArray[Any], cell: tuple[int, int]) -> NDArray[np.uint8]:
     """Return a picture in the size of a cell, with the colours of a file of integers."""
-    shown = final if final.dtype == np.uint8 else scaled_to_1(final)
-    return pictures.picture(shown, "final", size=cell)
+    return pictures.picture(final, "final", size=cell)

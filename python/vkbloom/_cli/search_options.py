@@ -16,8 +16,11 @@ from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
 from vkbloom._io import safe_writing
+from vkbloom._views import markup
 
 __all__ = ["search_options"]
+
+_RULE: Final = markup.element("hr")
 
 
 def search_options(
@@ -26,7 +29,7 @@ def search_options(
     """Add the options of a search; the arguments are their defaults.
 
     The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
-    `told`, a function that prints results and returns the exit status.
+    `show_results`, a function that prints results and returns the exit status.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -49,8 +52,10 @@ def search_options(
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
-            told = functools.partial(_tell, max_loss=max_loss, out=out, as_json=as_json)
-            return command(search=search, told=told, **rest)
+            show_results = functools.partial(
+                _show_results, max_loss=max_loss, out=out, as_json=as_json
+            )
+            return command(search=search, show_results=show_results, **rest)
 
         for option in reversed((*_of_search(vary, loss, max_calls), *_OF_RESULTS)):
             run = option(run)
@@ -130,7 +135,7 @@ def _bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
     return found
 
 
-def _tell(
+def _show_results(
     found: Sequence[vkbloom.FitResult], *, max_loss: float | None, out: str | None, as_json: bool
 ) -> int:
     """Print results, the best one first, and return the exit status."""
@@ -181,9 +186,6 @@ def _object(found: vkbloom.FitResult) -> dict[str, Any]:
 
 def _write(found: Sequence[vkbloom.FitResult], path: Path) -> None:
     """Write the reports of all results as one page."""
-    reports = "<hr>".join(one._repr_html_() for one in found)
-    page = (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom fit</title>'
-        f'<body style="font-family:sans-serif">{reports}</body></html>'
-    )
+    reports = [part for one in found for part in (markup.Markup(one._repr_html_()), _RULE)]
+    page = markup.page("vkbloom fit", *reports[:-1], style="body{font-family:sans-serif}")
     safe_writing.write_file(path, page.encode())

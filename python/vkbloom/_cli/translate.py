@@ -42,7 +42,7 @@ def command(
     target: str,
     size: tuple[int, int],
     search: dict[str, Any],
-    told: Callable[[Sequence[vkbloom.FitResult]], int],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], int],
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
@@ -61,4 +61,4 @@ def command(
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
         found = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
-    return told([found])
+    return show_results([found])

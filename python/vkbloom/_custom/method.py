@@ -21,6 +21,7 @@ from vkbloom._custom.planning import Request, Row, planned
 from vkbloom._custom.resources import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import number_field, value_field
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings
@@ -39,16 +40,6 @@ class CustomType(type):
     method: str
     file: CustomFile
     twin: Twin | None
-
-
-class CoreView:
-    """The fields that the core reads of own settings: those of all settings."""
-
-    method = "own"
-
-    def __init__(self, settings: CustomMethod) -> None:
-        for field in dataclasses.fields(Settings):
-            setattr(self, field.name, getattr(settings, field.name))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -75,10 +66,10 @@ class CustomMethod(Settings, metaclass=CustomType):
         """Return the number of each parameter."""
         return {param.name: param.plain(getattr(self, param.name)) for param in self.file.params}
 
-    @property
-    def core_view(self) -> CoreView:
-        """What the core reads in place of the settings."""
-        return CoreView(self)
+    def _core_block(self) -> bytes:
+        """Return the fields of all settings: others may have the names of other methods' fields."""
+        shared = {field.name: getattr(self, field.name) for field in dataclasses.fields(Settings)}
+        return settings_block("own", shared)
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Row, ...]:
         """Return the passes of a frame, as rows."""
@@ -187,11 +178,6 @@ def load_method(
         A pass does not compile; the message names file and line. Or the compiler is missing.
     OSError
         The file cannot be read.
-
-    See Also
-    --------
-    Settings : The fields of all methods.
-    Renderer.apply : Uses settings.
 
     Notes
     -----

@@ -82,10 +82,6 @@ def explore(
     ModuleNotFoundError
         anywidget is not installed: ``pip install vkbloom[notebook]``.
 
-    See Also
-    --------
-    grid : Many settings at once.
-
     Notes
     -----
     ``vkbloom explore`` shows the same page without a notebook. A bloom whose width is given in

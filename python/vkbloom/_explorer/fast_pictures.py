@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.displayed import scaled_to_1
 from vkbloom._views import pictures
 
 __all__ = ["picture_of", "texts_of"]
@@ -25,9 +26,11 @@ def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
     if array.dtype == np.uint8:
         picture = array[:, :, :3]
     elif array.ndim == 3 and name not in ("normal", "position"):
+        is_display = name == "final" and is_encoded
+        colours = array[:, :, :3] if is_display else scaled_to_1(array[:, :, :3], 2.0**-stops)
         with np.errstate(over="ignore"):
-            halves = np.ascontiguousarray(array[:, :, :3]).astype(np.float16, copy=False)
-        picture = _levels(stops, name == "final" and is_encoded)[halves.view(np.uint16)]
+            halves = np.ascontiguousarray(colours).astype(np.float16, copy=False)
+        picture = _levels(stops, is_display)[halves.view(np.uint16)]
     else:
         picture = pictures.picture(array, name)[:, :, :3]
     return pictures.png(picture, _LEVEL)

@@ -21,8 +21,9 @@ from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom._fit.result import FitResult, loss_text
 from vkbloom._fit.search import CLOSE, ENOUGH, Search
-from vkbloom._fit.space import Bounds, Space, spaces_of, spaces_of_all
+from vkbloom._fit.space import Bounds, Space, space_of, spaces_of_all
 from vkbloom._gradients import pullback_of
+from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Inputs, image_source
@@ -117,7 +118,7 @@ def fit(
         the settings declare; a threshold ends at the brightest value of the image, and a size of
         buffers at the image's height.
     renderer : Renderer, optional
-        Default: a new one.
+        Default: `default_renderer`.
     max_calls : int
         The most renders of a candidate.
     gradient : bool
@@ -199,31 +200,32 @@ def fit(
     measure = Measure.of(check_image(target, "target"), loss_named(loss))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     limits = (bounds or {}, brightest, len(measure.target))
-    varied = spaces_of_all if is_all else spaces_of
-    spaces = varied(candidates, names, *limits)
+    if is_all:
+        spaces = spaces_of_all(candidates, names, *limits)
+    else:
+        spaces = [space_of(one, names, *limits) for one in candidates]
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
-    opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
-    with opened as used:
-        stages = _stages(used, image, pixels, measure)
-        # All of them before the first is searched: the most likely failures come at once.
-        priced = [_priced(used, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
-        found = []
-        for space, cost in priced:
-            if not space.axes:
-                continue
-            with _bar(progress, space.start.method, max_calls) as told:
-                one = _fitted(
-                    used,
-                    stages,
-                    space,
-                    cost,
-                    framebuffer,
-                    max_calls=max_calls,
-                    told=told,
-                    gradient=gradient,
-                )
-                found.append(one)
+    renderer = renderer or default_renderer()
+    stages = _stages(renderer, image, pixels, measure)
+    # All of them before the first is searched: the most likely failures come at once.
+    priced = [_priced(renderer, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
+    found = []
+    for space, cost in priced:
+        if not space.axes:
+            continue
+        with _bar(progress, space.start.method, max_calls) as told:
+            one = _fitted(
+                renderer,
+                stages,
+                space,
+                cost,
+                framebuffer,
+                max_calls=max_calls,
+                told=told,
+                gradient=gradient,
+            )
+            found.append(one)
     found.sort(key=lambda one: one.loss)
     return found[0] if isinstance(settings, Settings) else found
 

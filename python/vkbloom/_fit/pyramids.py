@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Iterable
 from typing import Any, Final, Literal, get_args
@@ -15,6 +14,7 @@ from vkbloom._checks import check_index, check_size, import_extra
 from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.result import FitResult
 from vkbloom._methods.mip_chain import Pyramid
+from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom.psf import PSF
 
@@ -63,7 +63,7 @@ def fit_pyramid(
         "relative": of the differences; the peak dominates. "log": of the differences divided by
         the function, or by 1e-4 of its peak where the function is smaller.
     renderer : Renderer, optional
-        Default: a new one.
+        Default: `default_renderer`.
 
     Returns
     -------
@@ -95,21 +95,20 @@ def fit_pyramid(
     point = np.zeros((height, width, 3), np.float32)
     point[height // 2, width // 2] = 1
     begun = Pyramid(levels=levels, radius=radius, format="rgba32float")
-    opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
-    with opened as used:
-        image = used.upload(point)
-        sole = [begun.replace(level_weights=tuple(row)) for row in np.eye(levels)]
-        _check_levels(levels, used.plan(image, sole[-1]).framebuffers, (width, height))
-        columns: list[NDArray[np.float64]] = [
-            light(frames["bloom"])[:, :, 0].ravel()
-            for frames in used.sweep(image, sole, framebuffers=["bloom"])
-        ]
-        if direct:
-            columns.append(point[:, :, 0].ravel().astype(np.float64))
-        weights = _nonnegative(np.stack(columns, axis=1), wanted.ravel(), loss)
-        settings = _pyramid(begun, weights[:levels], float(weights[-1]) if direct else None)
-        frames = used.apply(image, settings)
-        start = used.apply(image, begun, framebuffers=["bloom"])["bloom"]
+    renderer = renderer or default_renderer()
+    image = renderer.upload(point)
+    sole = [begun.replace(level_weights=tuple(row)) for row in np.eye(levels)]
+    _check_levels(levels, renderer.plan(image, sole[-1]).framebuffers, (width, height))
+    columns: list[NDArray[np.float64]] = [
+        light(frames["bloom"])[:, :, 0].ravel()
+        for frames in renderer.sweep(image, sole, framebuffers=["bloom"])
+    ]
+    if direct:
+        columns.append(point[:, :, 0].ravel().astype(np.float64))
+    weights = _nonnegative(np.stack(columns, axis=1), wanted.ravel(), loss)
+    settings = _pyramid(begun, weights[:levels], float(weights[-1]) if direct else None)
+    frames = renderer.apply(image, settings)
+    start = renderer.apply(image, begun, framebuffers=["bloom"])["bloom"]
     framebuffer = "final" if direct else "bloom"
     found = light(frames[framebuffer])
     losses = measure(light(start)), measure(found)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +15,8 @@ from vkbloom._fit.causes import is_found, likely_cause
 from vkbloom._fit.losses import Loss
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
-from vkbloom._views import pictures
+from vkbloom._views import markup, pictures
+from vkbloom._views.markup import Markup, element
 
 __all__ = ["FitResult"]
 
@@ -134,34 +133,32 @@ class FitResult:
             ("target", self.target / peak, f"1 is {peak:.3g}"),
             ("difference", np.abs(self.residual) / largest, f"1 is {largest:.3g}"),
         )
-        parts = [
-            '<div style="color:inherit;font-size:13px;max-width:68em">',
-            f"<div><b>{html.escape(repr(self)[1:-1])}</b>, from a loss ({self.loss_name}) of "
-            f"{self.start_loss:.3g}, in {self.seconds:.1f} s</div>",
-            f"<div>{html.escape(self.words)}</div>",
-            '<div style="display:flex;flex-wrap:wrap;gap:12px">',
-        ]
+        parts = []
         for name, values, note in shown:
             height, width = values.shape[:2]
             size = pictures.scaled(width, height, min(1.0, _WIDTH / max(width, height)))
-            data = base64.b64encode(
-                pictures.png(pictures.picture(values.astype(np.float32), size=size))
-            ).decode("ascii")
-            parts.append(
-                f'<figure style="margin:0"><img alt="{html.escape(name)}" '
-                f'src="data:image/png;base64,{data}" style="width:{_WIDTH}px;max-width:100%;'
-                f'image-rendering:pixelated"><figcaption><b>{html.escape(name)}</b> {note}'
-                "</figcaption></figure>"
-            )
+            data = pictures.png(pictures.picture(values.astype(np.float32), size=size))
+            style = f"width:{_WIDTH}px;max-width:100%;image-rendering:pixelated"
+            image = markup.image(data, name, style=style)
+            parts.append(markup.figure(image, element("b", name), f" {note}", style="margin:0"))
         radii, profiles = radial_profiles((found, self.target))
         best = np.minimum.accumulate(self.history)
         parts += [
             diagram("radial profile", radii, profiles, (self.framebuffer, "target"), "pixels"),
             diagram("loss", np.arange(1, len(best) + 1.0), [best], ("best so far",), "calls"),
-            '</div><code style="color:inherit;background:none;padding:0;white-space:pre-wrap">'
-            f"{html.escape(repr(self.settings))}</code></div>",
         ]
-        return "".join(parts)
+        summary = (
+            f", from a loss ({self.loss_name}) of {self.start_loss:.3g}, in {self.seconds:.1f} s"
+        )
+        code = "color:inherit;background:none;padding:0;white-space:pre-wrap"
+        return element(
+            "div",
+            element("div", element("b", repr(self)[1:-1]), summary),
+            element("div", self.words),
+            element("div", *parts, style="display:flex;flex-wrap:wrap;gap:12px"),
+            element("code", repr(self.settings), style=code),
+            style="color:inherit;font-size:13px;max-width:68em",
+        )
 
 
 def radial_profiles(
@@ -188,11 +185,11 @@ def diagram(
     lines: Sequence[NDArray[np.float64]],
     labels: Sequence[str],
     unit: str,
-) -> str:
+) -> Markup:
     """Return curves on double logarithmic axes as SVG; values of 0 and less are left out."""
     values = np.concatenate([line[line > 0] for line in lines])
     if not values.size:
-        return ""
+        return Markup()
     top = float(values.max())
     bottom = max(float(values.min()), top * 1e-6)
     span = math.log(top / bottom) or 1.0
@@ -206,20 +203,37 @@ def diagram(
             if value > 0
         )
         shapes.append(
-            f'<polyline points="{points}" fill="none" stroke="{_COLOURS[number]}" '
-            f'stroke-width="{2 - number}"/>'
+            element(
+                "polyline",
+                points=points,
+                fill="none",
+                stroke=_COLOURS[number],
+                stroke_width=2 - number,
+            )
         )
-    key = ", ".join(
-        f'<span style="color:{colour}">{html.escape(label)}</span>'
-        for colour, label in zip(_COLOURS, labels, strict=False)
+    box = element(
+        "rect",
+        width=_WIDTH,
+        height=_HEIGHT,
+        fill="none",
+        stroke="currentColor",
+        stroke_opacity=0.3,
     )
-    return (
-        f'<figure style="margin:0"><svg width="{_WIDTH}" height="{_HEIGHT}" '
-        f'viewBox="-2 -2 {_WIDTH + 4} {_HEIGHT + 4}" role="img" aria-label="{title}">'
-        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="none" stroke="currentColor" '
-        f'stroke-opacity=".3"/>{"".join(shapes)}</svg><figcaption><b>{title}</b> {key}; '
-        f"{x[0]:.3g} to {x[-1]:.3g} {unit}, {bottom:.2g} to {top:.2g}</figcaption></figure>"
+    drawn = element(
+        "svg",
+        box,
+        *shapes,
+        width=_WIDTH,
+        height=_HEIGHT,
+        viewBox=f"-2 -2 {_WIDTH + 4} {_HEIGHT + 4}",
+        role="img",
+        aria_label=title,
     )
+    key: list[object] = []
+    for colour, label in zip(_COLOURS, labels, strict=False):
+        key += [" ", element("span", label, style=f"color:{colour}")]
+    ends = f"; {x[0]:.3g} to {x[-1]:.3g} {unit}, {bottom:.2g} to {top:.2g}"
+    return markup.figure(drawn, element("b", title), *key, ends, style="margin:0")
 
 
 def loss_text(loss: Loss) -> str:

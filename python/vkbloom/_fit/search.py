@@ -20,10 +20,11 @@ STEPS: Final = (1e-2, 1e-3)
 # A logarithmic axis wider than _ENDLESS times its scale is sampled within _REACH of the start.
 _REACH: Final = 0.25
 _ENDLESS: Final = 100.0
-# Members of a population for each varied field, and its generations. Another population follows
-# while the loss is not close. Least squares begin at the start and at the best members.
+# Members of a population for each varied field, and its generations: the first population is only
+# measured, and others follow while the loss is not close. Least squares begin at the start and at
+# the best members.
 _MEMBERS: Final = 6
-_GENERATIONS: Final = (4, 8, 16, 32)
+_GENERATIONS: Final = (0, 6, 12, 24, 48)
 _STARTS: Final = 5
 #: The search ends at ENOUGH, the loss of rounding to half floats. Below CLOSE it only polishes, or
 #: below a share of the loss without bloom, where that is less.
@@ -136,7 +137,8 @@ class Search:
         count = _MEMBERS * len(low)
         # Other points in each turn, and the best one of those before.
         units = qmc.Halton(len(low), scramble=False).random((turn + 1) * count + 1)[-count:]
-        enough = min(_NEAR, self.loss / 2)
+        # Levels make a valley rough, so that least squares do not reach its end.
+        enough = self._close if self._measure.is_rounded else min(_NEAR, self.loss / 2)
         found = optimize.differential_evolution(
             self._loss,
             np.stack([low, high], axis=1),

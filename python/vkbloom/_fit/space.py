@@ -15,7 +15,7 @@ from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.settings import Settings
 from vkbloom._suggestions import did_you_mean
 
-__all__ = ["Axis", "Bounds", "Point", "Space", "space_of", "spaces_of", "spaces_of_all"]
+__all__ = ["Axis", "Bounds", "Point", "Space", "space_of", "spaces_of_all"]
 
 #: Coordinates, 0 to 1, one for each axis.
 Point = NDArray[np.float64]
@@ -104,17 +104,6 @@ class Space:
             for axis, place in zip(self.axes, point, strict=True)
         }
         return self.start.replace(**values)
-
-
-def spaces_of(
-    candidates: Sequence[Settings],
-    names: Sequence[str],
-    bounds: Bounds,
-    brightest: float,
-    height: int,
-) -> list[Space]:
-    """Return the space of each candidate, which has all of the varied fields."""
-    return [space_of(one, names, bounds, brightest, height) for one in candidates]
 
 
 def spaces_of_all(

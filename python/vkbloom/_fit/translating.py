@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -16,6 +15,7 @@ from vkbloom._fit.fitting import Maker, fit
 from vkbloom._fit.losses import Loss
 from vkbloom._fit.result import FitResult
 from vkbloom._fit.space import Bounds, varied_as
+from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
@@ -78,7 +78,7 @@ def translate(
         Width and height of the picture. Methods that blur by pixels differ from those that blur
         by shares of the frame at every size but this.
     renderer : Renderer, optional
-        Default: a new one.
+        Default: `default_renderer`.
     vary : sequence of str, optional
         The fields of `to` to find. Default: those that set width and strength of its blur, its
         intensity, and its threshold where it has one.
@@ -116,20 +116,19 @@ def translate(
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
     image = lights(check_size("size", size))
     names = _knobs(start) if vary is None else vary
-    opened = contextlib.nullcontext(renderer) if renderer is not None else Renderer()
-    with opened as used:
-        found = fit(
-            image,
-            settings if callable(settings) else _applied(used, image, settings),
-            _plain(start),
-            names,
-            framebuffer="final",
-            loss=loss,
-            bounds=bounds,
-            renderer=used,
-            max_calls=max_calls,
-            progress=progress,
-        )
+    renderer = renderer or default_renderer()
+    found = fit(
+        image,
+        settings if callable(settings) else _applied(renderer, image, settings),
+        _plain(start),
+        names,
+        framebuffer="final",
+        loss=loss,
+        bounds=bounds,
+        renderer=renderer,
+        max_calls=max_calls,
+        progress=progress,
+    )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
     return dataclasses.replace(found, settings=found.settings.replace(**look))
 

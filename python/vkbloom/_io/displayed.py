@@ -140,8 +140,8 @@ def converted(
     return encoded(values, curve), (saved.primaries, curve)
 
 
-def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
-    """Return linear floats (H, W, C), colours with a component above 1 divided by the largest one.
+def scaled_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
+    """Return linear floats (H, W, C), in which no component of a colour is above the limit.
 
     A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
     problem", IEEE Transactions on Image Processing 12(12), 2003. A clip of each component makes
@@ -149,12 +149,12 @@ def scaled_to_1(values: NDArray[Any]) -> NDArray[Any]:
     """
     count = values.shape[2] - (values.shape[2] in (2, 4))
     peak = values[:, :, :count].max(axis=2, keepdims=True)
-    is_over = np.isfinite(peak) & (peak > 1)
+    is_over = np.isfinite(peak) & (peak > limit)
     if not is_over.any():
         return values
     # (Half floats are divided as single ones, so that only the result is rounded, to levels.)
     made = values.astype(np.result_type(values.dtype, np.float32))
-    made[:, :, :count] /= np.where(is_over, peak, values.dtype.type(1))
+    made[:, :, :count] /= np.where(is_over, peak / made.dtype.type(limit), made.dtype.type(1))
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -131,15 +130,10 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(_text(part))}</td>" for part in one) + "</tr>"
-            for one in self.passes
-        )
-        head = "".join(f"<th>{name}</th>" for name in Pass._fields)
-        return (
-            f"<table><caption>{html.escape(self._title)}</caption>"
-            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-        )
+        from vkbloom._views import markup  # noqa: PLC0415  costs start-up time
+
+        rows = [[_text(part) for part in one] for one in self.passes]
+        return markup.table(rows, Pass._fields, caption=self._title)
 
 
 def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:

@@ -11,6 +11,7 @@ import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self, get_args
 
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     FieldInfo,
     Record,
@@ -190,6 +191,10 @@ class Settings(Record):
             return getattr(self, name)
         place, field = stage_field_of(self.glare, name)
         return getattr(self.glare[place], field)
+
+    def _core_block(self) -> bytes:
+        """Return the settings as the core reads them."""
+        return settings_block(self.method, vars(self))
 
     @property
     def _has_state(self) -> bool:

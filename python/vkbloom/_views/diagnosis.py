@@ -64,10 +64,6 @@ class Diagnosis:
     text : str
         What `str` returns.
 
-    See Also
-    --------
-    diagnose : Returns it.
-
     Examples
     --------
     >>> from vkbloom import testing
@@ -106,7 +102,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
 
     A cause is named only if it explains every value: within one level of the coarser integer type,
     within 0.4 % for floats, and so that at most half of the difference remains. For a shift, a
-    tenth of the difference may remain, as its interpolation is unknown.
+    tenth of the difference may remain, as its interpolation is unknown; it needs scikit-image.
 
     Parameters
     ----------
@@ -123,10 +119,6 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     ------
     TypeError, ValueError
         An image is not an array of one of these dtypes and shapes.
-
-    See Also
-    --------
-    FrameRegression.compare : Its message names the cause.
 
     Examples
     --------

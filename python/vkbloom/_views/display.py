@@ -1,21 +1,16 @@
 """HTML of settings, scenes and renderers for notebooks, without scripts.
 
-Text inherits the page's colour, and lines and backgrounds are a translucent grey, so that they
-suit light and dark themes. All texts are escaped. Styles are attributes of the elements, because
-notebooks that are not trusted remove style sheets.
+Text inherits the page's colour, so that it suits light and dark themes.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import html
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from vkbloom._views import pictures
+from vkbloom._views import markup, pictures
+from vkbloom._views.markup import Markup, element
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -41,11 +36,13 @@ def fields_html(settings: DataclassInstance) -> str:
             unchanged.append((field.name, repr(value)))
         else:
             changed.append((field.name, f"{value!r} (default {field.default!r})"))
-    rest = (
-        f'<details><summary style="cursor:pointer;opacity:.8">{len(unchanged)} fields at their '
-        f"defaults</summary>{_table(unchanged)}</details>"
+    summary = f"{len(unchanged)} fields at their defaults"
+    rest = element(
+        "details",
+        element("summary", summary, style="cursor:pointer;opacity:.8"),
+        _table(unchanged),
     )
-    return _block(type(settings).__name__, (_table(changed) if changed else "") + rest)
+    return _block(type(settings).__name__, *([_table(changed)] if changed else []), rest)
 
 
 def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> str:
@@ -53,7 +50,7 @@ def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> s
 
     `faces`: ndarray, shape (6, N, N, C), or None; Faces of the sky: +x, -x, +y, -y, +z, -z.
     """
-    return _block("Scene", _table(rows) + ("" if faces is None else _cross(faces)))
+    return _block("Scene", _table(rows), *([] if faces is None else [_cross(faces)]))
 
 
 def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
@@ -69,39 +66,30 @@ def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
     return _block("Renderer", _table(rows))
 
 
-def _block(title: str, body: str) -> str:
-    return (
-        '<div style="color:inherit;font-size:13px">'
-        f'<div style="font-weight:bold;margin-bottom:2px">{html.escape(title)}</div>{body}</div>'
+def _block(title: str, *body: Markup) -> str:
+    heading = element("div", title, style="font-weight:bold;margin-bottom:2px")
+    return element("div", heading, *body, style="color:inherit;font-size:13px")
+
+
+def _table(rows: Iterable[tuple[str, str]]) -> Markup:
+    return markup.table(
+        rows,
+        name={"style": f"{_CELL};font-weight:normal;opacity:.8"},
+        cell={"style": f"{_CELL};overflow-wrap:anywhere"},
+        style="color:inherit;font-size:inherit;border-collapse:collapse;margin:0;border:0",
     )
 
 
-def _table(rows: Iterable[tuple[str, str]]) -> str:
-    cells = "".join(
-        f'<tr style="background:none"><th style="{_CELL};font-weight:normal;opacity:.8">'
-        f'{html.escape(name)}</th><td style="{_CELL};overflow-wrap:anywhere">'
-        f"{html.escape(value)}</td></tr>"
-        for name, value in rows
-    )
-    return (
-        '<table style="color:inherit;font-size:inherit;border-collapse:collapse;margin:0;border:0">'
-        f"<tbody>{cells}</tbody></table>"
-    )
-
-
-def _cross(faces: NDArray[Any]) -> str:
+def _cross(faces: NDArray[Any]) -> Markup:
     step = max(1, faces.shape[1] // _FACE_SIDE)
-    small = faces[:, ::step, ::step, :3]
-    if small.dtype != np.uint8:
-        with np.errstate(invalid="ignore"):
-            small = np.rint(255 * np.clip(np.nan_to_num(small.astype(np.float32)), 0, 1))
-    cells = []
-    for name, place, face in zip(
-        ("+x", "-x", "+y", "-y", "+z", "-z"), _CROSS, small.astype(np.uint8), strict=True
-    ):
-        data = base64.b64encode(pictures.png(np.ascontiguousarray(face))).decode("ascii")
-        cells.append(
-            f'<img src="data:image/png;base64,{data}" alt="sky {name}" title="{name}" '
-            f'style="grid-area:{place};width:{_FACE_SIDE}px;height:{_FACE_SIDE}px;margin:0">'
+    names = ("+x", "-x", "+y", "-y", "+z", "-z")
+    cells = [
+        markup.image(
+            pictures.png(pictures.picture(face[::step, ::step, :3], encoded=True)),
+            f"sky {name}",
+            title=name,
+            style=f"grid-area:{area};width:{_FACE_SIDE}px;height:{_FACE_SIDE}px;margin:0",
         )
-    return f'<div style="display:inline-grid;gap:1px;margin-top:6px">{"".join(cells)}</div>'
+        for name, area, face in zip(names, _CROSS, faces, strict=True)
+    ]
+    return element("div", *cells, style="display:inline-grid;gap:1px;margin-top:6px")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import math
 import struct
 import warnings
@@ -16,7 +14,10 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, import_extra
 from vkbloom._framebuffers import Framebuffers, leading
+from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.srgb import encode_srgb
+from vkbloom._views import markup
+from vkbloom._views.markup import Markup, element
 
 __all__ = [
     "contact_sheet_html",
@@ -32,16 +33,18 @@ __all__ = [
     "sheet_png",
 ]
 
+_CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
 
 def leading_png(frames: Framebuffers) -> bytes:
     """Return the picture of `final`, or else of the last image, or else of the last framebuffer.
 
-    8-bit images are shown as stored. Float images are clipped to 0..1 and shown with
-    the sRGB curve, unless the settings' encoding was already applied to them; `normal`
-    is shown as (n + 1) / 2, `position` with each axis stretched to 0..1, depth from
-    white (nearest) to black (farthest). NaN counts as 0.
+    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless the
+    settings' encoding was already applied to them; colours with a component above 1 are divided by
+    the largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as
+    (n + 1) / 2, `position` with each axis stretched to 0..1, depth from white (nearest) to black
+    (farthest). NaN counts as 0.
     """
     return png(_picture(frames, leading(frames)))
 
@@ -54,62 +57,64 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     exposure; the caption gives the exposure, and the range of all floats. Text inherits the
     page's colours.
     """
-    page = ['<div style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em">']
-    page.append(
-        '<div style="display:grid;gap:12px;'
-        'grid-template-columns:repeat(auto-fill,minmax(200px,1fr))">'
-    )
+    thumbnails = []
     for name, array in frames.items():
         height, width = array.shape[:2]
         shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
         stops = _viewing_stops(frames, name)
-        picture = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
-        data = base64.b64encode(png(picture)).decode("ascii")
+        shown = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
         # Show the pixels of an enlarged pyramid level without smoothing.
-        rendering = "auto" if max(picture.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
-        label = html.escape(name)
-        size = html.escape(_described(array, _note(frames, name)) + _ranged(array))
-        if stops != 0:
-            size += f", shown at {stops:g} stops"
-        page.append(
-            '<figure style="margin:0">'
-            f'<img src="data:image/png;base64,{data}" alt="{label}, {size}" '
-            'style="display:block;width:100%;height:auto;max-width:none;'
-            f"aspect-ratio:{_aspect(frames):.4g};object-fit:contain;"
-            f'background:rgba(128,128,128,.15);image-rendering:{rendering}">'
-            f'<figcaption><b>{label}</b> <span style="opacity:.7">{size}</span></figcaption>'
-            "</figure>"
+        rendering = "auto" if max(shown.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
+        size = _described(array, _note(frames, name)) + _ranged(array)
+        size += f", shown at {stops:g} stops" if stops else ""
+        style = "display:block;width:100%;height:auto;max-width:none;object-fit:contain;"
+        style += f"aspect-ratio:{_aspect(frames):.4g};image-rendering:{rendering};"
+        style += "background:rgba(128,128,128,.15)"
+        thumbnails.append(
+            markup.figure(
+                markup.image(png(shown), f"{name}, {size}", style=style),
+                element("b", name),
+                " ",
+                element("span", size, style="opacity:.7"),
+                style="margin:0",
+            )
         )
-    page.append("</div>")
-    if frames.timings:
-        page.append(_timings_html(frames))
-    facts = [f"{key} {value}" for key, value in frames.info.items()]
-    page.append(
-        '<div style="margin-top:10px;opacity:.8">' + html.escape(", ".join(facts)) + "<br>"
-        '<code style="color:inherit;background:none;padding:0;white-space:pre-wrap;'
-        f'overflow-wrap:anywhere">{html.escape(repr(frames.settings))}</code></div></div>'
+    columns = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
+    facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
+    return element(
+        "div",
+        element("div", *thumbnails, style=columns),
+        *([_timings_html(frames)] if frames.timings else []),
+        element(
+            "div",
+            facts,
+            element("br"),
+            element("code", repr(frames.settings), style=_CODE),
+            style="margin-top:10px;opacity:.8",
+        ),
+        style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em",
     )
-    return "".join(page)
 
 
-def _timings_html(frames: Framebuffers) -> str:
+def _timings_html(frames: Framebuffers) -> Markup:
     longest = max((t for t in frames.timings.values() if math.isfinite(t)), default=0.0)
-    adapter = html.escape(str(frames.info.get("adapter", "the device")))
-    rows = [
-        f'<div style="margin-top:10px">Time of each pass on {adapter}</div>'
-        '<div style="display:grid;grid-template-columns:max-content 1fr max-content;'
-        'gap:2px 8px;align-items:center">'
-    ]
+    bar = "height:.7em;background:#5b8def;border-radius:2px"
+    cells = []
     for name, seconds in frames.timings.items():
         part = seconds / longest if longest > 0 and math.isfinite(seconds) else 0.0
-        rows.append(
-            f"<div>{html.escape(name)}</div>"
-            f'<div style="width:{100 * part:.1f}%;height:.7em;background:#5b8def;'
-            'border-radius:2px"></div>'
-            f'<div style="text-align:right">{1e3 * seconds:.3f} ms</div>'
+        cells += [
+            element("div", name),
+            element("div", style=f"width:{100 * part:.1f}%;{bar}"),
+            element("div", f"{1e3 * seconds:.3f} ms", style="text-align:right"),
+        ]
+    adapter = frames.info.get("adapter", "the device")
+    grid = "display:grid;grid-template-columns:max-content 1fr max-content;gap:2px 8px"
+    return markup.joined(
+        (
+            element("div", f"Time of each pass on {adapter}", style="margin-top:10px"),
+            element("div", *cells, style=f"{grid};align-items:center"),
         )
-    rows.append("</div>")
-    return "".join(rows)
+    )
 
 
 def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
@@ -240,8 +245,8 @@ def picture(
     else:
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
-        shown = _clipped(values)
         linear = not encoded
+        shown = _clipped(scaled_to_1(values) if linear else values)
     if size is not None:
         shown = resized(shown, *size)
     if linear:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vkbloom._checks import import_extra
 
 __all__ = ["MIN_SHIFT", "find_shift"]
 
@@ -19,44 +21,65 @@ MIN_SHIFT: Final = 1 / 64
 # a pixel, the image may have been interpolated by another filter.
 _REMAINS: Final = 0.1
 _REMAINS_OF_WHOLE: Final = 0.02
-_WINDOW: Final = 256  # pixels; the side of the part in which a shift is searched
+_WINDOW: Final = 512  # pixels; the side of the part in which a shift is searched
 _LONGEST: Final = 0.25  # of the image's side
 # Shifts by quarters and eighths are tried, too: the estimate is less exact than its judgement.
 _PARTS: Final = (4, 8)
-_PADDING: Final = 16  # pixels; mirrored edges, so that the prefilter of splines does not ring
 
 
 def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None:
     """Return the shift (x, y) of `b` against `a`, and the residual; None if no shift explains `b`.
 
-    `a`, `b`: (H, W, C); `step`: a level of integers, 0 for floats.
+    `a`, `b`: (H, W, C); `step`: a level of integers, 0 for floats. None also without scikit-image.
     """
-    # Bright lights alone would decide otherwise.
-    small_a, small_b = _compressed(a), _compressed(b)
-    window = _brightest_window(small_a + small_b)
-    height, width = a.shape[:2]
-    tried: set[_Shift] = set()
-    for start in ((0, 0), _whole_shift(small_a.mean(axis=2), small_b.mean(axis=2))):
-        if max(abs(start[0]) / width, abs(start[1]) / height) > _LONGEST:
-            continue
-        refined = _refined(_smoothed(small_a), _smoothed(small_b), window, start)
-        for shift in (*(_rounded(refined, parts) for parts in _PARTS), refined):
-            if shift in tried or max(map(abs, shift)) < MIN_SHIFT:
-                continue
-            tried.add(shift)
-            part = (slice(None), slice(None)) if min(height, width) < 2 * _WINDOW else window
-            # Most pairs are refused by a part of them.
-            if _residual(a[part], b[part], shift, step) is None:
-                continue
-            residual = _residual(a, b, shift, step)
-            if residual is not None:
-                return shift, residual
+    try:
+        registration = import_extra("skimage.registration", "quality", "Finding a shift")
+        ndimage = import_extra("scipy.ndimage", "quality", "Finding a shift")
+        optimize = import_extra("scipy.optimize", "quality", "Finding a shift")
+    except ModuleNotFoundError:
+        return None
+    # Bright lights alone would decide otherwise, and interpolations differ in high frequencies.
+    grey_a, grey_b = (
+        ndimage.gaussian_filter(_compressed(image).mean(axis=2), 1, mode="wrap") for image in (a, b)
+    )
+    start, *_ = registration.phase_cross_correlation(
+        grey_b, grey_a, upsample_factor=4, normalization=None
+    )
+    window = _brightest_window(grey_a + grey_b)
+    part_a, part_b = grey_a[window], grey_b[window]
+    inner = _inner(part_a.shape, (start[1], start[0]))
+
+    def difference(shift: NDArray[np.float64]) -> float:
+        moved = ndimage.shift(part_a, shift, order=1, mode="grid-wrap")
+        return _rms((moved - part_b)[inner])
+
+    best = optimize.minimize(
+        difference, start, method="Nelder-Mead", options={"xatol": 5e-3, "fatol": 0.0}
+    )
+    y, x = map(float, best.x)
+    rounded = [(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS]
+    for shift in dict.fromkeys((*rounded, (x, y))):
+        is_short = max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _LONGEST
+        # Most pairs are refused by a part of them.
+        if (
+            is_short
+            and max(map(abs, shift)) >= MIN_SHIFT
+            and _residual(a[window], b[window], shift, step) is not None
+            and (residual := _residual(a, b, shift, step)) is not None
+        ):
+            return shift, residual
     return None
 
 
-def _rounded(shift: _Shift, parts: int) -> _Shift:
-    x, y = (round(parts * value) / parts + 0.0 for value in shift)
-    return x, y
+def _brightest_window(image: _Image) -> tuple[slice, slice]:
+    """Return rows and columns around the brightest pixel, where a shift is best seen."""
+    y, x = np.unravel_index(int(image.argmax()), image.shape)
+    starts = (
+        min(max(int(middle) - _WINDOW // 2, 0), max(side - _WINDOW, 0))
+        for middle, side in zip((y, x), image.shape, strict=True)
+    )
+    rows, columns = (slice(start, start + _WINDOW) for start in starts)
+    return rows, columns
 
 
 def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
@@ -75,14 +98,17 @@ def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
 
 def _interpolations(a: _Image, b: _Image, shift: _Shift) -> Iterator[tuple[_Image, _Image, _Image]]:
     """Yield a moved image, the one that it should be, and the one that it is made of."""
-    yield _moved(a, shift), b, a
+    ndimage = import_extra("scipy.ndimage", "quality", "Finding a shift")
+    x, y = shift
+    yield ndimage.shift(a, (y, x, 0), order=1, mode="grid-wrap"), b, a
     if _is_whole(shift):
         return
     # The first image may be an interpolation of the second.
-    yield _moved(b, (-shift[0], -shift[1])), a, b
-    yield _moved(a, shift, _catmull_rom), b, a
-    for is_spline in (True, False):
-        yield _filtered(a, shift, is_spline=is_spline), b, a
+    yield ndimage.shift(b, (-y, -x, 0), order=1, mode="grid-wrap"), a, b
+    yield _catmull_rom(a, shift), b, a
+    yield ndimage.shift(a, (y, x, 0), order=3, mode="mirror"), b, a
+    spectrum = ndimage.fourier_shift(np.fft.fft2(a, axes=(0, 1)), (y, x, 0))
+    yield np.fft.ifft2(spectrum, axes=(0, 1)).real, b, a
 
 
 def _is_whole(shift: _Shift) -> bool:
@@ -101,128 +127,23 @@ def _compressed(image: _Image) -> _Image:
     return compressed
 
 
-def _smoothed(image: _Image) -> _Image:
-    """Return an image without the high frequencies, in which interpolations differ."""
-    for axis in (0, 1):
-        for _ in range(2):
-            image = (np.roll(image, 1, axis) + 2 * image + np.roll(image, -1, axis)) / 4
-    return image
+def _catmull_rom(image: _Image, shift: _Shift) -> _Image:
+    """Return an image moved by (x, y) pixels; edges wrap.
 
-
-def _whole_shift(a: _Image, b: _Image) -> tuple[int, int]:
-    """Return the shift (x, y) of `b` against `a` in whole pixels, by their cross-correlation."""
-    spectra = [np.fft.rfft2(image - image.mean()) for image in (a, b)]
-    correlation = np.fft.irfft2(np.conj(spectra[0]) * spectra[1], a.shape)
-    y, x = (int(index) for index in np.unravel_index(int(correlation.argmax()), a.shape))
-    height, width = a.shape
-    return x - width * (x > width // 2), y - height * (y > height // 2)
-
-
-def _brightest_window(image: _Image) -> tuple[slice, slice]:
-    """Return rows and columns around the brightest pixel, where a shift is best seen."""
-    y, x = np.unravel_index(int(image.sum(axis=2).argmax()), image.shape[:2])
-    found = []
-    for place, side in zip((int(y), int(x)), image.shape[:2], strict=True):
-        start = min(max(place - _WINDOW // 2, 0), max(side - _WINDOW, 0))
-        found.append(slice(start, start + _WINDOW))
-    return found[0], found[1]
-
-
-def _refined(a: _Image, b: _Image, window: tuple[slice, slice], start: tuple[int, int]) -> _Shift:
-    """Return the shift to a part of a pixel: least squares of b(x) - a(x - shift) (Gauss-Newton).
-
-    Source: Lucas and Kanade, "An Iterative Image Registration Technique with an Application to
-    Stereo Vision", IJCAI 1981.
+    Source: Catmull and Rom, "A Class of Local Interpolating Splines", 1974.
     """
-    shift = np.array(start, np.float64)
-    margin = int(np.abs(shift).max()) + 2
-    reach = tuple(slice(max(part.start - margin, 0), part.stop + margin) for part in window)
-    part_a, part_b = a[reach], b[reach]
-    inner = _inner(part_a.shape, (margin - 2, margin - 2))
-    if min(part_a.shape[:2]) <= 2 * margin + 2:
-        return float(start[0]), float(start[1])
-    for _ in range(20):
-        moved = _moved(part_a, (float(shift[0]), float(shift[1])))
-        slopes = np.stack(
-            [np.asarray(np.gradient(moved, axis=axis))[inner].ravel() for axis in (1, 0)]
-        )
-        normal = slopes @ slopes.T
-        if np.linalg.det(normal) <= 1e-12 * np.trace(normal) ** 2:
-            break
-        # A shift to the right lowers the values where they rise to the right.
-        change = -np.linalg.solve(normal, slopes @ (part_b - moved)[inner].ravel())
-        shift += np.clip(change, -0.5, 0.5)
-        if np.abs(change).max() < 1e-4 or np.abs(shift - start).max() > 1.5:
-            break
-    return float(shift[0]), float(shift[1])
-
-
-def _linear(part: float) -> tuple[float, ...]:
-    return 0.0, 1 - part, part, 0.0
-
-
-def _catmull_rom(part: float) -> tuple[float, ...]:
-    """Source: Catmull and Rom, "A Class of Local Interpolating Splines", 1974."""
-    t = part
-    return (
-        (-t + 2 * t**2 - t**3) / 2,
-        (2 - 5 * t**2 + 3 * t**3) / 2,
-        (t + 4 * t**2 - 3 * t**3) / 2,
-        (-(t**2) + t**3) / 2,
-    )
-
-
-def _moved(
-    image: _Image, shift: _Shift, taps: Callable[[float], tuple[float, ...]] = _linear
-) -> _Image:
-    """Return an image moved by (x, y) pixels with four taps an axis; edges wrap."""
     for axis, value in ((1, shift[0]), (0, shift[1])):
         whole = int(np.floor(value))
-        weights = enumerate(taps(value - whole), whole - 1)
-        moved = [weight * np.roll(image, place, axis) for place, weight in weights if weight]
+        t = value - whole
+        taps = (
+            (-t + 2 * t**2 - t**3) / 2,
+            (2 - 5 * t**2 + 3 * t**3) / 2,
+            (t + 4 * t**2 - 3 * t**3) / 2,
+            (-(t**2) + t**3) / 2,
+        )
+        moved = [tap * np.roll(image, whole - 1 + i, axis) for i, tap in enumerate(taps) if tap]
         image = np.sum(moved, axis=0)
     return image
-
-
-def _filtered(image: _Image, shift: _Shift, *, is_spline: bool) -> _Image:
-    """Return an image moved with cubic splines, whose edges are mirrored, or with sinc functions.
-
-    Source: Unser, "Splines: A Perfect Fit for Signal and Image Processing", IEEE Signal Processing
-    Magazine 16 (1999).
-    """
-    height, width = image.shape[:2]
-    padding = min(_PADDING, height, width) if is_spline else 0
-    margins = ((padding, padding), (padding, padding), (0, 0))
-    padded = np.pad(image, margins, mode="symmetric")
-    spectrum = np.fft.rfft2(padded, axes=(0, 1))
-    down = 2 * np.pi * np.fft.fftfreq(padded.shape[0])[:, np.newaxis, np.newaxis]
-    across = 2 * np.pi * np.fft.rfftfreq(padded.shape[1])[:, np.newaxis]
-    for frequency, value in ((across, shift[0]), (down, shift[1])):
-        spectrum = spectrum * (
-            _spline(frequency, value) if is_spline else np.exp(-1j * frequency * value)
-        )
-    moved: _Image = np.fft.irfft2(spectrum, padded.shape[:2], axes=(0, 1))
-    return moved[padding : padding + height, padding : padding + width]
-
-
-def _spline(frequency: NDArray[np.floating[Any]], shift: float) -> NDArray[np.complex128]:
-    """Return the transfer function of a shift with interpolating cubic splines."""
-    whole = int(np.floor(shift))
-    part = shift - whole
-    # The cubic B-spline at the distances 1 + part, part, 1 - part and 2 - part.
-    weights = (
-        (1 - part) ** 3 / 6,
-        2 / 3 - part**2 + part**3 / 2,
-        2 / 3 - (1 - part) ** 2 + (1 - part) ** 3 / 2,
-        part**3 / 6,
-    )
-    taps = enumerate(weights, whole - 1)
-    total: NDArray[np.complex128] = sum(
-        (weight * np.exp(-1j * frequency * place) for place, weight in taps),
-        np.zeros(1, np.complex128),
-    )
-    transfer: NDArray[np.complex128] = total / ((2 + np.cos(frequency)) / 3)
-    return transfer
 
 
 def _inner(shape: tuple[int, ...], shift: _Shift) -> tuple[slice, slice]:

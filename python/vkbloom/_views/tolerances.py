@@ -63,10 +63,6 @@ class Tolerances:
     TypeError
         A field is not a number.
 
-    See Also
-    --------
-    FrameRegression.check : Takes the same limits as arguments.
-
     Examples
     --------
     >>> from vkbloom import testing
@@ -103,18 +99,7 @@ class Tolerances:
             raise TypeError(f"allow_nan: {self.allow_nan!r} is not a bool")
 
     def of(self, dtype: np.dtype[Any]) -> tuple[float, float]:
-        """Return atol and rtol for images of a dtype.
-
-        See Also
-        --------
-        FrameRegression.check : Uses them.
-
-        Examples
-        --------
-        >>> from vkbloom import testing
-        >>> testing.Tolerances(atol=0.01).of(np.dtype(np.float16))
-        (0.01, 0.0)
-        """
+        """Return atol and rtol for images of a dtype."""
         if self.atol is None and self.rtol is None:
             return DEFAULTS[dtype.name]
         return self.atol or 0.0, self.rtol or 0.0

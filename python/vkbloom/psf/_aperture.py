@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._array_cache import kept
-from vkbloom._checks import check_floats, check_number, check_size
+from vkbloom._checks import check_size
 from vkbloom._settings.fields import check_fields, number_field, value_field
-from vkbloom.psf._base import Array, centred
+from vkbloom.psf._base import Array, centred, check_wavelengths
 from vkbloom.psf._sampled import SampledPSF
 from vkbloom.psf._values import ArrayValue
 
@@ -154,9 +154,7 @@ def _check_mask(mask: Any) -> iris | ArrayValue:
 
 
 def _check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
-    lengths = check_floats("wavelengths", wavelengths)
-    for length in lengths:
-        check_number("wavelengths", length, 380, 780)
+    lengths = check_wavelengths(wavelengths)
     if not lengths or not (_colours(lengths).sum(axis=0) > 0).all():
         raise ValueError(
             f"wavelengths: the sum of {wavelengths!r} is not above 0 in each channel of sRGB; give "

@@ -12,13 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_size
+from vkbloom._checks import check_floats, check_number, check_size
 from vkbloom._settings.fields import Record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["FRAME_DEGREES", "PSF", "Array", "centred", "check_radii", "functions"]
+__all__ = [
+    "FRAME_DEGREES",
+    "PSF",
+    "Array",
+    "centred",
+    "check_radii",
+    "check_wavelengths",
+    "functions",
+    "in_grey",
+]
 
 Array = NDArray[np.float64]
 
@@ -198,6 +207,19 @@ def check_radii(name: str, values: ArrayLike) -> Array:
     if numbers.ndim != 1 or not (numbers >= 0).all():
         raise ValueError(f"{name}: {values!r} is not a sequence of numbers of at least 0")
     return numbers
+
+
+def check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
+    """Return wavelengths in nm as floats, or raise TypeError or ValueError."""
+    lengths = check_floats("wavelengths", wavelengths)
+    for length in lengths:
+        check_number("wavelengths", length, 380, 780)
+    return lengths
+
+
+def in_grey(values: Array) -> Array:
+    """Return values with three equal channels as the last axis."""
+    return np.repeat(values[..., np.newaxis], 3, axis=-1)
 
 
 def centred(array: Array, size: tuple[int, int]) -> Array:

@@ -8,9 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom._checks import check_floats, check_number
 from vkbloom._settings.fields import number_field, value_field
-from vkbloom.psf._base import Array
+from vkbloom.psf._base import Array, check_wavelengths, in_grey
 from vkbloom.psf._radial import RadialPSF
 
 __all__ = ["State", "cie_general", "cie_total", "spencer"]
@@ -25,12 +24,10 @@ _SHARES: dict[str, tuple[float, float, float, float]] = {
 }
 
 
-def _check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
-    lengths = check_floats("wavelengths", wavelengths)
+def _check_three(wavelengths: Any) -> tuple[float, ...]:
+    lengths = check_wavelengths(wavelengths)
     if len(lengths) != 3:
         raise ValueError(f"wavelengths: {wavelengths!r} is not (red, green, blue)")
-    for length in lengths:
-        check_number("wavelengths", length, 380, 780)
     return lengths
 
 
@@ -68,7 +65,7 @@ class spencer(RadialPSF):
 
     state: State = "photopic"
     wavelengths: tuple[float, float, float] = value_field(
-        (611.0, 549.0, 467.0), unit="nm", read=_check_wavelengths
+        (611.0, 549.0, 467.0), unit="nm", read=_check_three
     )
 
     def density(self, theta: ArrayLike) -> Array:
@@ -123,7 +120,7 @@ class cie_general(RadialPSF):
         angle = np.maximum(np.asarray(theta, np.float64), 0.1)
         old = 1 + (self.age / 62.5) ** 4
         veil = (5 / angle**2 + 0.1 * self.pigment / angle) * old
-        return _grey(10 / angle**3 + veil + 0.0025 * self.pigment)
+        return in_grey(10 / angle**3 + veil + 0.0025 * self.pigment)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,8 +163,4 @@ class cie_total(RadialPSF):
         core += 1.5e5 * (1 + (angle / 0.045) ** 2) ** -1.5
         veil = 400 / wide + 3e-8 * angle**2 + p * (1300 * wide**-1.5 + 0.8 * wide**-0.5)
         total = (1 - 0.08 * old) * core + (1 + 1.6 * old) * veil + 0.0025 * p
-        return _grey(total / (1 + p * (0.0417 + 0.055 * old)))
-
-
-def _grey(values: Array) -> Array:
-    return np.broadcast_to(values[..., np.newaxis], (*values.shape, 3))
+        return in_grey(total / (1 + p * (0.0417 + 0.055 * old)))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from vkbloom._checks import check_size
 from vkbloom._settings.fields import number_field
-from vkbloom.psf._base import PSF, Array, check_radii
+from vkbloom.psf._base import PSF, Array, check_radii, in_grey
 from vkbloom.psf._bessel import bessel
 from vkbloom.psf._radial import RadialPSF, integrate_pixels
 
@@ -43,7 +43,7 @@ class gaussian(PSF):
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
         columns, rows = (self._shares(side) for side in check_size("size", size))
-        return _rgb(np.outer(rows, columns))
+        return in_grey(np.outer(rows, columns))
 
     def _shares(self, side: int) -> Array:
         """Return the integral over each pixel of a line."""
@@ -58,11 +58,11 @@ class gaussian(PSF):
         return np.ones(3)
 
     def encircled_energy(self, radii: ArrayLike) -> Array:
-        return _rgb(-np.expm1(-0.5 * (check_radii("radii", radii) / self.sigma) ** 2))
+        return in_grey(-np.expm1(-0.5 * (check_radii("radii", radii) / self.sigma) ** 2))
 
     def mtf(self, frequencies: ArrayLike) -> Array:
         cycles = check_radii("frequencies", frequencies)
-        return _rgb(np.exp(-2 * (math.pi * self.sigma * cycles) ** 2))
+        return in_grey(np.exp(-2 * (math.pi * self.sigma * cycles) ** 2))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,18 +118,18 @@ class airy(PSF):
             x = np.maximum(np.pi * distance / self._scale, 1e-9)
             return np.asarray(peak * (2 * bessel(1, x) / x) ** 2)[np.newaxis]
 
-        return _rgb(integrate_pixels(per_pixel, size, self._scale)[..., 0])
+        return in_grey(integrate_pixels(per_pixel, size, self._scale)[..., 0])
 
     def energy(self) -> Array:
         return np.ones(3)
 
     def encircled_energy(self, radii: ArrayLike) -> Array:
         x = np.pi * check_radii("radii", radii) / self._scale
-        return _rgb(1 - bessel(0, x) ** 2 - bessel(1, x) ** 2)
+        return in_grey(1 - bessel(0, x) ** 2 - bessel(1, x) ** 2)
 
     def mtf(self, frequencies: ArrayLike) -> Array:
         v = np.minimum(check_radii("frequencies", frequencies) * self._scale, 1)
-        return _rgb(2 / np.pi * (np.arccos(v) - v * np.sqrt(1 - v**2)))
+        return in_grey(2 / np.pi * (np.arccos(v) - v * np.sqrt(1 - v**2)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,8 +174,4 @@ class harvey_shack(RadialPSF):
         peak = self.surfaces * self.b * (100 * self.l) ** self.s
         scatter = peak * (1 + (np.sin(angle) / self.l) ** 2) ** (self.s / 2)
         # cos(pi / 2) is not quite 0 in floats.
-        return _rgb(scatter * np.maximum(np.cos(angle), 0))
-
-
-def _rgb(values: Array) -> Array:
-    return np.repeat(values[..., np.newaxis], 3, axis=-1)
+        return in_grey(scatter * np.maximum(np.cos(angle), 0))

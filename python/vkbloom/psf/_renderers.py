@@ -12,7 +12,7 @@ import numpy as np
 from vkbloom._array_cache import kept
 from vkbloom._checks import check_floats
 from vkbloom._settings.fields import number_field, value_field
-from vkbloom.psf._base import PSF, Array, centred
+from vkbloom.psf._base import PSF, Array, centred, in_grey
 from vkbloom.psf._resampling import box_resample
 from vkbloom.psf._sampled import SampledPSF, check_values, rgb
 
@@ -55,7 +55,7 @@ class fog_glow(SampledPSF):
         radius = (u**2 + u[:, np.newaxis] ** 2) * self.size / 4
         window = (1 + np.cos(np.pi * u)) / 2
         values = np.exp(-9 * radius**0.125) * window * window[:, np.newaxis]
-        return np.repeat(values[..., np.newaxis], 3, axis=2)
+        return in_grey(values)
 
 
 def _check_image(image: Any) -> SampledPSF | ArrayValue:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from vkbloom._settings.fields import value_field
-from vkbloom.psf._base import PSF, Array, centred, check_radii
+from vkbloom.psf._base import PSF, Array, centred, check_radii, in_grey
 from vkbloom.psf._values import ArrayValue
 
 __all__ = ["SampledPSF", "check_values", "samples"]
@@ -114,4 +114,4 @@ class samples(SampledPSF):
 def rgb(values: ArrayValue) -> Array:
     """Return an array (h, w) or (h, w, 3) as float64 (h, w, 3)."""
     array = values.array.astype(np.float64)
-    return np.repeat(array[..., np.newaxis], 3, axis=2) if array.ndim == 2 else array
+    return in_grey(array) if array.ndim == 2 else array

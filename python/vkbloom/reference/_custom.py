@@ -1,4 +1,4 @@
-"""Custom methods: the framebuffers of a twin in NumPy, which is given with the method's file."""
+"""Custom methods: the framebuffers of a reference in NumPy, given with the method's file."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from ._sampling import Array
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-Twin = Callable[[Array, Any], Mapping[str, NDArray[Any]]]
+Function = Callable[[Array, Any], Mapping[str, NDArray[Any]]]
 
 
 def framebuffers(
-    twin: Twin, scene: Array, settings: Settings, dtype: np.dtype[Any]
+    function: Function, scene: Array, settings: Settings, dtype: np.dtype[Any]
 ) -> dict[str, Array]:
-    """Return the framebuffers of a twin.
+    """Return the framebuffers of a reference.
 
-    A twin that returns "final" composites by itself; then "bloom" is the difference to the scene.
+    One that returns "final" composites by itself; then "bloom" is the difference to the scene.
     """
     height, width, channels = scene.shape
     image = scene if channels == 4 else np.dstack([scene, np.ones((height, width))])
-    found = {name: np.asarray(array, np.float64) for name, array in twin(image, settings).items()}
+    found = {
+        name: np.asarray(array, np.float64) for name, array in function(image, settings).items()
+    }
     if "final" in found:
         final = found.pop("final")[..., :channels]
         found.setdefault(
@@ -35,7 +37,7 @@ def framebuffers(
         return {**found, "final": final}
     if "bloom" not in found:
         raise ValueError(
-            f"reference: the twin returned {', '.join(found) or 'nothing'}; it must return 'bloom' "
+            f"reference: it returned {', '.join(found) or 'nothing'}; it must return 'bloom' "
             "or 'final'"
         )
     return {**found, "final": composite(scene, found["bloom"], settings, dtype)}

@@ -88,9 +88,9 @@ def apply(
     >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
     True
     """
-    if (twin := getattr(settings, "twin", None)) is not None:
+    if (function := getattr(settings, "twin", None)) is not None:
         scene = as_float(image, "image", (3, 4))
-        return custom.framebuffers(twin, scene, settings, np.asarray(image).dtype)
+        return custom.framebuffers(function, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
     share = 0.0 if emission is not None else 1.0 if weights is None else weights
     return framebuffers(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from vkbloom._views.diagnosis import Diagnosis, diagnose
 from vkbloom._views.tolerances import Tolerances
+from vkbloom.testing._border import assert_border, assert_views, border_energy
 from vkbloom.testing._frame_files import read_frame
 from vkbloom.testing._law_report import LawReport, LawRow, report
 from vkbloom.testing._laws import (
@@ -38,10 +39,16 @@ from vkbloom.testing._scaled_scene import (
     assert_resolution_independent,
     resolution_response,
 )
+from vkbloom.testing._sequences import Flash, Flicker, flash, flicker
+from vkbloom.testing._shape import assert_round, assert_sizes, roundness
+from vkbloom.testing._time import assert_history, assert_jitter
+from vkbloom.testing._transparency import assert_alpha
 from vkbloom.testing._veiling_glare import veiling_glare_index
 
 __all__ = [
     "Diagnosis",
+    "Flash",
+    "Flicker",
     "FrameDifferenceWarning",
     "FrameRegression",
     "LawReport",
@@ -52,23 +59,34 @@ __all__ = [
     "Stability",
     "Tolerances",
     "assert_additive",
+    "assert_alpha",
+    "assert_border",
     "assert_bounded_fireflies",
     "assert_centroid_kept",
     "assert_gain",
+    "assert_history",
+    "assert_jitter",
     "assert_no_ringing",
     "assert_resolution_independent",
+    "assert_round",
     "assert_separable",
+    "assert_sizes",
     "assert_spread",
     "assert_stable",
     "assert_superposition",
     "assert_symmetric",
+    "assert_views",
+    "border_energy",
     "command",
     "diagnose",
+    "flash",
+    "flicker",
     "point_spread",
     "read_frame",
     "report",
     "resolution_response",
     "response",
+    "roundness",
     "stability",
     "veiling_glare_index",
 ]

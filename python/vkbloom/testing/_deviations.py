@@ -13,7 +13,11 @@ import numpy as np
 
 from vkbloom.testing._probe import Image
 
-__all__ = ["Deviation", "compare_with_law", "fail", "figure", "is_within", "measuring"]
+__all__ = ["Deviation", "NotTaken", "compare_with_law", "fail", "figure", "is_within", "measuring"]
+
+
+class NotTaken(ValueError):
+    """A bloom does not take what a law needs, such as a region or alpha; so it is not tested."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,7 +13,9 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import measuring
+from vkbloom._views import markup
+from vkbloom._views.markup import element
+from vkbloom.testing._deviations import NotTaken, measuring
 from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import Subject, fitting_probe
@@ -47,6 +48,8 @@ class LawRow:
         The assertion's message, or the reason why it could not be tested; empty if the law holds.
     why : str
         Why a bloom that is no fault may break the law.
+    applies : bool
+        Whether the bloom takes what the law needs, such as a region or alpha.
     """
 
     name: str
@@ -57,6 +60,7 @@ class LawRow:
     law: str
     message: str
     why: str
+    applies: bool = True
 
     @property
     def words(self) -> str:
@@ -96,7 +100,7 @@ class LawReport:
     required: tuple[str, ...] = ()
 
     def assert_held(self, *names: str) -> None:
-        """Assert that the laws of these names hold; without a name, all of them.
+        """Assert that the laws of these names hold; without a name, all that apply to the bloom.
 
         Parameters
         ----------
@@ -112,7 +116,9 @@ class LawReport:
         __tracebackhide__ = True
         known = {row.name: row for row in self.rows}
         try:
-            chosen = [law_name(name, known) for name in names] or list(known)
+            chosen = [law_name(name, known) for name in names] or [
+                name for name, row in known.items() if row.applies
+            ]
         except ValueError as error:
             raise ValueError(f"names: {error}") from None
         broken = [known[name] for name in chosen if not known[name].held]
@@ -148,27 +154,24 @@ class LawReport:
 
     def _repr_html_(self) -> str:
         """Return the same as a table."""
-        heads = "".join(
-            f'<th scope="col" style="text-align:left">{head}</th>'
-            for head in ("law", "held", "off by", "allowed", "why it may be broken")
-        )
-        body = []
+        rows = []
         for row in self.rows:
-            kind = self.kind(row)
-            words = f"<b>{row.words}</b>" if not row.held else row.words
-            words += " (required)" if row.name in self.required else ""
-            why = "" if row.held else f"{html.escape(row.message)}<br><i>{html.escape(row.why)}</i>"
-            body.append(
-                f'<tr class="{kind}"><th scope="row" style="text-align:left;color:{COLOURS[kind]}" '
-                f'title="{html.escape(row.law)}">{row.name}</th>'
-                f'<td style="color:{COLOURS[kind]}">{words}</td>'
-                + "".join(f"<td>{cell}</td>" for cell in _cells(row))
-                + f'<td style="text-align:left">{why}</td></tr>'
+            kind = {"class_": self.kind(row), "style": f"color:{COLOURS[self.kind(row)]}"}
+            words = element("span", row.words if row.held else element("b", row.words), **kind)
+            required = " (required)" * (row.name in self.required)
+            why = ("",) if row.held else (row.message, element("br"), element("i", row.why))
+            rows.append(
+                (
+                    element("span", row.name, title=row.law, **kind),
+                    markup.joined((words, required)),
+                    *_cells(row),
+                    element("span", *why, style="text-align:left"),
+                )
             )
-        return (
-            f'<table style="color:inherit"><caption>{html.escape(str(self).splitlines()[0])}'
-            f"</caption><thead><tr>{heads}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-        )
+        head = ("law", "held", "off by", "allowed", "why it may be broken")
+        caption = str(self).splitlines()[0]
+        name = {"style": "text-align:left"}
+        return markup.table(rows, head, caption=caption, name=name, style="color:inherit")
 
 
 def _cells(row: LawRow) -> tuple[str, str]:
@@ -249,7 +252,7 @@ def law_report(
 
 def _row(law: Law, subject: Subject) -> LawRow:
     """Test a law."""
-    message, why = "", law.why
+    message, why, applies = "", law.why, True
     held: bool | None = True
     # NaN and infinity among the test images are no fault of the caller's arithmetic.
     with measuring() as found, np.errstate(all="ignore"):
@@ -261,7 +264,7 @@ def _row(law: Law, subject: Subject) -> LawRow:
                 why = law.explain(subject, why)
         except (TypeError, ValueError) as error:
             # Not of the bloom itself: report has called it before.
-            message, held = str(error), None
+            message, held, applies = str(error), None, not isinstance(error, NotTaken)
     limited = [one for one in found if not math.isinf(one.allowed)] if held is not None else []
     worst = max(limited, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
     figures: dict[str, float] = {}
@@ -276,4 +279,5 @@ def _row(law: Law, subject: Subject) -> LawRow:
         law=worst.law if worst else law.formula,
         message=message,
         why=why,
+        applies=applies,
     )

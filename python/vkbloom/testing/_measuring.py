@@ -71,7 +71,8 @@ def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
     """Return the colours of a framebuffer as a function of the image."""
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        return renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer][..., :3]
+        found = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
+        return found[..., : image.shape[2]]
 
     return bloom
 
@@ -222,7 +223,7 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     for name, array in expected.items():
         wanted, got = np.atleast_3d(array)[..., :3], np.atleast_3d(frames[name])[..., :3]
         if wanted.shape != got.shape:
-            raise ValueError(f"the twin's {name} has the shape {wanted.shape}, not {got.shape}")
+            raise ValueError(f"reference: the shape of {name}, {wanted.shape}, is not {got.shape}")
         largest = float(np.abs(wanted).max()) or 1.0
         found[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
     return found

@@ -24,6 +24,7 @@ __all__ = [
     "area_sampled",
     "assert_stable",
     "check_stable",
+    "moments",
     "stability",
 ]
 
@@ -365,8 +366,8 @@ def _results(bloom: MovingBloom, probe: Probe, images: list[NDArray[Any]]) -> li
 def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:
     """Return energy, x and y of the shift, peak, ideal, radius, and the share at the border."""
     image = probe.values(given, given)[0][:, :, 0]
-    energy, place, variance = _moments(bloom)
-    _, from_place, from_variance = _moments(image)
+    energy, place, variance = moments(bloom)
+    _, from_place, from_variance = moments(image)
     # Replace the variance of the sampled light by that of the square.
     left = variance - from_variance + _LIGHT**2 / 6
     return (
@@ -380,7 +381,7 @@ def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> 
     )
 
 
-def _moments(plane: Image) -> tuple[float, tuple[float, float], float]:
+def moments(plane: Image) -> tuple[float, tuple[float, float], float]:
     """Return sum, centroid (x, y) and variance; the latter are NaN without light."""
     total = float(plane.sum())
     if total == 0:

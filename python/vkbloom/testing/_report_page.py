@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import shutil
@@ -12,6 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom._version import installed_version
+from vkbloom._views import markup
+from vkbloom._views.markup import element
 from vkbloom.testing._records import Figures, Record
 from vkbloom.testing._report_parts import Histogram, Part, Shown
 
@@ -187,16 +188,11 @@ def _figures_table(figures: Figures) -> str:
         "SSIM": _number(figures["ssim"]),
         "FLIP": _number(figures["flip"]),
     }
-    cells = "".join(
-        f'<tr><th scope="row">{label}</th><td>{_text(value)}</td></tr>'
-        for label, value in rows.items()
-        if value
-    )
-    return f'<table class="figures">{cells}</table>\n'
+    table = markup.table([row for row in rows.items() if row[1]], class_="figures")
+    return f"{table}\n"
 
 
 def _pictures(group: str, figures: Figures, shown: Shown) -> Iterable[str]:
-    name = _text(figures["name"])
     kinds: list[tuple[str, str | None, str]] = [
         ("expected", shown["expected"], "expected"),
         (
@@ -210,12 +206,15 @@ def _pictures(group: str, figures: Figures, shown: Shown) -> Iterable[str]:
     yield f'<div class="pictures" data-group="{group}">\n'
     for kind, data, caption in kinds:
         if data is not None:
-            yield (
-                f'<figure><button type="button" data-kind="{kind}" '
-                f'aria-label="Enlarge: {name}, {_text(caption)}">'
-                f'<img src="data:image/png;base64,{data}" alt="{name}, {_text(caption)}">'
-                f"</button><figcaption>{_text(caption)}</figcaption></figure>\n"
+            text = f"{figures['name']}, {caption}"
+            button = element(
+                "button",
+                markup.encoded_image(data, text),
+                type="button",
+                data_kind=kind,
+                aria_label=f"Enlarge: {text}",
             )
+            yield f"{markup.figure(button, caption)}\n"
     yield "</div>\n"
     if shown["shrunk"]:
         yield (
@@ -252,51 +251,47 @@ def _histogram(histogram: Histogram) -> str:
 def _worst(figures: Figures, shown: Shown) -> str:
     at = figures["max_error_at"] or [0, 0, 0]
     place = f"x {at[0]}, y {at[1]}, channel {at[2]}"
-    rows = "".join(
-        f'<tr><th scope="row">{label}</th>'
-        + "".join(f"<td>{value:.6g}</td>" for value in values)
-        + "</tr>"
-        for label, values in (
-            ("expected", shown["worst_expected"]),
-            ("actual", shown["worst_actual"]),
-        )
-    )
-    crops = "".join(
-        f'<figure><img class="crop" src="data:image/png;base64,{data}" '
-        f'alt="around {place}: {kind}"><figcaption>{kind}</figcaption></figure>'
+    values = {"expected": shown["worst_expected"], "actual": shown["worst_actual"]}
+    rows = [(label, *(f"{value:.6g}" for value in row)) for label, row in values.items()]
+    crops = [
+        markup.figure(markup.encoded_image(data, f"around {place}: {kind}", class_="crop"), kind)
         for kind, data in shown["worst"].items()
-    )
+    ]
     x, y = shown["worst_at"] or (0, 0)
-    return (
-        f'<div class="worst"><h4>Worst pixel: {place}</h4>'
-        f'<table class="figures">{rows}</table><div class="crops">{crops}</div>'
-        f"<p>Its surroundings; it is pixel {x + 1} from the left, {y + 1} from the top.</p></div>\n"
+    where = f"Its surroundings; it is pixel {x + 1} from the left, {y + 1} from the top."
+    worst = element(
+        "div",
+        element("h4", f"Worst pixel: {place}"),
+        markup.table(rows, class_="figures"),
+        element("div", *crops, class_="crops"),
+        element("p", where),
+        class_="worst",
     )
+    return f"{worst}\n"
 
 
 def _table(records: Sequence[Record], failed: Sequence[Record]) -> Iterable[str]:
     anchors = {id(record): f"check{index}" for index, record in enumerate(failed)}
-    yield (
-        '<section aria-labelledby="checks"><h2 id="checks">All checks</h2>\n<div class="wide">'
-        '<table><thead><tr><th scope="col">Check</th><th scope="col">Result</th>'
-        '<th scope="col">First to differ</th><th scope="col">Largest difference</th>'
-        '<th scope="col">Test</th></tr></thead><tbody>\n'
-    )
+    rows = []
     for record in records:
-        name = _text(record["name"])
         anchor = anchors.get(id(record))
         largest = max(
             (each["max_error"] or 0.0 for each in record["framebuffers"]), default=math.nan
         )
-        yield (
-            f'<tr class="{record["outcome"]}"><th scope="row">'
-            + (f'<a href="#{anchor}">{name}</a>' if anchor else name)
-            + f"</th><td>{_OUTCOMES[record['outcome']]}</td>"
-            f"<td>{_text(record['first_failure'] or '')}</td>"
-            f"<td>{'' if math.isnan(largest) else f'{largest:.4g}'}</td>"
-            f"<td><code>{_text(record['test'])}</code></td></tr>\n"
+        name = record["name"]
+        rows.append(
+            (
+                element("a", name, href=f"#{anchor}") if anchor else name,
+                element("span", _OUTCOMES[record["outcome"]], class_=record["outcome"]),
+                record["first_failure"] or "",
+                "" if math.isnan(largest) else f"{largest:.4g}",
+                element("code", record["test"]),
+            )
         )
-    yield "</tbody></table></div></section>\n"
+    head = ("Check", "Result", "First to differ", "Largest difference", "Test")
+    heading = element("h2", "All checks", id="checks")
+    table = element("div", markup.table(rows, head), class_="wide")
+    yield f"{element('section', heading, table, aria_labelledby='checks')}\n"
 
 
 def _number(value: float | None, unit: str = "") -> str:
@@ -304,4 +299,4 @@ def _number(value: float | None, unit: str = "") -> str:
 
 
 def _text(value: object) -> str:
-    return html.escape(str(value))
+    return markup.joined((value,))

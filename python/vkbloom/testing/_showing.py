@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import math
 from collections.abc import Mapping
 from typing import Any, Final
@@ -13,6 +11,8 @@ import numpy as np
 
 from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
+from vkbloom._views import markup
+from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
@@ -119,15 +119,10 @@ def as_page(found: Measured) -> str:
     spread, subject = found.spread, found.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
-    times = "".join(
-        f'<tr><th scope="row">{html.escape(name)}</th>'
-        f'<td class="n">{1000 * seconds:.3f} ms</td></tr>'
+    times = [
+        (name, element("span", f"{1000 * seconds:.3f} ms", class_="n"))
         for name, seconds in found.passes.items()
-    )
-    words = "".join(
-        f'<tr><th scope="row">{name}</th><td>{html.escape(text)}</td></tr>'
-        for name, text in figures(found).items()
-    )
+    ]
     lit = spread.radii > 0
     curve = diagram(
         "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
@@ -136,20 +131,25 @@ def as_page(found: Measured) -> str:
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
     shown |= {name: png(picture(image, name)) for name, image in pictures.items()}
-    images = "".join(
-        f'<figure><img src="data:image/png;base64,{base64.b64encode(data).decode()}" '
-        f'alt="{name}" width="{_width(name)}"><figcaption>{name}</figcaption></figure>'
+    images = [
+        markup.figure(markup.image(data, name, width=_width(name)), name)
         for name, data in shown.items()
-    )
-    name = html.escape(found.name)
+    ]
     width, height = found.size
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>vkbloom check: {name}</title>'
-        f"<style>{_STYLE}</style><body><h1>{name}</h1><p>On {html.escape(found.device)}.</p>"
-        f"<h2>Pictures</h2>{images}{curve}<h2>Laws</h2>"
-        f"{found.report._repr_html_()}"
-        f"<h2>Figures</h2><table>{words}</table>"
-        f"<h2>Passes at {width} x {height}</h2><table>{times}</table></body></html>\n"
+    return markup.page(
+        f"vkbloom check: {found.name}",
+        element("h1", found.name),
+        element("p", f"On {found.device}."),
+        element("h2", "Pictures"),
+        *images,
+        curve,
+        element("h2", "Laws"),
+        Markup(found.report._repr_html_()),
+        element("h2", "Figures"),
+        markup.table(figures(found).items()),
+        element("h2", f"Passes at {width} x {height}"),
+        markup.table(times),
+        style=_STYLE,
     )
 
 

@@ -1,0 +1,221 @@
+#include "execute/bindings.h"
+
+#include <string.h>
+
+// The layouts for passes with these descriptors after the parameters.
+struct vkb_pass_layouts {
+    enum vkb_binding_kind kind;
+    VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
+    uint32_t count;
+    struct vkb_layouts made;
+};
+
+static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
+                           struct vkb_error *error)
+{
+    return VK(error,
+              device->vk.vkCreateSampler(device->handle,
+                                         &(VkSamplerCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                             .magFilter = filter,
+                                             .minFilter = filter,
+                                             .mipmapMode = filter == VK_FILTER_LINEAR
+                                                             ? VK_SAMPLER_MIPMAP_MODE_LINEAR
+                                                             : VK_SAMPLER_MIPMAP_MODE_NEAREST,
+                                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+                                             .maxLod = VK_LOD_CLAMP_NONE,
+                                         },
+                                         NULL, sampler));
+}
+
+static const struct vkb_binding_types binding_types[VKB_BINDING_KINDS] = {
+    [VKB_BINDINGS_DRAW] = {.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER},
+    [VKB_BINDINGS_DISPATCH] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                               VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+    [VKB_BINDINGS_LOAD] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+    [VKB_BINDINGS_WORDS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                            VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
+};
+
+bool vkb_layouts_create(const struct vkb_device *device,
+                        const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
+                        uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    return VK(error, vk->vkCreateDescriptorSetLayout(
+                         device->handle,
+                         &(VkDescriptorSetLayoutCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
+                             .bindingCount = count,
+                             .pBindings = bindings,
+                         },
+                         NULL, &layouts->set))
+        && VK(error,
+              vk->vkCreatePipelineLayout(device->handle,
+                                         &(VkPipelineLayoutCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                             .setLayoutCount = 1,
+                                             .pSetLayouts = &layouts->set,
+                                             .pushConstantRangeCount = constants > 0,
+                                             .pPushConstantRanges =
+                                                 &(VkPushConstantRange){
+                                                     .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
+                                                     .size = constants,
+                                                 },
+                                         },
+                                         NULL, &layouts->pipeline));
+}
+
+void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts)
+{
+    device->vk.vkDestroyPipelineLayout(device->handle, layouts->pipeline, NULL);
+    device->vk.vkDestroyDescriptorSetLayout(device->handle, layouts->set, NULL);
+    *layouts = (struct vkb_layouts){0};
+}
+
+static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layouts *layouts,
+                           struct vkb_error *error)
+{
+    const bool draw = layouts->kind == VKB_BINDINGS_DRAW;
+    const VkShaderStageFlags stages =
+        draw ? VK_SHADER_STAGE_FRAGMENT_BIT : VK_SHADER_STAGE_COMPUTE_BIT;
+    VkDescriptorSetLayoutBinding rows[VKB_MAX_DESCRIPTORS + 1] = {
+        {
+            .binding = 0,
+            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
+            .descriptorCount = 1,
+            .stageFlags = stages | (draw ? VK_SHADER_STAGE_VERTEX_BIT : 0),
+        },
+    };
+
+    for (uint32_t i = 0; i < layouts->count; ++i)
+        rows[i + 1] = (VkDescriptorSetLayoutBinding){
+            .binding = i + 1,
+            .descriptorType = layouts->descriptors[i],
+            .descriptorCount = 1,
+            .stageFlags = stages,
+        };
+    const uint32_t constants = layouts->kind == VKB_BINDINGS_WORDS ? sizeof(struct vkb_words) : 0;
+    return vkb_layouts_create(device, rows, layouts->count + 1, constants, &layouts->made, error);
+}
+
+void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *bindings)
+{
+    for (size_t i = 0; i < bindings->layout_count; ++i)
+        vkb_layouts_destroy(device, &bindings->layouts[i].made);
+    vkb_free(bindings->layouts);
+    device->vk.vkDestroySampler(device->handle, bindings->filter, NULL);
+    device->vk.vkDestroySampler(device->handle, bindings->nearest, NULL);
+    *bindings = (struct vkb_bindings){0};
+}
+
+bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error)
+{
+    const bool filters =
+        vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
+    VkSampler *kept = filters ? &bindings->filter : &bindings->nearest;
+
+    if (!*kept
+        && !create_sampler(device, filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST, kept, error))
+        return false;
+    *sampler = *kept;
+    return true;
+}
+
+uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
+{
+    return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
+}
+
+static enum vkb_binding_kind kind_of(const struct vkb_pass_row *pass)
+{
+    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
+        return VKB_BINDINGS_DRAW;
+    return pass->reading == VKB_READING_SAMPLED ? VKB_BINDINGS_DISPATCH
+         : pass->reading == VKB_READING_LOADED  ? VKB_BINDINGS_LOAD
+                                                : VKB_BINDINGS_WORDS;
+}
+
+struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
+{
+    return binding_types[kind_of(pass)];
+}
+
+VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
+{
+    return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
+                                                   : VK_PIPELINE_BIND_POINT_GRAPHICS;
+}
+
+VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource)
+{
+    static const VkDescriptorType types[VKB_RESOURCE_KINDS] = {
+        [VKB_RESOURCE_TEXTURE] = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+        [VKB_RESOURCE_IMAGE] = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+        [VKB_RESOURCE_UNIFORM] = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
+        [VKB_RESOURCE_STORAGE] = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    };
+
+    return types[resource->kind];
+}
+
+// The descriptors after the parameters.
+static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
+{
+    struct vkb_pass_layouts layouts = {.kind = kind_of(pass)};
+    const struct vkb_binding_types types = binding_types[layouts.kind];
+
+    while (layouts.count < vkb_pass_descriptor_images(pass))
+        layouts.descriptors[layouts.count++] = types.read;
+    for (uint32_t i = 0; i < pass->resource_count; ++i)
+        layouts.descriptors[layouts.count++] = vkb_resource_descriptor(pass->resources[i]);
+    if (layouts.kind != VKB_BINDINGS_DRAW)
+        layouts.descriptors[layouts.count++] = types.target;
+    return layouts;
+}
+
+static uint32_t find_layouts(const struct vkb_bindings *bindings,
+                             const struct vkb_pass_layouts *layouts)
+{
+    uint32_t i = 0;
+
+    for (; i < bindings->layout_count; ++i) {
+        const struct vkb_pass_layouts *kept = &bindings->layouts[i];
+        if (kept->kind == layouts->kind && kept->count == layouts->count
+            && memcmp(kept->descriptors, layouts->descriptors, sizeof kept->descriptors) == 0)
+            break;
+    }
+    return i;
+}
+
+bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          const struct vkb_pass_row *pass, uint32_t *number,
+                          struct vkb_error *error)
+{
+    struct vkb_pass_layouts layouts = described(pass);
+
+    *number = find_layouts(bindings, &layouts);
+    if (*number < bindings->layout_count)
+        return true;
+    if (!vkb_grow(error, &bindings->layouts, &bindings->layout_capacity, bindings->layout_count + 1,
+                  sizeof layouts))
+        return false;
+    if (!create_layouts(device, &layouts, error)) {
+        vkb_layouts_destroy(device, &layouts.made);
+        return false;
+    }
+    bindings->layouts[bindings->layout_count++] = layouts;
+    return true;
+}
+
+const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                               const struct vkb_pass_row *pass)
+{
+    const struct vkb_pass_layouts layouts = described(pass);
+
+    return &bindings->layouts[find_layouts(bindings, &layouts)].made;
+}

@@ -1,0 +1,75 @@
+// The descriptors of a pass: samplers, descriptor set layouts and pipeline layouts. Each is created
+// at its first use.
+#ifndef VKB_BINDINGS_H
+#define VKB_BINDINGS_H
+
+#include "graph/graph.h"
+
+// The descriptors after the parameter block.
+enum vkb_binding_kind {
+    VKB_BINDINGS_DRAW,      // images, each with a sampler
+    VKB_BINDINGS_DISPATCH,  // the same, and a storage image as the target
+    VKB_BINDINGS_LOAD,      // storage images, the target is one too
+    VKB_BINDINGS_WORDS,     // images as words, and the sizes of all images as push constants
+    VKB_BINDING_KINDS
+};
+
+// Push constants: the sizes of images that are accessed as words (variants/pixels.glsl).
+struct vkb_words {
+    int32_t target[4];  // width, height, words in a row, first row of the bound buffer
+    int32_t reads[VKB_MAX_WORDS][4];  // width, height, words in a row, 0
+};
+
+// A descriptor set layout, and the pipeline layout with only this set.
+struct vkb_layouts {
+    VkDescriptorSetLayout set;
+    VkPipelineLayout pipeline;
+};
+
+// `constants`: the bytes of push constants of a compute shader. What is made before a failure is
+// left to vkb_layouts_destroy.
+bool vkb_layouts_create(const struct vkb_device *device,
+                        const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
+                        uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error);
+void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts);
+
+struct vkb_pass_layouts;
+
+struct vkb_bindings {
+    VkSampler filter, nearest;
+    struct vkb_pass_layouts *layouts;
+    size_t layout_count, layout_capacity;
+};
+
+// Destroying a zeroed object is safe.
+void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *bindings);
+
+// The sampler for images of the format. If the device cannot filter the format, shaders only fetch
+// texels from it.
+bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error);
+
+// Creates the layouts of a pass, if they are not there. *number differs between layouts.
+bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,
+                          const struct vkb_pass_row *pass, uint32_t *number,
+                          struct vkb_error *error);
+
+VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource);
+
+// The number of images that the pass reads through descriptors, with the scene's cubemap or
+// textures.
+uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
+
+// The types of the descriptors of the images that the pass reads, and of its target.
+struct vkb_binding_types {
+    VkDescriptorType read, target;
+};
+struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass);
+
+VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
+
+// The layouts of a pass that vkb_bindings_prepare has made.
+const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                               const struct vkb_pass_row *pass);
+
+#endif

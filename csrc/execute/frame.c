@@ -1,0 +1,434 @@
+#include "execute/frame.h"
+
+#include "share/exported_images.h"
+#include "transfer/sources.h"
+
+#include <string.h>
+
+static const struct vkb_sink *const sinks[] = {&vkb_host_sink, &vkb_cuda_sink, &vkb_screen_sink};
+enum { SINK_COUNT = sizeof sinks / sizeof sinks[0] };
+
+bool vkb_frame_create(const struct vkb_device *device, const void *cache_data, size_t cache_size,
+                      struct vkb_frame *frame, struct vkb_error *error)
+{
+    *frame = (struct vkb_frame){0};
+    return vkb_pipelines_create(device, cache_data, cache_size, &frame->pipelines, error);
+}
+
+void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
+{
+    while (frame->screens)
+        vkb_screen_destroy(device, frame->screens, &frame->screens);
+    vkb_submissions_destroy(device, &frame->submissions);
+    vkb_buffer_destroy(device, &frame->constants);
+    vkb_image_cache_destroy(device, &frame->cache);
+    vkb_resources_destroy(device, &frame->resources);
+    vkb_strided_copy_destroy(device, &frame->strided_copies);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        vkb_upload_destroy(device, &frame->uploads[kind]);
+    vkb_scene_destroy(device, &frame->scene);
+    vkb_pipelines_destroy(device, &frame->pipelines);
+    vkb_planner_destroy(&frame->planner);
+    *frame = (struct vkb_frame){0};
+}
+
+static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
+{
+    const uint32_t resources = sets * VKB_MAX_RESOURCES;
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    struct vkb_submission *submission = run->submission;
+
+    if (sets <= submission->descriptor_capacity)
+        return VK(error,
+                  vk->vkResetDescriptorPool(run->device->handle, submission->descriptors, 0));
+    vk->vkDestroyDescriptorPool(run->device->handle, submission->descriptors, NULL);
+    submission->descriptors = VK_NULL_HANDLE;
+    submission->descriptor_capacity = 0;
+    if (!VK(error, vk->vkCreateDescriptorPool(
+                       run->device->handle,
+                       &(VkDescriptorPoolCreateInfo){
+                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
+                           .maxSets = sets,
+                           .poolSizeCount = 5,
+                           .pPoolSizes =
+                               (VkDescriptorPoolSize[]){
+                                   {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets + resources},
+                                   {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                    sets * VKB_MAX_READS + resources},
+                                   {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+                                    sets * (VKB_MAX_LOADS + 1) + resources},
+                                   {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
+                                   {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets + resources},
+                               },
+                       },
+                       NULL, &submission->descriptors)))
+        return false;
+    submission->descriptor_capacity = sets;
+    return true;
+}
+
+// Reserves what the passes of the requests can need.
+static bool reserve(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
+                    struct vkb_error *error)
+{
+    const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
+    const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
+    const struct vkb_scene *scene = &run->frame->scene;
+    const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
+    struct vkb_submission *submission = run->submission;
+    uint32_t passes = 0, sets = 0;
+
+    for (uint32_t i = 0; i < request_count; ++i) {
+        const struct vkb_plan *plan = requests[i].plan;
+        passes += plan->graph.pass_count;
+        sets += vkb_record_sets(run->device, &plan->graph) + surfaces + VKB_INPUT_COUNT
+              + plan->output_count;
+    }
+    return reserve_descriptors(run, sets, error)
+        && vkb_timer_reserve(run->device, passes, &submission->timer, error)
+        && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
+                              params * passes, &submission->uniforms, error);
+}
+
+static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
+                       struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_submission *submission = run->submission;
+    struct vkb_scene *scene = &run->frame->scene;
+
+    if (scene->serial == data->serial)
+        return true;
+    if (!vkb_submissions_wait(device, &run->frame->submissions, error)
+        || !vkb_scene_begin(device, &submission->commands, data, scene, error)
+        || !vkb_submission_submit(device, submission, NULL, error)
+        || !vkb_submission_wait(device, &run->frame->submissions, submission, error))
+        return false;
+    vkb_scene_end(device, data, scene);
+    return true;
+}
+
+// Whether the image holds the pixels of the row.
+static bool holds_constant(const struct vkb_cached_image *cached, const struct vkb_image_row *row)
+{
+    return cached->content.valid && cached->content.version == row->serial;
+}
+
+static size_t size_of_pixels(const struct vkb_image_row *row)
+{
+    return (size_t)row->width * row->height * vkb_pixel_size(row->format);
+}
+
+// Finds the images of the graph that are filled once and do not hold their pixels. Returns the size
+// of these in *size.
+static bool find_constants(struct vkb_run *run, const void **pixels, size_t *size,
+                           struct vkb_error *error)
+{
+    const size_t most = sizeof run->constants / sizeof run->constants[0];
+
+    *size = 0;
+    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
+        const struct vkb_image_row *row = &run->graph->images[i];
+        if (!row->serial)
+            continue;
+        if (!vkb_run_resolve(run, i, error))
+            return false;
+        if (holds_constant(run->images[i], row))
+            continue;
+        if (run->constant_count == most)
+            return vkb_fail(error, VKB_ERROR_GENERAL, "graph: more than %zu images are filled once",
+                            most);
+        run->images[i]->content.valid = false;
+        run->images[i]->content.version = row->serial;
+        pixels[run->constant_count] = row->pixels;
+        run->constant_starts[run->constant_count] = *size;
+        run->constants[run->constant_count++] = run->images[i];
+        *size += size_of_pixels(row);
+    }
+    return true;
+}
+
+static bool stage_constants(struct vkb_run *run, struct vkb_error *error)
+{
+    const void *pixels[sizeof run->constants / sizeof run->constants[0]];
+    struct vkb_buffer *staging = &run->frame->constants;
+    size_t size;
+
+    if (!find_constants(run, pixels, &size, error))
+        return false;
+    if (size == 0)
+        return true;
+    if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+        || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                               size, staging, error))
+        return false;
+    for (uint32_t i = 0; i < run->constant_count; ++i) {
+        const size_t start = run->constant_starts[i];
+        const size_t end = i + 1 < run->constant_count ? run->constant_starts[i + 1] : size;
+        memcpy((char *)staging->mapped + start, pixels[i], end - start);
+    }
+    return vkb_buffer_flush(run->device, staging, error);
+}
+
+static void record_constants(struct vkb_run *run)
+{
+    for (uint32_t i = 0; i < run->constant_count; ++i) {
+        struct vkb_image *image = &run->constants[i]->image;
+        VkBufferImageCopy copy = {
+            .bufferOffset = run->constant_starts[i],
+            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+            .imageExtent = {image->width, image->height, 1},
+        };
+        vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                             VKB_ACCESS_COPY_TARGET);
+        run->device->vk.vkCmdCopyBufferToImage(
+            run->submission->commands.buffer, run->frame->constants.handle, image->handle,
+            vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
+        run->constants[i]->content.valid = true;
+    }
+}
+
+// `next` is the following request; NULL: `request` is the last one.
+static bool record_request(struct vkb_run *run, struct vkb_request *request,
+                           const struct vkb_request *next, struct vkb_error *error)
+{
+    struct vkb_submission *submission = run->submission;
+    struct vkb_frame *frame = run->frame;
+    const struct vkb_graph *graph = &request->plan->graph;
+    const struct vkb_plan_step step = {
+        .plan = request->plan,
+        .next = next ? &next->plan->graph : NULL,
+        .contents = run->contents,
+        .source = vkb_sources_version(run),
+        .scene = frame->scene.serial,
+    };
+
+    run->request = request;
+    run->graph = graph;
+    request->timing_count = 0;
+    request->first_span = submission->timer.span_count;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        vkb_run_set_image(run, i,
+                          graph->images[i].input != VKB_INPUT_NONE
+                              ? run->inputs[graph->images[i].input].image
+                              : vkb_image_cache_find(&frame->cache, &graph->images[i]));
+    if (!vkb_planner_mark(&frame->planner, &step, error))
+        return false;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (frame->planner.wanted[i] && !vkb_run_resolve(run, i, error))
+            return false;
+    if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
+        return false;
+    for (size_t i = 0; i < SINK_COUNT; ++i)
+        if (sinks[i]->record && !sinks[i]->record(run, error))
+            return false;
+    return true;
+}
+
+static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
+                              uint32_t request_count, struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_submission *submission = run->submission;
+    VkCommandBuffer commands = submission->commands.buffer;
+
+    for (size_t i = 0; i < SINK_COUNT; ++i)
+        if (sinks[i]->prepare && !sinks[i]->prepare(run, requests, request_count, error))
+            return false;
+    if (run->show && !run->show->acquired)
+        return true;
+    if (!vkb_commands_begin(device, &submission->commands, error))
+        return false;
+    vkb_timer_reset(device, commands, &submission->timer);
+    if (!vkb_sources_record(run, error))
+        return false;
+    record_constants(run);
+    for (uint32_t i = 0; i < request_count; ++i)
+        if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
+                            error))
+            return false;
+    vkb_barrier_record_host_read(device, commands);
+    // Not earlier: the host records while CUDA copies the inputs.
+    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_wait(run, error)
+        && vkb_submission_submit(device, submission, &run->sync, error);
+}
+
+static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
+                   struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
+{
+    run->graph = &requests[0].plan->graph;
+    return (!source->scene || load_scene(run, source->scene, error))
+        && vkb_sources_stage(run, source, requests, request_count, error)
+        && stage_constants(run, error) && reserve(run, requests, request_count, error)
+        && record_and_submit(run, requests, request_count, error);
+}
+
+// After a failure it is unknown what the device did, so images and commands are created again. The
+// images are created later, when no submission is pending, since a wait here could not be
+// interrupted.
+static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_submission *submission, const struct vkb_error *error)
+{
+    frame->stale = true;
+    device->lost = device->lost || error->kind == VKB_ERROR_DEVICE_LOST;
+    if (!submission->pending)
+        vkb_commands_destroy(device, &submission->commands);
+}
+
+static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+{
+    if (!frame->stale)
+        return true;
+    if (!vkb_submissions_wait(device, &frame->submissions, error))
+        return false;
+    vkb_image_cache_destroy(device, &frame->cache);
+    vkb_resources_destroy(device, &frame->resources);
+    frame->stale = false;
+    return true;
+}
+
+// Begins a submission: destroys cached objects that are old and that no pending submission uses.
+static void trim(const struct vkb_device *device, struct vkb_frame *frame,
+                 struct vkb_submission *submission)
+{
+    submission->number = ++frame->submitted;
+    const struct vkb_age age = {
+        .now = submission->number,
+        .pending = vkb_submissions_pending(&frame->submissions, submission->number),
+    };
+
+    vkb_pipelines_trim(device, &frame->pipelines, &age);
+    vkb_image_cache_trim(device, &frame->cache, &age);
+    vkb_resources_trim(device, &frame->resources, &age);
+}
+
+struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
+{
+    return (struct vkb_cached){
+        .pipelines = frame->pipelines.entry_count,
+        .framebuffers = frame->cache.framebuffer_count,
+        .image_bytes = vkb_image_cache_size(&frame->cache),
+    };
+}
+
+bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
+                      const struct vkb_frame_source *source, struct vkb_request *requests,
+                      uint32_t request_count, struct vkb_show *show,
+                      struct vkb_submission **submission, struct vkb_error *error)
+{
+    struct vkb_run run = {.device = device, .frame = frame, .show = show};
+    // All requests have the same images.
+    const uint32_t image_count = requests[0].plan->graph.image_count;
+    bool done;
+
+    if (!renew(device, frame, error)
+        || !vkb_submissions_take(device, &frame->submissions, &run.submission, error))
+        return false;
+    trim(device, frame, run.submission);
+    done = (run.images = vkb_alloc(error, image_count, sizeof *run.images))
+        && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
+        && submit(&run, source, requests, request_count, error);
+    vkb_free(run.images);
+    vkb_free(run.contents);
+    if (done && (!show || show->acquired)) {
+        run.submission->requests = requests;
+        run.submission->request_count = request_count;
+        for (uint32_t i = 0; i < request_count; ++i)
+            requests[i].non_finite = frame->non_finite;
+        *submission = run.submission;
+        vkb_sources_end(&run, source, true);
+        for (size_t i = 0; i < SINK_COUNT; ++i)
+            done = (!sinks[i]->finish || sinks[i]->finish(&run, requests, request_count, error))
+                && done;
+        return done;
+    }
+    if (!done) {
+        vkb_sources_end(&run, source, false);
+        fail_frame(device, frame, run.submission, error);
+    }
+    vkb_submissions_give_back(device, &frame->submissions, run.submission);
+    return done;
+}
+
+// Adds up timings with the same name: they are steps of one pass.
+static void merge_timings(struct vkb_request *request)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < request->timing_count; ++i) {
+        uint32_t at = 0;
+        while (at < count && strcmp(request->timings[at].name, request->timings[i].name) != 0)
+            ++at;
+        if (at < count)
+            request->timings[at].seconds += request->timings[i].seconds;
+        else
+            request->timings[count++] = request->timings[i];
+    }
+    request->timing_count = count;
+}
+
+// Reads timings and outputs of a submission that the device has finished.
+static void fetch(const struct vkb_device *device, const struct vkb_submission *submission)
+{
+    for (uint32_t i = 0; i < submission->request_count; ++i) {
+        struct vkb_request *request = &submission->requests[i];
+        if (submission->readback.counted) {
+            const uint32_t *counts = submission->readback.counts.mapped;
+            vkb_add_non_finite(&request->non_finite, (struct vkb_non_finite){counts[0], counts[1]});
+            for (uint32_t layer = 0; layer < request->plan->graph.layers; ++layer) {
+                const uint32_t *own = counts + layer * (VKB_COUNTS_SIZE / sizeof *counts);
+                request->layer_non_finite[layer] = (struct vkb_non_finite){own[0], own[1]};
+            }
+        }
+        for (uint32_t timing = 0; timing < request->timing_count; ++timing)
+            request->timings[timing].seconds =
+                vkb_timer_seconds(device, &submission->timer, request->first_span + timing);
+        merge_timings(request);
+        for (uint32_t output = 0; output < request->plan->output_count; ++output)
+            vkb_readback_fetch(&submission->readback, &request->outputs[output]);
+    }
+}
+
+bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
+                       struct vkb_submission *submission, bool *over, struct vkb_error *error)
+{
+    *over = vkb_submission_wait(device, &frame->submissions, submission, error);
+    const bool done = *over && vkb_readback_end(device, &submission->readback, error)
+                   && vkb_timer_fetch(device, &submission->timer, error);
+
+    if (done)
+        fetch(device, submission);
+    else if (error->kind != VKB_ERROR_INTERRUPTED)
+        fail_frame(device, frame, submission, error);
+    if (*over)
+        vkb_submissions_give_back(device, &frame->submissions, submission);
+    return done;
+}
+
+bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
+                    struct vkb_submission *submission)
+{
+    struct vkb_error error;
+
+    if (!vkb_submission_over(device, submission))
+        return false;
+    // A wait is interruptible and takes the GIL, which the caller holds.
+    if (submission->pending && !vkb_commands_reset(device, &submission->commands, &error))
+        return false;
+    submission->pending = false;
+    vkb_submissions_give_back(device, &frame->submissions, submission);
+    return true;
+}
+
+bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vkb_error *error)
+{
+    if (!vkb_submissions_end(device, &frame->submissions, error))
+        return false;
+    // A lost device has ended everything, except one that is lost because it does not end.
+    if (!frame->screens || (device->lost && !device->timed_out))
+        return true;
+    // The first wait may fail for lack of memory, too.
+    return vkb_device_wait_idle(device, error)
+        || (error->kind != VKB_ERROR_INTERRUPTED && error->result != VK_TIMEOUT
+            && (vkb_device_wait_idle(device, error) || error->result == VK_ERROR_DEVICE_LOST));
+}

@@ -1,0 +1,312 @@
+#include "execute/image_cache.h"
+
+#include "execute/limits.h"
+#include "vulkan/labels.h"
+
+#include <string.h>
+
+// Keys are compared byte by byte. All members have 64 bits, so there is no padding.
+struct framebuffer_key {
+    VkRenderPass render_pass;
+    uint64_t images[VKB_MAX_TARGETS + 1];
+};
+_Static_assert(sizeof(struct framebuffer_key) == (VKB_MAX_TARGETS + 2) * sizeof(uint64_t),
+               "a framebuffer's key has padding");
+
+struct vkb_framebuffer_entry {
+    struct framebuffer_key key;
+    VkFramebuffer handle;
+};
+
+// Destroys the framebuffers of an image that will be destroyed. No image has the id 0.
+static void destroy_framebuffers(const struct vkb_device *device, struct vkb_image_cache *cache,
+                                 uint64_t image_id)
+{
+    for (size_t i = image_id ? cache->framebuffer_count : 0; i-- > 0;) {
+        struct vkb_framebuffer_entry *entry = &cache->framebuffers[i];
+        bool uses = false;
+        for (uint32_t target = 0; target <= VKB_MAX_TARGETS; ++target)
+            uses |= entry->key.images[target] == image_id;
+        if (!uses)
+            continue;
+        device->vk.vkDestroyFramebuffer(device->handle, entry->handle, NULL);
+        *entry = cache->framebuffers[--cache->framebuffer_count];
+    }
+}
+
+void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache)
+{
+    for (size_t i = 0; i < cache->count; ++i) {
+        struct vkb_cached_image *cached = cache->images[i];
+        destroy_framebuffers(device, cache, cached->image_id);
+        vkb_image_destroy(device, &cached->image);
+        vkb_free(cached->content.recipe);
+        vkb_free(cached);
+    }
+    vkb_free(cache->images);
+    vkb_free(cache->framebuffers);
+    // The clock continues, so that ids and versions stay unique.
+    *cache = (struct vkb_image_cache){.clock = cache->clock, .now = cache->now};
+}
+
+// Destroys the image and keeps its entry, since there are only a few names.
+static void destroy_image(const struct vkb_device *device, struct vkb_image_cache *cache,
+                          struct vkb_cached_image *cached)
+{
+    cached->content.valid = false;
+    destroy_framebuffers(device, cache, cached->image_id);
+    vkb_image_destroy(device, &cached->image);
+}
+
+static uint64_t image_size(const struct vkb_image *image)
+{
+    return image->handle ? (uint64_t)image->width * image->height * image->layers
+                               * vkb_pixel_size(image->format)
+                         : 0;
+}
+
+uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
+{
+    uint64_t size = 0;
+
+    for (size_t i = 0; i < cache->count; ++i)
+        size += image_size(&cache->images[i]->image);
+    return size;
+}
+
+void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
+                          const struct vkb_age *age)
+{
+    uint64_t size = vkb_image_cache_size(cache);
+    const uint64_t left = size > VKB_KEPT_IMAGE_BYTES ? VKB_KEPT_IMAGE_BYTES / 2 : size;
+
+    cache->now = age->now;
+    while (size > left) {
+        struct vkb_cached_image *oldest = NULL;
+        for (size_t i = 0; i < cache->count; ++i)
+            if (cache->images[i]->image.handle
+                && (!oldest || cache->images[i]->used < oldest->used))
+                oldest = cache->images[i];
+        if (!oldest || !vkb_is_old(oldest->used, age))
+            return;
+        size -= image_size(&oldest->image);
+        destroy_image(device, cache, oldest);
+    }
+}
+
+static VkImageUsageFlags image_usage(const struct vkb_device *device, enum vkb_format format)
+{
+    // No pass reads depth.
+    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
+         | (format == VKB_FORMAT_DEPTH32_FLOAT
+                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
+                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
+                      | (device->dispatch ? VK_IMAGE_USAGE_STORAGE_BIT : 0));
+}
+
+bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
+                         struct vkb_error *error)
+{
+    const enum vkb_format format = row->format;
+    const VkFormatFeatureFlags features =
+        format == VKB_FORMAT_DEPTH32_FLOAT
+            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
+            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
+
+    if (!vkb_device_supports(device, format, features))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
+                        device->adapter.name, vkb_formats[format].name);
+    return true;
+}
+
+static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
+                         uint32_t image, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[image].format;
+
+    if (!vkb_image_row_check(device, &graph->images[image], error))
+        return false;
+    if (vkb_graph_blends(graph, image)
+        && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the adapter %s cannot add up layers in %s images, but in %s it can",
+                        device->adapter.name, vkb_formats[format].name,
+                        vkb_formats[VKB_FORMAT_RGBA16_FLOAT].name);
+    return true;
+}
+
+// Dispatches that variants chose do not come here without them.
+static bool check_passes(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        if (pass->geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
+            return vkb_fail(error, VKB_ERROR_GENERAL,
+                            "the compute shaders of %s cannot write images, which the pass %s "
+                            "needs",
+                            device->adapter.name, pass->name);
+        // Plans without a renderer know no limits.
+        if (pass->block == VKB_BLOCK_own && device->handle
+            && !vkb_limits_check(device, pass, error))
+            return false;
+    }
+    return true;
+}
+
+// The images of a convolution, which are many times larger than the frame, must fit the largest
+// heap of the device together.
+static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    const uint64_t needed = vkb_graph_size(graph);
+    uint64_t largest = 0;
+    bool convolves = false;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        convolves = convolves || graph->images[i].serial;
+    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
+        if (device->memory.memoryHeaps[i].size > largest)
+            largest = device->memory.memoryHeaps[i].size;
+    // Plans without a renderer know no heaps.
+    if (convolves && largest && needed > largest)
+        return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+                        "memory is short: %llu MiB of images are needed, and the adapter %s has "
+                        "%llu; use a smaller bloom_scale or kernel_size",
+                        (unsigned long long)(needed >> 20), device->adapter.name,
+                        (unsigned long long)(largest >> 20));
+    return true;
+}
+
+bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                           struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (!check_format(device, graph, i, error))
+            return false;
+    return check_passes(device, graph, error) && check_memory(device, graph, error);
+}
+
+bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
+                          struct vkb_image *image, struct vkb_error *error)
+{
+    return vkb_image_create(device,
+                            &(struct vkb_image_spec){
+                                .format = row->format,
+                                .width = row->width,
+                                .height = row->height,
+                                .layers = row->layers ? row->layers : 1,
+                                .levels = 1,
+                                .array = row->layers > 0,
+                                .usage = image_usage(device, row->format),
+                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+                            },
+                            image, error);
+}
+
+static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache,
+                                            const struct vkb_image_row *row)
+{
+    for (size_t i = 0; i < cache->count; ++i)
+        if (cache->images[i]->array == (row->layers > 0)
+            && strcmp(cache->images[i]->name, row->name) == 0)
+            return cache->images[i];
+    return NULL;
+}
+
+static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache,
+                                           const struct vkb_image_row *row, struct vkb_error *error)
+{
+    struct vkb_cached_image *cached =
+        vkb_append(error, &cache->images, &cache->count, &cache->capacity, sizeof *cached);
+
+    if (cached) {
+        memcpy(cached->name, row->name, sizeof cached->name);
+        cached->array = row->layers > 0;
+    }
+    return cached;
+}
+
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+{
+    return image->handle && image->format == row->format && image->width == row->width
+        && image->height == row->height && image->layers == (row->layers ? row->layers : 1)
+        && image->array == (row->layers > 0);
+}
+
+bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
+{
+    const struct vkb_cached_image *cached = find_cached(cache, row);
+
+    return cached && cached->image.handle && !vkb_image_fits(&cached->image, row);
+}
+
+struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
+                                              const struct vkb_image_row *row)
+{
+    struct vkb_cached_image *cached = find_cached(cache, row);
+
+    return cached && vkb_image_fits(&cached->image, row) ? cached : NULL;
+}
+
+bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
+                             const struct vkb_image_row *row, struct vkb_cached_image **resolved,
+                             struct vkb_error *error)
+{
+    struct vkb_cached_image *cached = find_cached(cache, row);
+
+    if (!cached && !(cached = add_cached(cache, row, error)))
+        return false;
+    *resolved = cached;
+    cached->used = cache->now;
+    if (vkb_image_fits(&cached->image, row))
+        return true;
+    destroy_image(device, cache, cached);
+    cached->image_id = ++cache->clock;
+    if (!vkb_image_create_row(device, row, &cached->image, error))
+        return false;
+    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
+    if (cached->image.buffer)
+        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
+    return true;
+}
+
+bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,
+                                 struct vkb_cached_image **targets, uint32_t target_count,
+                                 VkRenderPass render_pass, VkFramebuffer *framebuffer,
+                                 struct vkb_error *error)
+{
+    struct framebuffer_key key;
+    VkImageView views[VKB_MAX_TARGETS + 1];
+
+    memset(&key, 0, sizeof key);
+    key.render_pass = render_pass;
+    for (uint32_t i = 0; i < target_count; ++i) {
+        views[i] = targets[i]->image.view;
+        key.images[i] = targets[i]->image_id;
+    }
+    for (size_t i = 0; i < cache->framebuffer_count; ++i)
+        if (memcmp(&cache->framebuffers[i].key, &key, sizeof key) == 0) {
+            *framebuffer = cache->framebuffers[i].handle;
+            return true;
+        }
+    if (!vkb_grow(error, &cache->framebuffers, &cache->framebuffer_capacity,
+                  cache->framebuffer_count + 1, sizeof *cache->framebuffers)
+        || !VK(error, device->vk.vkCreateFramebuffer(
+                          device->handle,
+                          &(VkFramebufferCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO,
+                              .renderPass = render_pass,
+                              .attachmentCount = target_count,
+                              .pAttachments = views,
+                              .width = targets[0]->image.width,
+                              .height = targets[0]->image.height,
+                              .layers = 1,
+                          },
+                          NULL, framebuffer)))
+        return false;
+    struct vkb_framebuffer_entry *entry = &cache->framebuffers[cache->framebuffer_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *framebuffer;
+    return true;
+}

@@ -1,0 +1,74 @@
+// The images that are kept from frame to frame, each under its name and with a description of how
+// it was made. An image is replaced when a graph needs another size or format. It is destroyed when
+// it is old and the images take much memory.
+#ifndef VKB_IMAGE_CACHE_H
+#define VKB_IMAGE_CACHE_H
+
+#include "execute/age.h"
+#include "graph/plan.h"
+#include "vulkan/memory.h"
+
+struct vkb_cached_image {
+    char name[VKB_NAME_SIZE];
+    bool array;  // the images of batches are other ones
+    struct vkb_image image;
+    uint64_t image_id;  // new each time that the image is created
+    uint64_t used;      // the last submission that used it
+    struct vkb_content content;
+};
+
+struct vkb_framebuffer_entry;
+
+struct vkb_image_cache {
+    struct vkb_cached_image **images;  // pointers, since the elements must not move
+    size_t count, capacity;
+    uint64_t clock;  // the last id or version that was assigned
+    uint64_t now;    // the number of the submission that uses them
+    struct vkb_framebuffer_entry *framebuffers;
+    size_t framebuffer_count, framebuffer_capacity;
+};
+
+// Bytes of all images' pixels.
+uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache);
+
+// Begins a submission. If the images take more than VKB_KEPT_IMAGE_BYTES, the old ones are
+// destroyed with their framebuffers, the oldest first, until they take half of that.
+enum { VKB_KEPT_IMAGE_BYTES = 256 << 20 };
+void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
+                          const struct vkb_age *age);
+
+void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache);
+
+// Checks that the device supports the graph's images, with the usage that the passes need.
+bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
+                           struct vkb_error *error);
+
+// The same for one row, without the usage that only passes need.
+bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
+                         struct vkb_error *error);
+// Whether the image has the row's size and format; and the creation of such an image outside of the
+// cache.
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row);
+bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
+                          struct vkb_image *image, struct vkb_error *error);
+
+// Finds the cached image of a row; NULL if there is none of its size and format.
+struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
+                                              const struct vkb_image_row *row);
+
+// Whether vkb_image_cache_resolve would replace an image of another size or format. Pending
+// commands must not use the replaced image.
+bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row);
+
+// Finds or creates the cached image of a row.
+bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
+                             const struct vkb_image_row *row, struct vkb_cached_image **cached,
+                             struct vkb_error *error);
+
+// The framebuffer of these targets. It is kept until one of their images is replaced.
+bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,
+                                 struct vkb_cached_image **targets, uint32_t target_count,
+                                 VkRenderPass render_pass, VkFramebuffer *framebuffer,
+                                 struct vkb_error *error);
+
+#endif

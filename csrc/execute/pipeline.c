@@ -1,0 +1,473 @@
+#include "execute/pipeline.h"
+
+#include "scene/scene.h"
+#include "spirv/specialize.h"
+
+#include <string.h>
+
+// Keys are compared byte by byte, so they have no padding.
+struct render_pass_key {
+    enum vkb_format formats[VKB_MAX_TARGETS];
+    enum vkb_format depth_format;
+    uint32_t target_count;
+    enum vkb_load load;
+    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
+    uint32_t use_count;
+};
+_Static_assert(sizeof(struct render_pass_key)
+                   == (VKB_MAX_TARGETS + 4) * sizeof(uint32_t)
+                          + sizeof(struct vkb_target_use[VKB_MAX_TARGETS + 1]),
+               "a render pass's key has padding");
+
+struct vkb_render_pass_entry {
+    struct render_pass_key key;
+    VkRenderPass handle;
+};
+
+struct pipeline_key {
+    VkRenderPass render_pass;
+    struct vkb_hash vertex, shader;
+    uint32_t geometry;         // enum vkb_geometry
+    uint32_t textured, blend;  // enum vkb_blend
+    uint32_t target_count;
+    uint32_t layout;  // the number of the layouts
+    struct vkb_constants constants;
+};
+_Static_assert(sizeof(struct pipeline_key)
+                   == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
+                          + (5 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+               "a pipeline's key has padding");
+
+struct vkb_pipeline_entry {
+    struct pipeline_key key;
+    VkPipeline handle;
+    uint64_t used;  // the last submission that used it
+};
+
+bool vkb_pipelines_create(const struct vkb_device *device, const void *cache_data,
+                          size_t cache_size, struct vkb_pipelines *pipelines,
+                          struct vkb_error *error)
+{
+    *pipelines = (struct vkb_pipelines){0};
+    return VK(error, device->vk.vkCreatePipelineCache(
+                         device->handle,
+                         &(VkPipelineCacheCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO,
+                             .initialDataSize = cache_size,
+                             .pInitialData = cache_data,
+                         },
+                         NULL, &pipelines->cache));
+}
+
+void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines *pipelines)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    for (size_t i = 0; i < pipelines->entry_count; ++i)
+        vk->vkDestroyPipeline(device->handle, pipelines->entries[i].handle, NULL);
+    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
+        vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
+    vkb_bindings_destroy(device, &pipelines->bindings);
+    vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
+    vkb_free(pipelines->entries);
+    vkb_free(pipelines->render_passes);
+    *pipelines = (struct vkb_pipelines){0};
+}
+
+void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                        const struct vkb_age *age)
+{
+    const size_t left = pipelines->entry_count > VKB_KEPT_PIPELINES ? VKB_KEPT_PIPELINES / 2
+                                                                    : pipelines->entry_count;
+
+    pipelines->now = age->now;
+    while (pipelines->entry_count > left) {
+        struct vkb_pipeline_entry *oldest = &pipelines->entries[0];
+        for (size_t i = 1; i < pipelines->entry_count; ++i)
+            if (pipelines->entries[i].used < oldest->used)
+                oldest = &pipelines->entries[i];
+        if (!vkb_is_old(oldest->used, age))
+            return;
+        device->vk.vkDestroyPipeline(device->handle, oldest->handle, NULL);
+        *oldest = pipelines->entries[--pipelines->entry_count];
+    }
+}
+
+bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                        void **data, size_t *size, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    *data = NULL;
+    if (!VK(error, vk->vkGetPipelineCacheData(device->handle, pipelines->cache, size, NULL)))
+        return false;
+    *data = vkb_alloc(error, *size, 1);
+    if (!*data)
+        return false;
+    if (VK(error, vk->vkGetPipelineCacheData(device->handle, pipelines->cache, size, *data)))
+        return true;
+    vkb_free(*data);
+    *data = NULL;
+    return false;
+}
+
+// Colour images whose memory is also a buffer stay in the general layout.
+static VkImageLayout attachment_layout(const struct vkb_device *device, enum vkb_format format,
+                                       enum vkb_access access)
+{
+    return device->words && format != VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_LAYOUT_GENERAL
+                                                               : vkb_access_layout(access);
+}
+
+static VkAttachmentDescription describe_attachment(const struct vkb_device *device,
+                                                   enum vkb_format format, enum vkb_load load,
+                                                   const struct vkb_target_use *use)
+{
+    enum vkb_access last = use->after == VKB_ACCESS_NONE ? use->during : use->after;
+
+    return (VkAttachmentDescription){
+        .format = vkb_formats[format].vk,
+        .samples = VK_SAMPLE_COUNT_1_BIT,
+        .loadOp =
+            load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        // Depth is stored, since it is a framebuffer. (The forward system's source discards it.)
+        .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
+        .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
+        .initialLayout = VK_IMAGE_LAYOUT_UNDEFINED,
+        .finalLayout = attachment_layout(device, format, last),
+    };
+}
+
+static bool create_render_pass(const struct vkb_device *device, const struct render_pass_key *key,
+                               VkRenderPass *handle, struct vkb_error *error)
+{
+    VkAttachmentDescription attachments[VKB_MAX_TARGETS + 1];
+    VkAttachmentReference references[VKB_MAX_TARGETS];
+    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
+    const bool depth = key->depth_format != VKB_FORMAT_NONE;
+    // In `uses` the depth comes first, in `attachments` the colours.
+    const struct vkb_target_use *colour_uses = key->uses + depth;
+
+    for (uint32_t i = 0; i < key->target_count; ++i) {
+        attachments[i] = describe_attachment(device, key->formats[i], key->load, &colour_uses[i]);
+        references[i] = (VkAttachmentReference){
+            i, attachment_layout(device, key->formats[i], VKB_ACCESS_COLOR_TARGET)};
+    }
+    if (depth)
+        attachments[key->target_count] =
+            describe_attachment(device, key->depth_format, VKB_LOAD_CLEAR, &key->uses[0]);
+    return VK(error,
+              device->vk.vkCreateRenderPass(
+                  device->handle,
+                  &(VkRenderPassCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO,
+                      .attachmentCount = key->target_count + depth,
+                      .pAttachments = attachments,
+                      .subpassCount = 1,
+                      .pSubpasses =
+                          &(VkSubpassDescription){
+                              .pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS,
+                              .colorAttachmentCount = key->target_count,
+                              .pColorAttachments = references,
+                              .pDepthStencilAttachment =
+                                  depth ? &(VkAttachmentReference){key->target_count,
+                                                                   vkb_access_layout(
+                                                                       VKB_ACCESS_DEPTH_TARGET)}
+                                        : NULL,
+                          },
+                      .dependencyCount =
+                          vkb_subpass_dependencies(key->uses, key->use_count, dependencies),
+                      .pDependencies = dependencies,
+                  },
+                  NULL, handle));
+}
+
+// Where colour images are always in the general layout, their render passes need not know who reads
+// them. So render passes of the same formats share their pipelines, which a CPU compiles slowly.
+static void generalize(struct vkb_target_use *uses, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i)
+        if (uses[i].during != VKB_ACCESS_DEPTH_TARGET)
+            uses[i].before = uses[i].after = VKB_ACCESS_ANY_READ;
+}
+
+bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                               const struct vkb_graph *graph, uint32_t first, uint32_t end,
+                               VkRenderPass *render_pass, struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = &graph->passes[first];
+    struct render_pass_key key;
+
+    memset(&key, 0, sizeof key);
+    key.target_count = pass->target_count;
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        key.formats[i] = graph->images[pass->targets[i]].format;
+    if (pass->depth != VKB_NO_IMAGE)
+        key.depth_format = graph->images[pass->depth].format;
+    key.load = pass->load;
+    key.use_count = vkb_graph_target_uses(graph, first, end, key.uses);
+    if (device->words)
+        generalize(key.uses, key.use_count);
+
+    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
+        if (memcmp(&pipelines->render_passes[i].key, &key, sizeof key) == 0) {
+            *render_pass = pipelines->render_passes[i].handle;
+            return true;
+        }
+    if (!vkb_grow(error, &pipelines->render_passes, &pipelines->render_pass_capacity,
+                  pipelines->render_pass_count + 1, sizeof *pipelines->render_passes)
+        || !create_render_pass(device, &key, render_pass, error))
+        return false;
+    struct vkb_render_pass_entry *entry = &pipelines->render_passes[pipelines->render_pass_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *render_pass;
+    return true;
+}
+
+static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
+                                                    VkShaderModule module)
+{
+    return (VkPipelineShaderStageCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+        .stage = stage,
+        .module = module,
+        .pName = "main",
+    };
+}
+
+static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
+                          const struct vkb_constants *constants, VkShaderModule *module,
+                          struct vkb_error *error)
+{
+    uint32_t *code;
+    size_t size;
+
+    if (!vkb_specialize(shader, constants, &code, &size, error))
+        return false;
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
+    vkb_free(code);
+    return done;
+}
+
+bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
+                        const struct vkb_shader *shader, const struct vkb_constants *constants,
+                        VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error)
+{
+    VkShaderModule module;
+
+    if (!create_module(device, shader, constants, &module, error))
+        return false;
+    const bool done = VK(error, device->vk.vkCreateComputePipelines(
+                                    device->handle, cache, 1,
+                                    &(VkComputePipelineCreateInfo){
+                                        .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                                        .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
+                                        .layout = layout,
+                                    },
+                                    NULL, pipeline));
+    device->vk.vkDestroyShaderModule(device->handle, module, NULL);
+    return done;
+}
+
+static const struct geometry_state {
+    VkCullModeFlags cull;
+    bool depth_test, depth_write;
+} geometry_states[] = {
+    [VKB_GEOMETRY_FULLSCREEN] = {VK_CULL_MODE_NONE, false, false},
+    [VKB_GEOMETRY_SKYBOX] = {VK_CULL_MODE_NONE, true, false},
+    [VKB_GEOMETRY_BODY] = {VK_CULL_MODE_BACK_BIT, true, true},
+    [VKB_GEOMETRY_GLOW] = {VK_CULL_MODE_BACK_BIT, true, true},
+};
+
+// The states of a graphics pipeline that are the same for all passes.
+static const VkPipelineInputAssemblyStateCreateInfo triangles = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
+    .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
+};
+static const VkPipelineViewportStateCreateInfo one_viewport = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO,
+    .viewportCount = 1,
+    .scissorCount = 1,
+};
+static const VkPipelineMultisampleStateCreateInfo one_sample = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
+    .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT,
+};
+static const VkPipelineDynamicStateCreateInfo dynamic_viewport = {
+    .sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
+    .dynamicStateCount = 2,
+    .pDynamicStates = (const VkDynamicState[]){VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR},
+};
+
+static VkPipelineVertexInputStateCreateInfo vertex_input(const struct vkb_pass_row *pass)
+{
+    const bool is_mesh = vkb_is_mesh(pass->geometry);
+
+    return (VkPipelineVertexInputStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
+        .vertexBindingDescriptionCount = pass->textured ? VKB_VERTEX_BINDINGS : is_mesh,
+        .pVertexBindingDescriptions = vkb_vertex_bindings,
+        .vertexAttributeDescriptionCount =
+            pass->textured ? VKB_TEXTURED_ATTRIBUTES : is_mesh * VKB_VERTEX_ATTRIBUTES,
+        .pVertexAttributeDescriptions = vkb_vertex_attributes,
+    };
+}
+
+static VkPipelineRasterizationStateCreateInfo rasterization(const struct geometry_state *state)
+{
+    return (VkPipelineRasterizationStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
+        .polygonMode = VK_POLYGON_MODE_FILL,
+        .cullMode = state->cull,
+        .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
+        .lineWidth = 1.0f,
+    };
+}
+
+static VkPipelineDepthStencilStateCreateInfo depth_test(const struct geometry_state *state)
+{
+    return (VkPipelineDepthStencilStateCreateInfo){
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
+        .depthTestEnable = state->depth_test,
+        .depthWriteEnable = state->depth_write,
+        .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
+    };
+}
+
+// Colours are added. VKB_BLEND_ADD keeps the target's alpha: the forward system's SRC_ALPHA,
+// DST_ALPHA does the same for an alpha of 1 in rgba8unorm, but gives an alpha of 2 in a float
+// format.
+static VkPipelineColorBlendAttachmentState blending(enum vkb_blend blend)
+{
+    return (VkPipelineColorBlendAttachmentState){
+        .blendEnable = blend != VKB_BLEND_NONE,
+        .srcColorBlendFactor = VK_BLEND_FACTOR_ONE,
+        .dstColorBlendFactor = VK_BLEND_FACTOR_ONE,
+        .colorBlendOp = VK_BLEND_OP_ADD,
+        .srcAlphaBlendFactor =
+            blend == VKB_BLEND_ADD_RGBA ? VK_BLEND_FACTOR_ONE : VK_BLEND_FACTOR_ZERO,
+        .dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE,
+        .alphaBlendOp = VK_BLEND_OP_ADD,
+        .colorWriteMask = 0xf,
+    };
+}
+
+static bool create_graphics(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, const VkShaderModule modules[2],
+                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
+{
+    const struct geometry_state *state = &geometry_states[pass->geometry];
+    const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
+    const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
+    const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
+    VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
+
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        blends[i] = blending(pass->blend);
+    return VK(error,
+              device->vk.vkCreateGraphicsPipelines(
+                  device->handle, pipelines->cache, 1,
+                  &(VkGraphicsPipelineCreateInfo){
+                      .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
+                      .stageCount = 2,
+                      .pStages =
+                          (VkPipelineShaderStageCreateInfo[]){
+                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0]),
+                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1]),
+                          },
+                      .pVertexInputState = &vertices,
+                      .pInputAssemblyState = &triangles,
+                      .pViewportState = &one_viewport,
+                      .pRasterizationState = &raster,
+                      .pMultisampleState = &one_sample,
+                      .pDepthStencilState = &depth,
+                      .pColorBlendState =
+                          &(VkPipelineColorBlendStateCreateInfo){
+                              .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
+                              .attachmentCount = pass->target_count,
+                              .pAttachments = blends,
+                          },
+                      .pDynamicState = &dynamic_viewport,
+                      .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                      .renderPass = render_pass,
+                  },
+                  NULL, pipeline));
+}
+
+static bool create_pipeline(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
+                            const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                            VkPipeline *pipeline, struct vkb_error *error)
+{
+    // A driver copies what it needs of a module: none has to be kept.
+    VkShaderModule modules[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};
+
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH)
+        return vkb_compute_create(device, pipelines->cache, pass->shader, &pass->constants,
+                                  vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                                  pipeline, error);
+    const bool done =
+        create_module(device, pass->vertex, &pass->constants, &modules[0], error)
+        && create_module(device, pass->shader, &pass->constants, &modules[1], error)
+        && create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error);
+    for (int i = 0; i < 2; ++i)
+        device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);
+    return done;
+}
+
+// lavapipe compiles in this process, and ends it where that fails.
+enum { COMPILE_MIB = 64 };
+
+static bool has_room_to_compile(const struct vkb_device *device, struct vkb_error *error)
+{
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU
+        || vkb_require_room("compiling shaders", COMPILE_MIB, error))
+        return true;
+    vkb_add_words(error, ". %s", vkb_memory_hint);
+    return false;
+}
+
+bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                       const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                       VkPipeline *pipeline, struct vkb_error *error)
+{
+    struct pipeline_key key;
+
+    memset(&key, 0, sizeof key);
+    if (!vkb_bindings_prepare(device, &pipelines->bindings, pass, &key.layout, error))
+        return false;
+    key.vertex = vkb_shader_hash(pass->vertex);
+    key.shader = vkb_shader_hash(pass->shader);
+    key.geometry = pass->geometry;
+    key.textured = pass->textured;
+    key.blend = pass->blend;
+    key.target_count = pass->target_count;
+    key.constants = pass->constants;
+    key.render_pass = render_pass;
+
+    for (size_t i = 0; i < pipelines->entry_count; ++i)
+        if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
+            *pipeline = pipelines->entries[i].handle;
+            pipelines->entries[i].used = pipelines->now;
+            return true;
+        }
+    if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
+                  pipelines->entry_count + 1, sizeof *pipelines->entries)
+        || !has_room_to_compile(device, error)
+        || !create_pipeline(device, pipelines, pass, render_pass, pipeline, error))
+        return false;
+    struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
+    memcpy(&entry->key, &key, sizeof key);
+    entry->handle = *pipeline;
+    entry->used = pipelines->now;
+    ++pipelines->created;
+    return true;
+}

@@ -1,0 +1,557 @@
+#include "execute/record.h"
+
+#include "vulkan/labels.h"
+
+#include <string.h>
+
+// Copies the pass's parameters to the uniform buffer; returns their offset.
+static VkDeviceSize write_params(struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
+    const VkDeviceSize offset = run->submission->uniform_used;
+    const size_t size = vkb_block_sizes[pass->block];
+
+    memcpy((char *)run->submission->uniforms.mapped + offset, &pass->params, size);
+    run->submission->uniform_used = (offset + size + align - 1) / align * align;
+    return offset;
+}
+
+// The image that the pass reads at binding index + 1. `surface` has the textures, if the pass reads
+// textures.
+static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
+                       const struct vkb_surface *surface, uint32_t index,
+                       VkDescriptorImageInfo *info, struct vkb_error *error)
+{
+    struct vkb_scene *scene = &run->frame->scene;
+    const bool sky = pass->geometry == VKB_GEOMETRY_SKYBOX;
+    const struct vkb_texture *texture = NULL;
+    const struct vkb_image *image;
+
+    if (surface) {
+        texture = &scene->textures[index == 0 ? surface->base : surface->emission];
+        image = &texture->image;
+    } else {
+        image = sky ? &scene->sky : &run->images[pass->reads[index]]->image;
+    }
+    *info = (VkDescriptorImageInfo){
+        .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
+        .imageView = image->view,
+        .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
+    };
+    if (sky) {
+        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
+        const bool smaller = !vkb_sky_is_magnified(image, &pass->params.mesh, target);
+        if (!vkb_image_view(run->device, &scene->sky, smaller, &info->imageView, error))
+            return false;
+    }
+    return texture || pass->reading != VKB_READING_SAMPLED
+        || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
+                                &info->sampler, error);
+}
+
+// Rows of a dispatch's target that one storage buffer descriptor covers, and their place.
+struct band {
+    VkDescriptorBufferInfo buffer;
+    size_t row_pitch;
+    uint32_t first, rows;
+};
+
+// The content of a descriptor set: the pass, the offset of its parameters in the uniform buffer,
+// the surface whose textures it reads, and the band that it stores. The last two may be NULL.
+struct binding {
+    const struct vkb_pass_row *pass;
+    VkDeviceSize params;
+    const struct vkb_surface *surface;
+    const struct band *band;
+};
+
+static void write_resource(const struct vkb_run *run, const struct vkb_resource *resource,
+                           VkDescriptorImageInfo *image, VkDescriptorBufferInfo *buffer,
+                           VkWriteDescriptorSet *write)
+{
+    const struct vkb_resource_entry *entry = vkb_resources_find(&run->frame->resources, resource);
+
+    *image = (VkDescriptorImageInfo){entry->sampler, entry->view, VK_IMAGE_LAYOUT_GENERAL};
+    *buffer = (VkDescriptorBufferInfo){.buffer = entry->buffer.handle, .range = VK_WHOLE_SIZE};
+    *write = (VkWriteDescriptorSet){
+        .descriptorType = vkb_resource_descriptor(resource),
+        .pImageInfo = image,
+        .pBufferInfo = buffer,
+    };
+}
+
+// Fills in the descriptor of the image that the pass reads as number `i`.
+static bool write_read(struct vkb_run *run, const struct binding *binding, uint32_t i,
+                       VkDescriptorImageInfo *info, VkWriteDescriptorSet *write,
+                       struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = binding->pass;
+
+    *write = (VkWriteDescriptorSet){
+        .dstBinding = i + 1,
+        .descriptorType = vkb_pass_binding_types(pass).read,
+        .pImageInfo = info,
+    };
+    if (pass->reading != VKB_READING_WORDS)
+        return read_image(run, pass, binding->surface, i, info, error);
+    struct vkb_image *image = &run->images[pass->reads[i]]->image;
+    write->pTexelBufferView = &image->words;
+    return vkb_image_words(run->device, image, error);
+}
+
+// Fills the set with the parameters, the images read, the resources and the target of a dispatch.
+static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
+                              VkDescriptorSet set, struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = binding->pass;
+    const uint32_t image_count = vkb_pass_descriptor_images(pass);
+    VkDescriptorImageInfo images[VKB_MAX_DESCRIPTORS];
+    VkDescriptorBufferInfo buffers[VKB_MAX_RESOURCES];
+    VkWriteDescriptorSet writes[VKB_MAX_DESCRIPTORS + 1];
+    uint32_t write_count = 0;
+    VkDescriptorBufferInfo params = {
+        .buffer = run->submission->uniforms.handle,
+        .offset = binding->params,
+        .range = vkb_block_sizes[pass->block],
+    };
+    if (pass->block != VKB_BLOCK_NONE)
+        writes[write_count++] = (VkWriteDescriptorSet){
+            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
+            .pBufferInfo = &params,
+        };
+    for (uint32_t i = 0; i < image_count; ++i)
+        if (!write_read(run, binding, i, &images[i], &writes[write_count++], error))
+            return false;
+    for (uint32_t i = 0; i < pass->resource_count; ++i) {
+        write_resource(run, pass->resources[i], &images[image_count + i], &buffers[i],
+                       &writes[write_count]);
+        writes[write_count++].dstBinding = image_count + i + 1;
+    }
+    const uint32_t last = image_count + pass->resource_count;
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
+        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
+        images[last] = (VkDescriptorImageInfo){
+            .imageView = target->view,
+            .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
+        };
+        writes[write_count++] = (VkWriteDescriptorSet){
+            .dstBinding = last + 1,
+            .descriptorType = vkb_pass_binding_types(pass).target,
+            .pImageInfo = &images[last],
+            .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
+        };
+    }
+    for (uint32_t i = 0; i < write_count; ++i) {
+        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[i].dstSet = set;
+        writes[i].descriptorCount = 1;
+    }
+    run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
+    return true;
+}
+
+static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
+                             struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = binding->pass;
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    const struct vkb_bindings *bindings = &run->frame->pipelines.bindings;
+    const struct vkb_layouts *layouts = vkb_bindings_layouts(bindings, pass);
+    VkDescriptorSet set;
+
+    if (!VK(error, vk->vkAllocateDescriptorSets(
+                       run->device->handle,
+                       &(VkDescriptorSetAllocateInfo){
+                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
+                           .descriptorPool = run->submission->descriptors,
+                           .descriptorSetCount = 1,
+                           .pSetLayouts = &layouts->set,
+                       },
+                       &set))
+        || !write_descriptors(run, binding, set, error))
+        return false;
+    vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
+                                layouts->pipeline, 0, 1, &set, 0, NULL);
+    return true;
+}
+
+static void bind_mesh(const struct vkb_run *run, const struct vkb_mesh *mesh, bool textured)
+{
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    VkCommandBuffer commands = run->submission->commands.buffer;
+
+    vk->vkCmdBindVertexBuffers(commands, 0, 1, &mesh->vertices.handle, &(VkDeviceSize){0});
+    if (textured)
+        vk->vkCmdBindVertexBuffers(commands, 1, 1, &mesh->texcoords.handle, &(VkDeviceSize){0});
+    vk->vkCmdBindIndexBuffer(commands, mesh->indices.handle, 0, VK_INDEX_TYPE_UINT32);
+}
+
+// Draws each surface with its textures.
+static bool draw_surfaces(struct vkb_run *run, const struct vkb_pass_row *pass,
+                          const struct vkb_mesh *mesh, VkDeviceSize params, struct vkb_error *error)
+{
+    uint32_t first = mesh->plain_count;
+
+    bind_mesh(run, mesh, true);
+    for (uint32_t i = 0; i < mesh->surface_count; ++i) {
+        const struct vkb_surface *surface = &mesh->surfaces[i];
+        const struct binding binding = {.pass = pass, .params = params, .surface = surface};
+        if (!bind_descriptors(run, &binding, error))
+            return false;
+        run->device->vk.vkCmdDrawIndexed(run->submission->commands.buffer, surface->index_count, 1,
+                                         first, 0, 0);
+        first += surface->index_count;
+    }
+    return true;
+}
+
+// Dispatches the workgroups for `rows` rows of the target.
+static void dispatch(const struct vkb_run *run, const struct vkb_pass_row *pass, uint32_t rows)
+{
+    const struct vkb_image_row *target = &run->graph->images[pass->targets[0]];
+    const uint32_t width = (target->width + pass->block_width - 1) / pass->block_width;
+    const uint32_t height = (rows + pass->block_height - 1) / pass->block_height;
+
+    run->device->vk.vkCmdDispatch(run->submission->commands.buffer,
+                                  pass->groups_width ? pass->groups_width : width,
+                                  pass->groups_height ? pass->groups_height : height,
+                                  run->graph->layers ? run->graph->layers : 1);
+}
+
+// The most rows that one storage buffer descriptor can cover. They are a multiple of the block's
+// rows, and end at an offset at which the next buffer can begin.
+static uint32_t band_rows(const struct vkb_device *device, const struct vkb_pass_row *pass,
+                          size_t row_pitch)
+{
+    const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
+    const size_t aligned = align > VKB_WORD_SIZE ? (size_t)align / VKB_WORD_SIZE : 1;
+    size_t block = pass->block_height;
+
+    while (block % aligned != 0)
+        block += pass->block_height;
+    const size_t blocks = device->limits.maxStorageBufferRange / row_pitch / block;
+
+    return (uint32_t)((blocks ? blocks : 1) * block);
+}
+
+uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph)
+{
+    uint32_t sets = 0;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        ++sets;
+        if (pass->reading == VKB_READING_WORDS) {
+            const struct vkb_image_row *row = &graph->images[pass->targets[0]];
+            const size_t pitch = vkb_image_row_pitch(row->format, row->width);
+            sets += row->height / band_rows(device, pass, pitch);
+        }
+    }
+    return sets;
+}
+
+// The output whose memory the pass can store to instead of its image; NULL: none. No other pass may
+// read the image. An output without alpha needs a shader that stores three channels. If the request
+// comes again, the pass stores to the image, so that a third time nothing has to run.
+static struct vkb_output *find_stored(const struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_plan *plan = run->request->plan;
+    const uint32_t image = pass->targets[0];
+
+    if (run->contents[image]->repeated)
+        return NULL;
+    for (uint32_t i = 0; i < run->graph->pass_count; ++i)
+        if (run->frame->planner.needed[i] && vkb_pass_reads(&run->graph->passes[i], image))
+            return NULL;
+    for (uint32_t i = 0; i < plan->output_count; ++i) {
+        struct vkb_output *output = &run->request->outputs[i];
+        if (plan->outputs[i] == image && (vkb_readback_is_complete(output) || pass->shader->packed)
+            && vkb_readback_takes_words(run->device, output, run->graph->images[image].height))
+            return output;
+    }
+    return NULL;
+}
+
+static void describe_words(const struct vkb_image *image, size_t row_pitch, int32_t words[4])
+{
+    words[0] = (int32_t)image->width;
+    words[1] = (int32_t)image->height;
+    words[2] = (int32_t)(row_pitch / VKB_WORD_SIZE);
+    words[3] = 0;
+}
+
+static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                       const struct band *band)
+{
+    struct vkb_words words = {0};
+
+    describe_words(&run->images[pass->targets[0]]->image, band->row_pitch, words.target);
+    words.target[3] = (int32_t)band->first;
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        const struct vkb_image *image = &run->images[pass->reads[i]]->image;
+        describe_words(image, image->row_pitch, words.reads[i]);
+    }
+    run->device->vk.vkCmdPushConstants(
+        run->submission->commands.buffer,
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->pipeline,
+        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
+}
+
+// `output`: what the pass stores to; NULL: its image.
+static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
+                           VkDeviceSize params, struct vkb_output *output, struct vkb_error *error)
+{
+    const struct vkb_image *image = &run->images[pass->targets[0]]->image;
+    const size_t channel_size = vkb_formats[image->format].channel_size;
+    const VkDeviceSize start = output ? output->imported_offset : 0;
+    struct band band = {
+        .buffer.buffer = output ? output->imported : image->buffer,
+        .row_pitch = output ? image->width * output->channels * channel_size : image->row_pitch,
+    };
+    const struct binding binding = {.pass = pass, .params = params, .band = &band};
+    const uint32_t rows = band_rows(run->device, pass, band.row_pitch);
+
+    if (output)
+        output->sink = VKB_SINK_STORED;
+    for (; band.first < image->height; band.first += rows) {
+        const uint32_t left = image->height - band.first;
+        band.rows = rows < left ? rows : left;
+        band.buffer.offset = start + band.first * band.row_pitch;
+        band.buffer.range = band.rows * band.row_pitch;
+        if (!bind_descriptors(run, &binding, error))
+            return false;
+        push_words(run, pass, &band);
+        dispatch(run, pass, band.rows);
+    }
+    return true;
+}
+
+static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceSize params,
+                 struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    VkCommandBuffer commands = run->submission->commands.buffer;
+    const struct vkb_scene *scene = &run->frame->scene;
+    const struct vkb_mesh *mesh = pass->geometry == VKB_GEOMETRY_GLOW ? &scene->glow : &scene->body;
+
+    if (pass->textured)
+        return draw_surfaces(run, pass, mesh, params, error);
+    if (!bind_descriptors(run, &(struct binding){.pass = pass, .params = params}, error))
+        return false;
+    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
+        dispatch(run, pass, run->graph->images[pass->targets[0]].height);
+    } else if (!vkb_is_mesh(pass->geometry)) {
+        vk->vkCmdDraw(commands, 3, 1, 0, 0);
+    } else if (mesh->plain_count > 0) {
+        bind_mesh(run, mesh, false);
+        vk->vkCmdDrawIndexed(commands, mesh->plain_count, 1, 0, 0, 0);
+    }
+    return true;
+}
+
+// Whether the pass gains from a source without NaN and infinity, and this one has none.
+static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    const struct vkb_non_finite *non_finite = &run->frame->non_finite;
+
+    return pass->gains_if_finite && !run->unknown_non_finite && non_finite->nan == 0
+        && non_finite->inf == 0;
+}
+
+static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,
+                        struct vkb_error *error)
+{
+    const struct vkb_pass_row *pass = &run->graph->passes[index];
+    VkCommandBuffer commands = run->submission->commands.buffer;
+    const bool words = pass->reading == VKB_READING_WORDS;
+    struct vkb_output *output = words ? find_stored(run, pass) : NULL;
+    struct vkb_pass_row known;
+    VkPipeline pipeline;
+
+    if (words) {
+        memcpy(&known, pass, sizeof known);
+        if (run->images[pass->reads[0]]->image.channels == 3)
+            known.shader = known.shader->rgb;
+        if (output && !vkb_readback_is_complete(output))
+            known.shader = known.shader->packed;
+        known.constants.finite = reads_finite(run, pass);
+        pass = &known;
+    } else if (reads_finite(run, pass)) {
+        memcpy(&known, pass, sizeof known);
+        known.constants.finite = true;
+        pass = &known;
+    }
+    if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
+                           error))
+        return false;
+    vkb_label_begin(run->device, commands, pass->name);
+    run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
+    const bool done = words ? dispatch_words(run, pass, write_params(run, pass), output, error)
+                            : draw(run, pass, write_params(run, pass), error);
+    vkb_label_end(run->device, commands);
+    return done;
+}
+
+static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
+{
+    for (uint32_t i = first; i < end; ++i) {
+        const struct vkb_pass_row *pass = &run->graph->passes[i];
+        for (uint32_t read = 0; read < pass->read_count; ++read) {
+            struct vkb_image *image = &run->images[pass->reads[read]]->image;
+            if (!vkb_pass_writes(pass, pass->reads[read]))
+                vkb_image_transition(run->device, run->submission->commands.buffer, image,
+                                     vkb_pass_reads_as(pass));
+        }
+    }
+}
+
+// Transitions the images that the passes read, and the targets to the access from which the render
+// pass's dependencies start.
+static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
+{
+    VkCommandBuffer commands = run->submission->commands.buffer;
+    const struct vkb_pass_row *pass = &run->graph->passes[first];
+    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
+    const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
+    const uint32_t depth_uses = use_count - pass->target_count;
+
+    transition_reads(run, first, end);
+    for (uint32_t i = 0; i < use_count; ++i) {
+        uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
+        struct vkb_image *image = &run->images[target]->image;
+        // A new image needs no barrier. Any other must have the access that its graph leaves it in.
+        if (image->access != VKB_ACCESS_NONE && image->access != uses[i].before)
+            vkb_image_transition(run->device, commands, image, uses[i].before);
+        image->access = uses[i].after == VKB_ACCESS_NONE ? uses[i].during : uses[i].after;
+    }
+}
+
+static void begin_render_pass(const struct vkb_run *run, VkRenderPass render_pass,
+                              VkFramebuffer framebuffer, const struct vkb_pass_row *pass,
+                              VkExtent2D extent)
+{
+    const struct VolkDeviceTable *vk = &run->device->vk;
+    VkCommandBuffer commands = run->submission->commands.buffer;
+    VkClearValue clears[VKB_MAX_TARGETS + 1];
+
+    for (uint32_t i = 0; i < pass->target_count; ++i)
+        clears[i] = (VkClearValue){.color = {.float32 = {0.0f, 0.0f, 0.0f, 1.0f}}};
+    clears[pass->target_count] = (VkClearValue){.depthStencil = {.depth = 1.0f}};
+    vk->vkCmdBeginRenderPass(commands,
+                             &(VkRenderPassBeginInfo){
+                                 .sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO,
+                                 .renderPass = render_pass,
+                                 .framebuffer = framebuffer,
+                                 .renderArea = {.extent = extent},
+                                 .clearValueCount = pass->target_count + 1,
+                                 .pClearValues = clears,
+                             },
+                             VK_SUBPASS_CONTENTS_INLINE);
+    vk->vkCmdSetViewport(commands, 0, 1,
+                         &(VkViewport){
+                             .width = (float)extent.width,
+                             .height = (float)extent.height,
+                             .maxDepth = 1.0f,
+                         });
+    vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
+}
+
+static void add_timing(struct vkb_run *run, uint32_t first)
+{
+    struct vkb_timing *timing = &run->request->timings[run->request->timing_count++];
+
+    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
+}
+
+static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_submission *submission = run->submission;
+    const struct vkb_pass_row *pass = &run->graph->passes[index];
+    VkCommandBuffer commands = submission->commands.buffer;
+
+    // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
+    vkb_timer_start(device, commands, &submission->timer);
+    transition_reads(run, index, index + 1);
+    vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+                         vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
+                                                 : VKB_ACCESS_DISPATCH_STORED);
+    if (!record_pass(run, index, VK_NULL_HANDLE, error))
+        return false;
+    vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, index);
+    return true;
+}
+
+static uint32_t target_images(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                              struct vkb_cached_image **cache)
+{
+    uint32_t targets[VKB_MAX_TARGETS + 1];
+    const uint32_t count = vkb_pass_targets(pass, targets);
+
+    for (uint32_t i = 0; i < count; ++i)
+        cache[i] = run->images[targets[i]];
+    return count;
+}
+
+// Records passes first..end-1 as one render pass with one timing. Within a render pass, tiling
+// devices and lavapipe do not keep the order of draws, so single draws cannot be timed.
+static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end,
+                               struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_frame *frame = run->frame;
+    struct vkb_submission *submission = run->submission;
+    VkCommandBuffer commands = submission->commands.buffer;
+    struct vkb_cached_image *targets[VKB_MAX_TARGETS + 1];
+    const uint32_t target_count = target_images(run, &run->graph->passes[first], targets);
+    VkRenderPass render_pass;
+    VkFramebuffer framebuffer;
+
+    if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
+                                   error)
+        || !vkb_image_cache_framebuffer(device, &frame->cache, targets, target_count, render_pass,
+                                        &framebuffer, error))
+        return false;
+    transition_images(run, first, end);
+    vkb_timer_start(device, commands, &submission->timer);
+    begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
+                      (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
+    for (uint32_t i = first; i < end; ++i)
+        if (!record_pass(run, i, render_pass, error))
+            return false;
+    device->vk.vkCmdEndRenderPass(commands);
+    vkb_timer_stop(device, commands, &submission->timer);
+    add_timing(run, first);
+    return true;
+}
+
+// Loads the resources of a pass. If passes change them, this one waits for all before it.
+static bool load_resources(struct vkb_run *run, const struct vkb_pass_row *pass,
+                           struct vkb_error *error)
+{
+    VkCommandBuffer commands = run->submission->commands.buffer;
+
+    if (!vkb_resources_load(run->device, commands, run->submission->number, pass,
+                            &run->frame->resources, error))
+        return false;
+    if (pass->turn)
+        vkb_barrier_record(run->device, commands, NULL, true, VKB_ACCESS_RESOURCE,
+                           VKB_ACCESS_RESOURCE);
+    return true;
+}
+
+bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_error *error)
+{
+    struct vkb_run *run = context;
+
+    for (uint32_t i = first; i < end; ++i)
+        if (!load_resources(run, &run->graph->passes[i], error))
+            return false;
+    if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
+        return record_render_pass(run, first, end, error);
+    for (uint32_t i = first; i < end; ++i)
+        if (!record_dispatch(run, i, error))
+            return false;
+    return true;
+}

@@ -1,0 +1,215 @@
+#include "execute/resources.h"
+
+#include <string.h>
+
+static void destroy_entry(const struct vkb_device *device, struct vkb_resource_entry *entry)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    vk->vkDestroySampler(device->handle, entry->sampler, NULL);
+    vk->vkDestroyImageView(device->handle, entry->view, NULL);
+    vk->vkDestroyImage(device->handle, entry->image, NULL);
+    vkb_memory_free(device, entry->memory);
+    vkb_buffer_destroy(device, &entry->buffer);
+    vkb_buffer_destroy(device, &entry->staging);
+    vkb_free(entry);
+}
+
+void vkb_resources_destroy(const struct vkb_device *device, struct vkb_resources *resources)
+{
+    for (size_t i = 0; i < resources->count; ++i)
+        destroy_entry(device, resources->entries[i]);
+    vkb_free(resources->entries);
+    *resources = (struct vkb_resources){0};
+}
+
+void vkb_resources_trim(const struct vkb_device *device, struct vkb_resources *resources,
+                        const struct vkb_age *age)
+{
+    for (size_t i = 0; i < resources->count && resources->count > VKB_KEPT_RESOURCES;) {
+        const uint64_t used = resources->entries[i]->used;
+        if (used >= age->pending || used + 1 >= age->now) {
+            ++i;
+            continue;
+        }
+        destroy_entry(device, resources->entries[i]);
+        resources->entries[i] = resources->entries[--resources->count];
+    }
+}
+
+static bool create_sampler(const struct vkb_device *device, const struct vkb_resource *resource,
+                           VkSampler *sampler, struct vkb_error *error)
+{
+    const VkFilter filter = resource->linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
+    const VkSamplerAddressMode border = (VkSamplerAddressMode)resource->border;
+
+    return VK(error, device->vk.vkCreateSampler(device->handle,
+                                                &(VkSamplerCreateInfo){
+                                                    .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                                    .magFilter = filter,
+                                                    .minFilter = filter,
+                                                    .addressModeU = border,
+                                                    .addressModeV = border,
+                                                    .addressModeW = border,
+                                                },
+                                                NULL, sampler));
+}
+
+static bool check_format(const struct vkb_device *device, const struct vkb_resource *resource,
+                         struct vkb_error *error)
+{
+    VkFormatProperties properties;
+    const VkFormatFeatureFlags needed =
+        resource->kind == VKB_RESOURCE_IMAGE ? VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT
+        : resource->linear                   ? VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
+                                             : VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
+
+    device->instance->vk.vkGetPhysicalDeviceFormatProperties(
+        device->adapter.physical, (VkFormat)resource->format, &properties);
+    if ((properties.optimalTilingFeatures & needed) != needed)
+        return vkb_fail(
+            error, VKB_ERROR_VALUE, "passes: the adapter %s cannot %s textures of the VkFormat %u",
+            device->adapter.name,
+            resource->kind == VKB_RESOURCE_IMAGE ? "store" : "sample or filter", resource->format);
+    return true;
+}
+
+static bool create_view(const struct vkb_device *device, const struct vkb_resource *resource,
+                        struct vkb_resource_entry *entry, struct vkb_error *error)
+{
+    static const VkImageViewType types[] = {VK_IMAGE_VIEW_TYPE_1D, VK_IMAGE_VIEW_TYPE_2D,
+                                            VK_IMAGE_VIEW_TYPE_3D};
+
+    return VK(error, device->vk.vkCreateImageView(
+                         device->handle,
+                         &(VkImageViewCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
+                             .image = entry->image,
+                             .viewType = types[resource->dimensions - 1],
+                             .format = (VkFormat)resource->format,
+                             .subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1},
+                         },
+                         NULL, &entry->view));
+}
+
+static bool create_image(const struct vkb_device *device, const struct vkb_resource *resource,
+                         struct vkb_resource_entry *entry, struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    static const VkImageType types[] = {VK_IMAGE_TYPE_1D, VK_IMAGE_TYPE_2D, VK_IMAGE_TYPE_3D};
+    VkMemoryRequirements requirements;
+    VkMemoryPropertyFlags flags;
+
+    if (!check_format(device, resource, error)
+        || !VK(error,
+               vk->vkCreateImage(
+                   device->handle,
+                   &(VkImageCreateInfo){
+                       .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                       .imageType = types[resource->dimensions - 1],
+                       .format = (VkFormat)resource->format,
+                       .extent = {resource->width, resource->height, resource->depth},
+                       .mipLevels = 1,
+                       .arrayLayers = 1,
+                       .samples = VK_SAMPLE_COUNT_1_BIT,
+                       .usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT
+                              | (resource->kind == VKB_RESOURCE_IMAGE ? VK_IMAGE_USAGE_STORAGE_BIT
+                                                                      : VK_IMAGE_USAGE_SAMPLED_BIT),
+                   },
+                   NULL, &entry->image)))
+        return false;
+    vk->vkGetImageMemoryRequirements(device->handle, entry->image, &requirements);
+    return vkb_memory_allocate(device, VKB_MEMORY_DEVICE, &requirements, NULL, &entry->memory,
+                               &flags, error)
+        && VK(error, vk->vkBindImageMemory(device->handle, entry->image, entry->memory, 0))
+        && create_view(device, resource, entry, error)
+        && (resource->kind == VKB_RESOURCE_IMAGE
+            || create_sampler(device, resource, &entry->sampler, error));
+}
+
+static bool create_entry(const struct vkb_device *device, const struct vkb_resource *resource,
+                         struct vkb_resource_entry *entry, struct vkb_error *error)
+{
+    const VkBufferUsageFlags usage = resource->kind == VKB_RESOURCE_UNIFORM
+                                       ? VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT
+                                       : VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+
+    if (!vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                           resource->size, &entry->staging, error))
+        return false;
+    if (resource->data)
+        memcpy(entry->staging.mapped, resource->data, resource->size);
+    else
+        memset(entry->staging.mapped, 0, resource->size);
+    return vkb_buffer_flush(device, &entry->staging, error)
+        && (vkb_resource_is_image(resource)
+                ? create_image(device, resource, entry, error)
+                : vkb_buffer_create(device, VKB_MEMORY_DEVICE,
+                                    usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, resource->size,
+                                    &entry->buffer, error));
+}
+
+// Records the copy of the data. All images of resources are in the general layout.
+static void record_fill(const struct vkb_device *device, VkCommandBuffer commands,
+                        const struct vkb_resource *resource, const struct vkb_resource_entry *entry)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+
+    if (vkb_resource_is_image(resource)) {
+        vkb_barrier_record(device, commands,
+                           &(VkImageMemoryBarrier){
+                               .oldLayout = VK_IMAGE_LAYOUT_UNDEFINED,
+                               .newLayout = VK_IMAGE_LAYOUT_GENERAL,
+                               .image = entry->image,
+                               .subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1},
+                           },
+                           false, VKB_ACCESS_RESOURCE, VKB_ACCESS_RESOURCE);
+        vk->vkCmdCopyBufferToImage(
+            commands, entry->staging.handle, entry->image, VK_IMAGE_LAYOUT_GENERAL, 1,
+            &(VkBufferImageCopy){
+                .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+                .imageExtent = {resource->width, resource->height, resource->depth},
+            });
+    } else {
+        vk->vkCmdCopyBuffer(commands, entry->staging.handle, entry->buffer.handle, 1,
+                            &(VkBufferCopy){.size = resource->size});
+    }
+    vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_RESOURCE);
+}
+
+static struct vkb_resource_entry *find(const struct vkb_resources *resources, uint64_t serial)
+{
+    for (size_t i = 0; i < resources->count; ++i)
+        if (resources->entries[i]->serial == serial)
+            return resources->entries[i];
+    return NULL;
+}
+
+bool vkb_resources_load(const struct vkb_device *device, VkCommandBuffer commands, uint64_t now,
+                        const struct vkb_pass_row *pass, struct vkb_resources *resources,
+                        struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < pass->resource_count; ++i) {
+        const struct vkb_resource *resource = pass->resources[i];
+        struct vkb_resource_entry *entry = find(resources, resource->serial);
+        if (!entry) {
+            entry = vkb_append(error, &resources->entries, &resources->count, &resources->capacity,
+                               sizeof *entry);
+            if (!entry)
+                return false;
+            // Found only when it is complete: after a failure all entries are destroyed.
+            if (!create_entry(device, resource, entry, error))
+                return false;
+            entry->serial = resource->serial;
+            record_fill(device, commands, resource, entry);
+        }
+        entry->used = now;
+    }
+    return true;
+}
+
+const struct vkb_resource_entry *vkb_resources_find(const struct vkb_resources *resources,
+                                                    const struct vkb_resource *resource)
+{
+    return find(resources, resource->serial);
+}

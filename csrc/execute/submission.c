@@ -1,0 +1,165 @@
+#include "execute/submission.h"
+
+enum { KEPT_SUBMISSIONS = 3 };  // unused ones; several threads at once may have needed more
+
+static void release_inputs(const struct vkb_device *device, struct vkb_submission *submission)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (submission->inputs[kind].buffer)
+            vkb_image_destroy(device, &submission->inputs[kind]);
+}
+
+static void destroy_submission(const struct vkb_device *device, struct vkb_submission *submission)
+{
+    vkb_timer_destroy(device, &submission->timer);
+    device->vk.vkDestroyDescriptorPool(device->handle, submission->descriptors, NULL);
+    vkb_buffer_destroy(device, &submission->uniforms);
+    vkb_readback_destroy(device, &submission->readback);
+    release_inputs(device, submission);
+    vkb_commands_destroy(device, &submission->commands);
+    vkb_free(submission);
+}
+
+void vkb_submissions_destroy(const struct vkb_device *device, struct vkb_submissions *submissions)
+{
+    for (size_t i = 0; i < submissions->count; ++i)
+        destroy_submission(device, submissions->submissions[i]);
+    vkb_free(submissions->submissions);
+    *submissions = (struct vkb_submissions){0};
+}
+
+static struct vkb_submission *find_free(const struct vkb_submissions *submissions)
+{
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (!submissions->submissions[i]->taken && !submissions->submissions[i]->pending)
+            return submissions->submissions[i];
+    return NULL;
+}
+
+// Frees the submissions that nobody waits for and that the device has finished: copies of rows.
+static bool free_finished(const struct vkb_device *device, struct vkb_submissions *submissions,
+                          struct vkb_error *error)
+{
+    for (size_t i = 0; i < submissions->count; ++i) {
+        struct vkb_submission *submission = submissions->submissions[i];
+        if (submission->taken || !submission->pending || !vkb_submission_over(device, submission))
+            continue;
+        if (!vkb_commands_reset(device, &submission->commands, error))
+            return false;
+        submission->pending = false;
+    }
+    return true;
+}
+
+bool vkb_submissions_take(const struct vkb_device *device, struct vkb_submissions *submissions,
+                          struct vkb_submission **taken, struct vkb_error *error)
+{
+    if (!free_finished(device, submissions, error))
+        return false;
+    struct vkb_submission *submission = find_free(submissions);
+    if (!submission
+        && !(submission = vkb_append(error, &submissions->submissions, &submissions->count,
+                                     &submissions->capacity, sizeof *submission)))
+        return false;
+    if (!submission->commands.pool && !vkb_commands_create(device, &submission->commands, error))
+        return false;
+    submission->taken = true;
+    submission->uniform_used = 0;
+    *taken = submission;
+    return true;
+}
+
+void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submissions *submissions,
+                               struct vkb_submission *submission)
+{
+    size_t free_count = 0;
+
+    submission->taken = false;
+    submission->requests = NULL;
+    if (submission->pending)
+        return;
+    submission->request_count = 0;
+    vkb_readback_release(device, &submission->readback);
+    release_inputs(device, submission);
+    for (size_t i = 0; i < submissions->count; ++i)
+        free_count += !submissions->submissions[i]->taken && !submissions->submissions[i]->pending;
+    if (free_count <= KEPT_SUBMISSIONS)
+        return;
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (submissions->submissions[i] == submission)
+            submissions->submissions[i] = submissions->submissions[--submissions->count];
+    destroy_submission(device, submission);
+}
+
+bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
+                           const struct vkb_sync *order, struct vkb_error *error)
+{
+    submission->pending = vkb_commands_submit(device, &submission->commands, order, error);
+    return submission->pending;
+}
+
+uint64_t vkb_submissions_pending(const struct vkb_submissions *submissions, uint64_t now)
+{
+    uint64_t first = now;
+
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (submissions->submissions[i]->pending && submissions->submissions[i]->number < first)
+            first = submissions->submissions[i]->number;
+    return first;
+}
+
+bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submission *submission)
+{
+    return !submission->pending || vkb_commands_over(device, &submission->commands);
+}
+
+// All pending submissions may run before this one. A submission without requests loads a scene, and
+// counts as a frame.
+static uint32_t count_frames(const struct vkb_submissions *submissions)
+{
+    uint32_t count = 0;
+
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (submissions->submissions[i]->pending)
+            count += submissions->submissions[i]->request_count
+                       ? submissions->submissions[i]->request_count
+                       : 1;
+    return count;
+}
+
+bool vkb_submission_wait(struct vkb_device *device, const struct vkb_submissions *submissions,
+                         struct vkb_submission *submission, struct vkb_error *error)
+{
+    if (submission->pending
+        && !vkb_commands_wait(device, &submission->commands, count_frames(submissions), error))
+        return false;
+    submission->pending = false;
+    return true;
+}
+
+bool vkb_submissions_wait(struct vkb_device *device, struct vkb_submissions *submissions,
+                          struct vkb_error *error)
+{
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (!vkb_submission_wait(device, submissions, submissions->submissions[i], error))
+            return false;
+    return true;
+}
+
+bool vkb_submissions_end(struct vkb_device *device, struct vkb_submissions *submissions,
+                         struct vkb_error *error)
+{
+    for (size_t i = 0; i < submissions->count; ++i) {
+        struct vkb_submission *submission = submissions->submissions[i];
+        if (vkb_submission_wait(device, submissions, submission, error))
+            continue;
+        if (error->kind == VKB_ERROR_INTERRUPTED || error->result == VK_TIMEOUT)
+            return false;
+        // The first wait may have failed for lack of memory, so wait again. If the device is lost,
+        // its objects can be destroyed.
+        if (!vkb_submission_wait(device, submissions, submission, error)
+            && error->result != VK_ERROR_DEVICE_LOST)
+            return false;
+    }
+    return true;
+}

@@ -1,0 +1,536 @@
+#include "share/cuda.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+// As in CUDA's header.
+typedef int result;
+enum {
+    OUT_OF_MEMORY = 2,
+    NOT_INITIALIZED = 3,
+    STREAM_CAPTURE_IMPLICIT = 906,
+    CAPTURE_MODE_RELAXED = 2,
+    STREAM_NON_BLOCKING = 1,
+    EVENT_DISABLE_TIMING = 2,
+    ATTRIBUTE_IS_MANAGED = 8,
+    ATTRIBUTE_DEVICE_ORDINAL = 9,
+    HANDLE_OPAQUE_FD = 1,
+    MEMORY_DEDICATED = 1,
+    HANDLE_TIMELINE_FD = 9,
+};
+
+union shared_handle {
+    int descriptor;
+    struct {
+        void *handle;
+        const void *name;
+    } other;
+};
+
+struct memory_handle {
+    int type;
+    union shared_handle handle;
+    unsigned long long size;
+    unsigned flags, reserved[16];
+};
+
+struct memory_buffer {
+    unsigned long long offset, size;
+    unsigned flags, reserved[16];
+};
+
+struct semaphore_handle {
+    int type;
+    union shared_handle handle;
+    unsigned flags, reserved[16];
+};
+
+// CUDA has two structs of this size, for signals and for waits.
+struct semaphore_point {
+    unsigned long long value, others[8];
+    unsigned flags, reserved[16];
+};
+
+struct uuid {
+    unsigned char bytes[16];
+};
+
+// Those in the second list may be missing.
+#define FUNCTIONS(NAME) \
+    NAME(cuInit, "cuInit", (unsigned)) \
+    NAME(cuGetErrorName, "cuGetErrorName", (result, const char **)) \
+    NAME(cuDeviceGetCount, "cuDeviceGetCount", (int *)) \
+    NAME(cuDeviceGet, "cuDeviceGet", (int *, int)) \
+    NAME(cuDeviceGetName, "cuDeviceGetName", (char *, int, int)) \
+    NAME(cuDeviceGetUuid, "cuDeviceGetUuid", (struct uuid *, int)) \
+    NAME(cuDevicePrimaryCtxRetain, "cuDevicePrimaryCtxRetain", (void **, int)) \
+    NAME(cuDevicePrimaryCtxRelease, "cuDevicePrimaryCtxRelease_v2", (int)) \
+    NAME(cuCtxPushCurrent, "cuCtxPushCurrent_v2", (void *)) \
+    NAME(cuCtxPopCurrent, "cuCtxPopCurrent_v2", (void **)) \
+    NAME(cuCtxSynchronize, "cuCtxSynchronize", (void)) \
+    NAME(cuStreamCreate, "cuStreamCreate", (void **, unsigned)) \
+    NAME(cuStreamDestroy, "cuStreamDestroy_v2", (void *)) \
+    NAME(cuStreamSynchronize, "cuStreamSynchronize", (void *)) \
+    NAME(cuStreamWaitEvent, "cuStreamWaitEvent", (void *, void *, unsigned)) \
+    NAME(cuStreamIsCapturing, "cuStreamIsCapturing", (void *, int *)) \
+    NAME(cuThreadExchangeStreamCaptureMode, "cuThreadExchangeStreamCaptureMode", (int *)) \
+    NAME(cuEventCreate, "cuEventCreate", (void **, unsigned)) \
+    NAME(cuEventDestroy, "cuEventDestroy_v2", (void *)) \
+    NAME(cuEventRecord, "cuEventRecord", (void *, void *)) \
+    NAME(cuEventQuery, "cuEventQuery", (void *)) \
+    NAME(cuEventSynchronize, "cuEventSynchronize", (void *)) \
+    NAME(cuPointerGetAttribute, "cuPointerGetAttribute", (void *, int, vkb_cuda_address)) \
+    NAME(cuImportExternalMemory, "cuImportExternalMemory", \
+         (void **, const struct memory_handle *)) \
+    NAME(cuExternalMemoryGetMappedBuffer, "cuExternalMemoryGetMappedBuffer", \
+         (vkb_cuda_address *, void *, const struct memory_buffer *)) \
+    NAME(cuDestroyExternalMemory, "cuDestroyExternalMemory", (void *)) \
+    NAME(cuImportExternalSemaphore, "cuImportExternalSemaphore", \
+         (void **, const struct semaphore_handle *)) \
+    NAME(cuDestroyExternalSemaphore, "cuDestroyExternalSemaphore", (void *)) \
+    NAME(cuSignalExternalSemaphoresAsync, "cuSignalExternalSemaphoresAsync", \
+         (void *const *, const struct semaphore_point *, unsigned, void *)) \
+    NAME(cuWaitExternalSemaphoresAsync, "cuWaitExternalSemaphoresAsync", \
+         (void *const *, const struct semaphore_point *, unsigned, void *)) \
+    NAME(cuMemFree, "cuMemFree_v2", (vkb_cuda_address)) \
+    NAME(cuMemcpyDtoDAsync, "cuMemcpyDtoDAsync_v2", \
+         (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
+    NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *)) \
+    NAME(cuMemcpyHtoDAsync, "cuMemcpyHtoDAsync_v2", \
+         (vkb_cuda_address, const void *, size_t, void *))
+#define LATER_FUNCTIONS(NAME) \
+    NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *)) \
+    NAME(cuCtxWaitEvent, "cuCtxWaitEvent", (void *, void *))
+
+struct vkb_cuda {
+#define MEMBER(name, symbol, arguments) result(*name) arguments;
+    FUNCTIONS(MEMBER)
+    LATER_FUNCTIONS(MEMBER)
+#undef MEMBER
+    int device, ordinal;
+    void *context, *stream;
+};
+
+#ifdef VKBLOOM_FAULTS
+#define RESULT(call) (vkb_fault(#call) ? OUT_OF_MEMORY : (call))
+#else
+#define RESULT(call) (call)
+#endif
+#define CU(error, call) check(cuda, (error), RESULT(call), #call)
+
+static bool check(const struct vkb_cuda *cuda, struct vkb_error *error, result answer,
+                  const char *call_text)
+{
+    size_t length;
+    const char *call = vkb_call_name(call_text, &length), *name = NULL;
+
+    if (answer == 0)
+        return true;
+    cuda->cuGetErrorName(answer, &name);
+    vkb_fail(error, answer == OUT_OF_MEMORY ? VKB_ERROR_OUT_OF_MEMORY : VKB_ERROR_GENERAL,
+             "CUDA: %.*s failed with %s", (int)length, call, name ? name : "an unknown error");
+    if (answer == NOT_INITIALIZED)
+        vkb_add_words(error, ". In a process that was forked from one with CUDA, CUDA does not "
+                             "work: start processes by multiprocessing's method \"spawn\"");
+    return false;
+}
+
+// The library stays open: other users of the process have it open, too.
+static bool load(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    void *library = dlopen("libcuda.so.1", RTLD_NOW | RTLD_LOCAL), *function;
+
+    if (!library)
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "CUDA: libcuda.so.1 does not open; arrays on the device need NVIDIA's "
+                        "driver");
+#define LATER_LOAD(member, symbol, arguments) \
+    function = dlsym(library, symbol); \
+    memcpy(&cuda->member, &function, sizeof function);
+#define LOAD(member, symbol, arguments) \
+    LATER_LOAD(member, symbol, arguments) \
+    if (!function) \
+        return vkb_fail(error, VKB_ERROR_GENERAL, \
+                        "CUDA: libcuda.so.1 has no %s; a newer driver is needed", symbol);
+    FUNCTIONS(LOAD)
+    LATER_FUNCTIONS(LATER_LOAD)
+#undef LOAD
+#undef LATER_LOAD
+    return true;
+}
+
+void vkb_cuda_name(const struct vkb_cuda *cuda, int ordinal, char name[VKB_CUDA_NAME_SIZE])
+{
+    struct uuid uuid = {{0}};
+    char device_name[256] = "unknown GPU";
+    int device;
+
+    if (cuda->cuDeviceGet(&device, ordinal) == 0) {
+        cuda->cuDeviceGetName(device_name, sizeof device_name, device);
+        cuda->cuDeviceGetUuid(&uuid, device);
+    }
+    name += snprintf(name, VKB_CUDA_NAME_SIZE, "%.200s (uuid:", device_name);
+    for (int i = 0; i < 16; ++i)
+        name += sprintf(name, "%s%02x", i >= 4 && i <= 10 && i % 2 == 0 ? "-" : "", uuid.bytes[i]);
+    strcpy(name, ")");
+}
+
+static bool fail_missing(const struct vkb_cuda *cuda, const char *name, int count,
+                         struct vkb_error *error)
+{
+    char found[VKB_CUDA_NAME_SIZE];
+
+    vkb_fail(error, VKB_ERROR_VALUE,
+             "device: the renderer is on %s, which is not among CUDA's GPUs:", name);
+    for (int i = 0; i < count; ++i) {
+        vkb_cuda_name(cuda, i, found);
+        vkb_add_words(error, "%s %s", i ? "," : "", found);
+    }
+    vkb_add_words(error,
+                  "%s. Open a renderer with the adapter \"uuid:...\" of one of them, or use "
+                  "arrays on the host",
+                  count ? "" : " there are none");
+    return false;
+}
+
+static bool find_device(struct vkb_cuda *cuda, const uint8_t uuid[16], const char *name,
+                        struct vkb_error *error)
+{
+    int count = 0;
+
+    if (!CU(error, cuda->cuInit(0)) || !CU(error, cuda->cuDeviceGetCount(&count)))
+        return false;
+    for (cuda->ordinal = 0; cuda->ordinal < count; ++cuda->ordinal) {
+        struct uuid found;
+        if (!CU(error, cuda->cuDeviceGet(&cuda->device, cuda->ordinal))
+            || !CU(error, cuda->cuDeviceGetUuid(&found, cuda->device)))
+            return false;
+        if (memcmp(found.bytes, uuid, sizeof found.bytes) == 0)
+            return true;
+    }
+    return fail_missing(cuda, name, count, error);
+}
+
+// What this thread's calls do to captures of graphs, while the core makes calls.
+static _Thread_local int capture_mode;
+
+// Every use of the context is between these two. Waits, imports and frees would else invalidate
+// captures of any thread, which have nothing to do with the own stream.
+static bool enter(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    if (!CU(error, cuda->cuCtxPushCurrent(cuda->context)))
+        return false;
+    capture_mode = CAPTURE_MODE_RELAXED;
+    cuda->cuThreadExchangeStreamCaptureMode(&capture_mode);
+    return true;
+}
+
+static bool leave(struct vkb_cuda *cuda, bool done)
+{
+    void *context;
+
+    cuda->cuThreadExchangeStreamCaptureMode(&capture_mode);
+    cuda->cuCtxPopCurrent(&context);
+    return done;
+}
+
+// Work of Vulkan cannot be recorded into a graph. A stream that waits for another one's event is
+// captured with it.
+static bool require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error)
+{
+    int status = 0;
+    const result answer = RESULT(cuda->cuStreamIsCapturing(stream, &status));
+
+    if (answer != STREAM_CAPTURE_IMPLICIT && status == 0)
+        return check(cuda, error, answer, "cuStreamIsCapturing");
+    return vkb_fail(error, VKB_ERROR_GENERAL,
+                    "CUDA graph: the stream is being captured, and the renderer's work cannot be "
+                    "recorded; make the call before or after the capture");
+}
+
+// As enter, to give work to the own stream and, unless it is NULL, to another one.
+static bool enter_streams(struct vkb_cuda *cuda, void *other, struct vkb_error *error)
+{
+    return enter(cuda, error)
+        && ((require_no_capture(cuda, cuda->stream, error)
+             && (!other || require_no_capture(cuda, other, error)))
+            || leave(cuda, false));
+}
+
+struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error)
+{
+    struct vkb_cuda *cuda = vkb_alloc(error, 1, sizeof *cuda);
+
+    if (!cuda)
+        return NULL;
+    if (load(cuda, error) && find_device(cuda, uuid, name, error)
+        && CU(error, cuda->cuDevicePrimaryCtxRetain(&cuda->context, cuda->device))
+        && enter(cuda, error)
+        && leave(cuda, CU(error, cuda->cuStreamCreate(&cuda->stream, STREAM_NON_BLOCKING))))
+        return cuda;
+    vkb_cuda_close(cuda);
+    return NULL;
+}
+
+void vkb_cuda_close(struct vkb_cuda *cuda)
+{
+    struct vkb_error ignored;
+
+    if (!cuda)
+        return;
+    if (cuda->stream && enter(cuda, &ignored))
+        leave(cuda, cuda->cuStreamDestroy(cuda->stream) == 0);
+    if (cuda->context)
+        cuda->cuDevicePrimaryCtxRelease(cuda->device);
+    vkb_free(cuda);
+}
+
+bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    return CU(error, cuda->cuCtxPushCurrent(cuda->context));
+}
+
+void vkb_cuda_leave(struct vkb_cuda *cuda)
+{
+    void *context;
+
+    cuda->cuCtxPopCurrent(&context);
+}
+
+bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error)
+{
+    return enter_streams(cuda, stream, error) && leave(cuda, true);
+}
+
+int vkb_cuda_ordinal(const struct vkb_cuda *cuda)
+{
+    return cuda->ordinal;
+}
+
+void *vkb_cuda_stream(const struct vkb_cuda *cuda)
+{
+    return cuda->stream;
+}
+
+static bool import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
+                   struct vkb_cuda_memory *memory, struct vkb_error *error)
+{
+    const struct memory_handle handle = {
+        .type = HANDLE_OPAQUE_FD,
+        .handle.descriptor = descriptor,
+        .size = size,
+        .flags = MEMORY_DEDICATED,
+    };
+
+    if (!CU(error, cuda->cuImportExternalMemory(&memory->handle, &handle))) {
+        close(descriptor);
+        return false;
+    }
+    return CU(error, cuda->cuExternalMemoryGetMappedBuffer(&memory->address, memory->handle,
+                                                           &(struct memory_buffer){.size = size}))
+        && CU(error, cuda->cuEventCreate(&memory->event, EVENT_DISABLE_TIMING));
+}
+
+bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
+                     struct vkb_cuda_memory *memory, struct vkb_error *error)
+{
+    *memory = (struct vkb_cuda_memory){0};
+    if (!enter(cuda, error)) {
+        close(descriptor);
+        return false;
+    }
+    const bool done = leave(cuda, import(cuda, descriptor, size, memory, error));
+    if (!done)
+        vkb_cuda_free(cuda, memory);
+    return done;
+}
+
+void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
+{
+    struct vkb_error ignored;
+
+    if (!enter(cuda, &ignored))
+        return;
+    // CUDA leaks the memory unless the mapped buffer is freed first.
+    if (memory->address)
+        cuda->cuMemFree(memory->address);
+    if (memory->handle)
+        cuda->cuDestroyExternalMemory(memory->handle);
+    if (memory->event)
+        cuda->cuEventDestroy(memory->event);
+    leave(cuda, true);
+    *memory = (struct vkb_cuda_memory){0};
+}
+
+void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vkb_error *error)
+{
+    const struct semaphore_handle handle = {
+        .type = HANDLE_TIMELINE_FD,
+        .handle.descriptor = descriptor,
+    };
+    void *semaphore = NULL;
+
+    if (!enter(cuda, error)
+        || !leave(cuda, CU(error, cuda->cuImportExternalSemaphore(&semaphore, &handle)))) {
+        close(descriptor);
+        return NULL;
+    }
+    return semaphore;
+}
+
+void vkb_cuda_free_semaphore(struct vkb_cuda *cuda, void *semaphore)
+{
+    struct vkb_error ignored;
+
+    if (enter(cuda, &ignored))
+        leave(cuda, cuda->cuDestroyExternalSemaphore(semaphore) == 0);
+}
+
+bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
+                     struct vkb_error *error)
+{
+    const struct semaphore_point point = {.value = value};
+
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, CU(error, cuda->cuSignalExternalSemaphoresAsync(&semaphore, &point, 1,
+                                                                       cuda->stream)));
+}
+
+bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
+                   struct vkb_error *error)
+{
+    const struct semaphore_point point = {.value = value};
+
+    return enter_streams(cuda, stream, error)
+        && leave(cuda, CU(error, cuda->cuWaitExternalSemaphoresAsync(
+                                     &semaphore, &point, 1, stream ? stream : cuda->stream)));
+}
+
+bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_settle(struct vkb_cuda *cuda)
+{
+    struct vkb_error ignored;
+
+    return enter(cuda, &ignored) && leave(cuda, cuda->cuCtxSynchronize() == 0);
+}
+
+bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
+                    struct vkb_error *error)
+{
+    int ordinal = -1;
+    unsigned managed = 0;
+    char theirs[VKB_CUDA_NAME_SIZE], ours[VKB_CUDA_NAME_SIZE];
+
+    if (!enter(cuda, error))
+        return false;
+    const bool known = leave(
+        cuda, cuda->cuPointerGetAttribute(&ordinal, ATTRIBUTE_DEVICE_ORDINAL, address) == 0
+                  && cuda->cuPointerGetAttribute(&managed, ATTRIBUTE_IS_MANAGED, address) == 0);
+    if (!known)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "%s: its address is not in CUDA's memory; it may have been freed", what);
+    if (managed)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "%s: it is in managed (unified) memory; copy it to the device's own", what);
+    if (ordinal == cuda->ordinal)
+        return true;
+    vkb_cuda_name(cuda, ordinal, theirs);
+    vkb_cuda_name(cuda, cuda->ordinal, ours);
+    return vkb_fail(error, VKB_ERROR_VALUE,
+                    "%s: it is on %s, and the renderer is on %s; open a renderer with the array's "
+                    "GPU as adapter, or move the array",
+                    what, theirs, ours);
+}
+
+// The stream waits for what another one has got so far.
+static bool follow(struct vkb_cuda *cuda, void *after, struct vkb_error *error)
+{
+    void *event = NULL;
+
+    if (!after)
+        return true;
+    const bool done = CU(error, cuda->cuEventCreate(&event, EVENT_DISABLE_TIMING))
+                   && CU(error, cuda->cuEventRecord(event, after))
+                   && CU(error, cuda->cuStreamWaitEvent(cuda->stream, event, 0));
+    if (event)
+        cuda->cuEventDestroy(event);
+    return done;
+}
+
+bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
+                   void *after, struct vkb_error *error)
+{
+    return enter_streams(cuda, after, error)
+        && leave(cuda, follow(cuda, after, error)
+                           && CU(error, cuda->cuMemcpyDtoDAsync(to, from, size, cuda->stream))
+                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
+                         size_t size, void *after, struct vkb_error *error)
+{
+    return enter_streams(cuda, after, error)
+        && leave(cuda,
+                 follow(cuda, after, error)
+                     && CU(error, cuda->cuMemcpyDtoDAsync(to->address, from, size, cuda->stream))
+                     && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
+}
+
+bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to)
+{
+    struct vkb_error ignored;
+
+    return cuda->cuCtxWaitEvent && enter(cuda, &ignored)
+        && leave(cuda, cuda->cuCtxWaitEvent(cuda->context, to->event) == 0);
+}
+
+bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
+                       struct vkb_error *error)
+{
+    return enter(cuda, error) && leave(cuda, CU(error, cuda->cuEventSynchronize(to->event)));
+}
+
+bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
+                   struct vkb_error *error)
+{
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, CU(error, cuda->cuMemcpyDtoHAsync(to, from, size, cuda->stream))
+                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
+                    struct vkb_error *error)
+{
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, CU(error, cuda->cuMemcpyHtoDAsync(to, from, size, cuda->stream))
+                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+}
+
+bool vkb_cuda_can_mark(const struct vkb_cuda *cuda)
+{
+    return cuda->cuCtxRecordEvent != NULL;
+}
+
+bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
+{
+    struct vkb_error ignored;
+
+    // Of all streams, since nothing tells on which ones the memory was used.
+    return vkb_cuda_can_mark(cuda) && enter(cuda, &ignored)
+        && leave(cuda, cuda->cuCtxRecordEvent(cuda->context, memory->event) == 0);
+}
+
+bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
+{
+    struct vkb_error ignored;
+
+    return enter(cuda, &ignored) && leave(cuda, cuda->cuEventQuery(memory->event) == 0);
+}

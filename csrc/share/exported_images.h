@@ -1,0 +1,20 @@
+// Images that come from memory that CUDA shares, and framebuffers that go there.
+#ifndef VKB_EXPORTED_H
+#define VKB_EXPORTED_H
+
+#include "execute/record.h"
+
+// Fails with a value error if a dispatch cannot read the image: its rows are too far apart.
+bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input *input,
+                        struct vkb_error *error);
+
+// Records the copy of the input to its image, if it is to be sent, and the count of NaN and
+// infinity.
+bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
+                               struct vkb_error *error);
+
+// Orders the submission after what CUDA fills. Where the device has no timelines, this waits until
+// CUDA has filled the memory of the inputs.
+bool vkb_exported_wait(struct vkb_run *run, struct vkb_error *error);
+
+#endif

@@ -1,0 +1,91 @@
+// Memory of the device that CUDA maps, too: what comes from arrays on the device, and results that
+// stay there. It is kept for new arrays when an array is freed. Calls must not overlap; the core
+// makes them with the GIL or vkb_memory.
+#ifndef VKB_EXPORTS_H
+#define VKB_EXPORTS_H
+
+#include "share/cuda.h"
+#include "vulkan/export.h"
+#include "vulkan/timeline.h"
+
+struct vkb_export {
+    struct vkb_export *previous, *next;  // in the list of taken or idle ones
+    struct vkb_buffer buffer;
+    struct vkb_cuda_memory memory;
+    uint64_t size;
+    struct vkb_exports *exports;
+    bool filling;         // CUDA may still copy to it, and no point tells when it is filled
+    bool marked;          // of an idle one: its event tells when its last use is over
+    uint64_t given_back;  // the number of the return that made it idle
+    // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
+    uint64_t filled, drawn;
+};
+
+// A timeline of Vulkan that CUDA shares. `value` is the last point that was given away.
+struct vkb_shared_timeline {
+    VkSemaphore semaphore;  // VK_NULL_HANDLE: there is none; the host waits instead
+    void *cuda;
+    uint64_t value;
+};
+
+struct vkb_exports {
+    const struct vkb_device *device;  // NULL: closed
+    uint32_t users;                   // which include the renderer
+    struct vkb_cuda *cuda;
+    struct vkb_export *taken, *idle;  // the latest first
+    uint64_t idle_size;
+    // Numbers of returns: of the last one, and of the last one before CUDA finished all work.
+    uint64_t last_given_back, settled;
+    // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
+    struct vkb_shared_timeline filled, drawn;
+};
+
+// Opens CUDA for the device. The caller is the first user.
+struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct vkb_error *error);
+// Must be called before the device is destroyed, and when it has finished all work. Taken memory
+// stays CUDA's until it is given back. `settled`: what vkb_exports_settle returned.
+void vkb_exports_close(struct vkb_exports *exports, bool settled);
+
+// Each taken memory has a user, and so has each call that leaves the lock. The last one of closed
+// exports frees them with vkb_exports_free, without the lock: true.
+void vkb_exports_begin_use(struct vkb_exports *exports);
+bool vkb_exports_end_use(struct vkb_exports *exports);
+void vkb_exports_free(struct vkb_exports *exports);
+
+// Takes at least `size` bytes, of undefined content.
+struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
+                                    struct vkb_error *error);
+// Waits for a copy that vkb_cuda_begin_copy has begun. May overlap with calls for other memory.
+bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error);
+
+// Lets CUDA signal that the copy is complete, so that the host need not wait for it, if CUDA can
+// order it with the work of other streams.
+bool vkb_export_filling(struct vkb_export *one, struct vkb_error *error);
+// The point of the copy, if it is later than `point` and the host does not wait for it.
+void vkb_export_wait(const struct vkb_export *one, struct vkb_sync_point *point);
+// The next point of the device's work, with the renderer's lock; none without timelines.
+void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *point);
+// Makes a stream of CUDA wait until the device has drawn to the memory; NULL: CUDA's own stream
+// here. Fails if the device was lost before.
+bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error);
+
+// The device has finished everything: no stream has to wait any more. May be NULL, as below.
+void vkb_exports_complete(struct vkb_exports *exports);
+// Waits until CUDA has done all work of the context, before the timelines are destroyed. May
+// overlap with other calls. May fail, as vkb_cuda_settle.
+bool vkb_exports_settle(const struct vkb_exports *exports);
+// The device must have finished all work on it, and CUDA a copy to it. What CUDA's streams have got
+// so far may still use it.
+void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one);
+// Where drivers are too old to mark what was given back, the host has to wait with vkb_cuda_settle
+// before vkb_exports_take can use it again: the number to tell vkb_exports_set_settled afterwards,
+// or 0.
+uint64_t vkb_exports_unmarked(const struct vkb_exports *exports);
+void vkb_exports_set_settled(struct vkb_exports *exports, uint64_t given_back);
+
+// Idle memory that is not kept, taken; NULL: none. The caller frees its `memory` with
+// vkb_cuda_free, which waits and so needs no lock, and then removes it.
+struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports);
+void vkb_exports_remove(struct vkb_export *one);
+
+#endif

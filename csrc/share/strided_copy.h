@@ -1,0 +1,57 @@
+// A dispatch outside of the graph: moves elements between images and buffers with any strides, and
+// counts NaN and infinity among them.
+#ifndef VKB_STRIDED_COPY_H
+#define VKB_STRIDED_COPY_H
+
+#include "execute/bindings.h"
+#include "vulkan/memory.h"
+
+enum vkb_strided_copy_kind {
+    VKB_STRIDED_COPY_BUFFER,
+    VKB_STRIDED_COPY_TO_IMAGE,
+    VKB_STRIDED_COPY_FROM_IMAGE,
+    VKB_STRIDED_COPY_TO_LAYERS,
+    VKB_STRIDED_COPY_FROM_LAYERS,
+    VKB_STRIDED_COPY_COUNT,
+};
+
+// Created at the first use of each kind; destroying a zeroed or half-created one is safe.
+struct vkb_strided_copies {
+    struct vkb_strided_copy_pipeline {
+        struct vkb_layouts layouts;
+        VkPipeline handle;
+    } pipelines[VKB_STRIDED_COPY_COUNT];
+};
+
+bool vkb_strided_copy_create(const struct vkb_device *device, VkPipelineCache cache,
+                             enum vkb_strided_copy_kind kind, struct vkb_strided_copies *copies,
+                             struct vkb_error *error);
+void vkb_strided_copy_destroy(const struct vkb_device *device, struct vkb_strided_copies *copies);
+
+// The push constants of strided_copy.comp: strides in bytes, `one` for channels that are not there.
+struct vkb_strided_copy_layout {
+    int32_t offset, row_stride, pixel_stride, channel_stride;
+    uint32_t width, height, channels, from_channels;
+    uint32_t size, one, stores, is_float;
+    int32_t layer_stride;  // in the buffer; there, a multiple of 16
+    uint32_t aligned;      // pixels of four channels that begin with words, without gaps
+};
+
+// By its kind, `image` stands in place of `from` or `to`.
+struct vkb_strided_copy_work {
+    enum vkb_strided_copy_kind kind;
+    struct vkb_strided_copy_layout layout;
+    VkDescriptorBufferInfo from, to, counts;
+    VkDescriptorImageInfo image;
+    uint32_t layers;  // 0: it is one image
+};
+
+// Bytes from the counts of one image to those of the next.
+enum { VKB_COUNTS_SIZE = 256 };
+
+bool vkb_strided_copy_record(const struct vkb_device *device,
+                             const struct vkb_strided_copies *copies, VkCommandBuffer commands,
+                             VkDescriptorPool pool, const struct vkb_strided_copy_work *work,
+                             struct vkb_error *error);
+
+#endif

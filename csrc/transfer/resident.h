@@ -1,0 +1,51 @@
+// Images that stay on the device as long as there is a handle of them. Calls must not overlap; the
+// core makes them with the GIL or vkb_memory, and calls the last two functions with the renderer's
+// lock.
+#ifndef VKB_RESIDENT_H
+#define VKB_RESIDENT_H
+
+#include "execute/image_cache.h"
+#include "transfer/upload.h"
+
+struct vkb_resident {
+    struct vkb_resident *previous, *next;  // in the list of its renderer
+    struct vkb_resident_image {
+        struct vkb_cached_image cached;  // not part of the image cache
+        struct vkb_upload upload;
+    } inputs[VKB_INPUT_COUNT];  // by kind
+    struct vkb_non_finite non_finite;
+    uint32_t uses;  // submissions that use it and may still run
+    bool staged;    // its pixels are in staging memory, and the next submission copies them
+    bool recycled;  // will get other pixels, so it keeps its staging memory
+};
+
+struct vkb_residents;
+
+struct vkb_residents *vkb_residents_create(const struct vkb_device *device,
+                                           struct vkb_error *error);
+// Must be called before the device is destroyed, and when it has finished all work on the images.
+// Destroys the images; each struct stays until it is released. `residents` may be NULL.
+void vkb_residents_close(struct vkb_residents *residents);
+
+// Adds an element without an image.
+struct vkb_resident *vkb_resident_add(struct vkb_residents *residents, struct vkb_error *error);
+// The device must have finished all work on it.
+void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *resident);
+
+// Enclose a submission that reads it: before the submission; after the device has finished it, or
+// if there was none.
+void vkb_resident_use(struct vkb_resident *resident);
+void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *resident);
+
+// Creates the image of this kind, with the input's size and format. vkb_resident_fill gives it
+// pixels. No submission may use the element.
+bool vkb_resident_begin(struct vkb_device *device, struct vkb_resident *resident,
+                        enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
+                        struct vkb_error *error);
+// Fills rows of the image from row `first` on. They must be inside of the image, and no submission
+// may use it yet. The input is read before this returns.
+bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
+                       enum vkb_input_kind kind, const struct vkb_input *input, uint32_t first,
+                       struct vkb_error *error);
+
+#endif

@@ -1,0 +1,247 @@
+#include "transfer/sources.h"
+
+#include "share/exported_images.h"
+
+void vkb_run_set_image(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached)
+{
+    run->images[image] = cached;
+    run->contents[image] = cached ? &cached->content : NULL;
+}
+
+bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
+{
+    const struct vkb_image_row *row = &run->graph->images[image];
+    struct vkb_image_cache *cache = &run->frame->cache;
+    struct vkb_cached_image *cached;
+
+    if (run->inputs[row->input].image) {
+        vkb_run_set_image(run, image, run->inputs[row->input].image);
+        return true;
+    }
+    if ((vkb_image_cache_replaces(cache, row)
+         && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
+        || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
+        return false;
+    vkb_run_set_image(run, image, cached);
+    return true;
+}
+
+// An input of the requests that are staged.
+struct pixels {
+    const struct vkb_frame_source *source;
+    const struct vkb_request *requests;
+    uint32_t request_count;
+    uint32_t image;  // of the graph
+    enum vkb_input_kind kind;
+};
+
+// Whether the output of that image lies in the memory of the input's rows.
+static bool overlaps(const struct vkb_output *output, const struct vkb_image_row *row,
+                     const struct vkb_input *input)
+{
+    const uintptr_t start = (uintptr_t)output->memory, other = (uintptr_t)input->memory;
+    const size_t pixel_size = output->channels * vkb_formats[row->format].channel_size;
+    const size_t size = (size_t)row->width * output->row_count * pixel_size;
+
+    return output->memory && start < other + (size_t)input->row_stride * input->height
+        && other < start + size;
+}
+
+// Whether all passes of the request that may read the image read words, and nothing copies it to an
+// output or writes to the memory of its pixels.
+static bool allows_in_place(const struct vkb_request *request, uint32_t image,
+                            const struct vkb_input *input)
+{
+    const struct vkb_graph *graph = &request->plan->graph;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        if (vkb_pass_reads(pass, image)
+            && (pass->reading != VKB_READING_WORDS
+                || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
+            return false;
+    }
+    for (uint32_t i = 0; i < request->plan->output_count; ++i)
+        if (request->plan->outputs[i] == image
+            || overlaps(&request->outputs[i], &graph->images[request->plan->outputs[i]], input))
+            return false;
+    return true;
+}
+
+static bool stage_resident(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                           struct vkb_error *error)
+{
+    struct vkb_resident *resident = pixels->source->resident;
+    struct vkb_staged_input *staged = &run->inputs[pixels->kind];
+
+    (void)error;
+    *taken = resident;
+    if (!resident)
+        return true;
+    staged->image = &resident->inputs[pixels->kind].cached;
+    staged->upload = &resident->inputs[pixels->kind].upload;
+    staged->send = resident->staged;
+    staged->access = staged->image->image.access;
+    // Those of all its images.
+    run->frame->non_finite = resident->non_finite;
+    return true;
+}
+
+static void end_resident(const struct vkb_frame_source *source, struct vkb_staged_input *staged,
+                         bool submitted)
+{
+    if (submitted)
+        source->resident->staged = false;
+    else
+        // The recorded commands do not run, so the image keeps its last access.
+        staged->image->image.access = staged->access;
+}
+
+static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                           struct vkb_error *error)
+{
+    const struct vkb_input *input = pixels->source->inputs[pixels->kind];
+    struct vkb_in_place *place = &run->frame->in_place[pixels->kind];
+
+    (void)error;
+    if (!pixels->source->in_place || !input)
+        return true;
+    for (uint32_t i = 0; i < pixels->request_count; ++i)
+        if (!allows_in_place(&pixels->requests[i], pixels->image, input))
+            return true;
+    *taken = vkb_in_place_stage(run->device, place, input, &run->frame->cache.clock);
+    if (!*taken)
+        return true;
+    run->inputs[pixels->kind].image = &place->cached;
+    run->submission->inputs[pixels->kind] = place->cached.image;
+    vkb_add_non_finite(&run->frame->non_finite, place->non_finite);
+    return true;
+}
+
+static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                           struct vkb_error *error)
+{
+    const struct vkb_input *input = pixels->source->inputs[pixels->kind];
+    struct vkb_staged_input *staged = &run->inputs[pixels->kind];
+    uint64_t *held = &run->frame->exported[pixels->kind];
+
+    *taken = input && input->exported;
+    if (!*taken)
+        return true;
+    if (!vkb_exported_check(run->device, input, error)
+        || !vkb_run_resolve(run, pixels->image, error))
+        return false;
+    staged->image = run->images[pixels->image];
+    staged->input = input;
+    staged->send = *held != input->serial || !staged->image->content.valid;
+    run->unknown_non_finite = true;
+    if (!staged->send)
+        return true;
+    // The image no longer has the pixels of the host with which the next ones would be compared.
+    vkb_upload_forget(&run->frame->uploads[pixels->kind]);
+    *held = input->serial;
+    return vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock, NULL, 0,
+                                     error);
+}
+
+// Stages the image if the device does not have it yet.
+static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                         struct vkb_error *error)
+{
+    struct vkb_upload *upload = &run->frame->uploads[pixels->kind];
+    struct vkb_staged_input *staged = &run->inputs[pixels->kind];
+    bool changed;
+
+    *taken = true;
+    if (!vkb_run_resolve(run, pixels->image, error))
+        return false;
+    run->frame->exported[pixels->kind] = 0;
+    struct vkb_cached_image *image = run->images[pixels->image];
+    // If the last write did not reach the image, there is no content to compare with.
+    if (image->image.mapped && !image->content.valid)
+        vkb_upload_forget(upload);
+    if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, run->submission->number,
+                          pixels->source->inputs[pixels->kind], &image->image, &changed, error))
+        return false;
+    staged->image = image;
+    staged->upload = upload;
+    staged->send = changed || !image->content.valid;
+    vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
+    return !staged->send
+        || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
+}
+
+static bool record_copy(struct vkb_run *run, struct vkb_staged_input *staged,
+                        struct vkb_error *error)
+{
+    (void)error;
+    if (!staged->send)
+        return true;
+    if (!staged->image->image.mapped)
+        vkb_upload_record(run->device, run->submission->commands.buffer, staged->upload,
+                          &staged->image->image);
+    staged->image->content.valid = true;
+    return true;
+}
+
+static const struct vkb_source_way {
+    // Sets *taken where the way suits the input.
+    bool (*stage)(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                  struct vkb_error *error);
+    // Both may be NULL.
+    bool (*record)(struct vkb_run *run, struct vkb_staged_input *staged, struct vkb_error *error);
+    void (*end)(const struct vkb_frame_source *source, struct vkb_staged_input *staged,
+                bool submitted);
+} ways[] = {
+    {stage_resident, record_copy, end_resident},
+    {stage_exported, vkb_exported_record_input, NULL},
+    {stage_in_place, NULL, NULL},
+    {stage_upload, record_copy, NULL},
+};
+
+bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *source,
+                       const struct vkb_request *requests, uint32_t request_count,
+                       struct vkb_error *error)
+{
+    struct pixels pixels = {source, requests, request_count, 0, VKB_INPUT_NONE};
+
+    run->frame->non_finite = (struct vkb_non_finite){0};
+    for (; pixels.image < run->graph->image_count; ++pixels.image) {
+        bool taken = false;
+        pixels.kind = run->graph->images[pixels.image].input;
+        if (pixels.kind == VKB_INPUT_NONE)
+            continue;
+        for (size_t i = 0; !taken && i < sizeof ways / sizeof ways[0]; ++i) {
+            if (!ways[i].stage(run, &pixels, &taken, error))
+                return false;
+            run->inputs[pixels.kind].way = &ways[i];
+        }
+    }
+    return true;
+}
+
+bool vkb_sources_record(struct vkb_run *run, struct vkb_error *error)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].image && run->inputs[kind].way->record
+            && !run->inputs[kind].way->record(run, &run->inputs[kind], error))
+            return false;
+    return true;
+}
+
+void vkb_sources_end(struct vkb_run *run, const struct vkb_frame_source *source, bool submitted)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].image && run->inputs[kind].way->end)
+            run->inputs[kind].way->end(source, &run->inputs[kind], submitted);
+}
+
+uint64_t vkb_sources_version(const struct vkb_run *run)
+{
+    uint64_t version = 0;
+
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
+        if (run->inputs[kind].image && run->inputs[kind].image->content.version > version)
+            version = run->inputs[kind].image->content.version;
+    return version ? version : run->frame->scene.serial;
+}

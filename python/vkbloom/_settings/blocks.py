@@ -1,0 +1,127 @@
+"""Settings as blocks of bytes: structs of the core, by the core's tables of their members."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from vkbloom import _core
+
+if TYPE_CHECKING:
+    from vkbloom._settings.glare import Glare
+
+__all__ = ["settings_block"]
+
+Table = Mapping[str, tuple[int, str, int]]
+Values = Mapping[str, tuple[float, float, float]]
+
+#: The codes of the tables as those of the module struct.
+_CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
+#: Members that are arrays of numbers, and the member that counts them, if there is one.
+_COUNTS: Final[Mapping[str, str | None]] = {
+    "weights": "weight_count",
+    "layers": "layer_count",
+    "level_weights": "level_weight_count",
+    "tint": None,
+    "sun_position": None,
+}
+_MAX_FLOAT: Final = 3.4028234663852886e38
+
+
+def _pack(block: bytearray, table: Table, name: str, *numbers: float) -> None:
+    offset, code, _ = table[name]
+    struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, offset, *numbers)
+
+
+def _defaults(table: Table, values: Values) -> bytes:
+    """Return a struct whose numbers have their defaults, and whose rest is 0."""
+    block = bytearray(table[""][2])
+    for name, (default, _, _) in values.items():
+        _pack(block, table, name, default)
+    return bytes(block)
+
+
+_STAGE: Final = _defaults(_core.STAGE_BLOCK, _core.GLARE_VALUES)
+_SETTINGS: Final = _defaults(_core.SETTINGS_BLOCK, _core.VALUES)
+
+
+def _index(name: str, value: object, names: Sequence[str]) -> int:
+    if value not in names:
+        raise ValueError(f"{name}: {value!r} is not one of {', '.join(names)}")
+    return names.index(str(value))
+
+
+def _pack_value(block: bytearray, table: Table, name: str, value: float, values: Values) -> None:
+    """Store a number of a table; raise ValueError if it is out of its range."""
+    default, low, high = values[name]
+    if not low <= value <= high and value != default:
+        raise ValueError(f"{name}: {value!r} is out of range, {low!r} to {high!r}")
+    _pack(block, table, name, int(value) if table[name][1] == "i4" else value)
+
+
+def _pack_array(block: bytearray, name: str, value: Sequence[Any]) -> None:
+    rows = [row if isinstance(row, tuple) else (row,) for row in value]
+    numbers = [float(number) for row in rows for number in row]
+    room = _core.SETTINGS_BLOCK[name][2]
+    if not 1 <= len(numbers) <= room:
+        raise ValueError(f"{name}: {len(numbers)} numbers are out of range, 1 to {room}")
+    if not all(abs(number) <= _MAX_FLOAT for number in numbers):
+        raise ValueError(f"{name}: {value!r} is out of range, finite numbers")
+    _pack(block, _core.SETTINGS_BLOCK, name, *numbers)
+    if counter := _COUNTS[name]:
+        _pack(block, _core.SETTINGS_BLOCK, counter, len(rows))
+
+
+def _pack_size(block: bytearray, size: tuple[int, int]) -> None:
+    width, height = size
+    if not all(1 <= side < 1 << 32 for side in size):
+        raise ValueError(f"bloom_size: {size!r} is out of range, sides of at least 1")
+    _pack(block, _core.SETTINGS_BLOCK, "bloom_width", width)
+    _pack(block, _core.SETTINGS_BLOCK, "bloom_height", height)
+
+
+def _stage_block(stage: Glare) -> bytearray:
+    table, block = _core.STAGE_BLOCK, bytearray(_STAGE)
+    _pack(block, table, "kind", _index("glare", stage.stage, _core.STAGES))
+    for name in _core.GLARE_VALUES:
+        if (value := getattr(stage, name, None)) is not None:
+            _pack_value(block, table, name, value, _core.GLARE_VALUES)
+    numbers = [n for scale, tint in getattr(stage, "ghosts", ()) for n in (*tint, scale)]
+    if len(numbers) > table["ghosts"][2]:
+        raise ValueError(
+            f"ghosts: {len(numbers) // 4} ghosts are out of range, 0 to {_core.MAX_GHOSTS}"
+        )
+    _pack(block, table, "ghosts", *numbers)
+    _pack(block, table, "ghost_count", len(numbers) // 4)
+    return block
+
+
+def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
+    """Return the block of a method with these fields; those that it lacks have their defaults.
+
+    Raises ValueError or TypeError if the core has no room for a value.
+    """
+    table, block = _core.SETTINGS_BLOCK, bytearray(_SETTINGS)
+    _pack(block, table, "method", _index("method", method, _core.METHODS))
+    _pack(block, table, "thresholded", fields.get("threshold") is not None)
+    for name, value in fields.items():
+        if value is None:
+            continue
+        if name in _core.VALUES:
+            _pack_value(block, table, name, value, _core.VALUES)
+        elif name in _core.CHOICES:
+            _pack(block, table, name, _index(name, value, _core.CHOICES[name]))
+        elif name in _COUNTS:
+            _pack_array(block, name, value)
+        elif name == "bloom_size":
+            _pack_size(block, value)
+        elif name == "format":
+            _pack(block, table, name, _index(name, value, _core.FORMATS))
+    stages = [_stage_block(stage) for stage in fields.get("glare", ())]
+    if len(stages) > _core.MAX_STAGES:
+        raise ValueError(f"glare: {len(stages)} stages are out of range, 0 to {_core.MAX_STAGES}")
+    start, size = table["stages"][0], len(_STAGE)
+    block[start : start + size * len(stages)] = b"".join(stages)
+    _pack(block, table, "stage_count", len(stages))
+    return bytes(block)

@@ -1,0 +1,93 @@
+"""HTML of reports, pages and notebooks: elements, whose texts are escaped.
+
+Styles are attributes of the elements, because notebooks that are not trusted remove style sheets.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+__all__ = ["Markup", "element", "encoded_image", "figure", "image", "joined", "page", "table"]
+
+_NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
+
+
+class Markup(str):
+    """HTML, which is not escaped again."""
+
+    __slots__ = ()
+
+
+def joined(parts: Iterable[object]) -> Markup:
+    """Return HTML as it is, and other values as escaped text, one after the other."""
+    return Markup(
+        "".join(part if isinstance(part, Markup) else html.escape(str(part)) for part in parts)
+    )
+
+
+def element(name: str, *content: object, **attributes: object) -> Markup:
+    """Return an element; in names of attributes, _ is written for - and after a word of Python.
+
+    An attribute that is None is left out.
+    """
+    written = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{html.escape(str(value))}"'
+        for key, value in attributes.items()
+        if value is not None
+    )
+    end = "" if name in ("br", "hr", "img", "meta") else f"</{name}>"
+    return Markup(f"<{name}{written}>{joined(content)}{end}")
+
+
+def image(png: bytes, alt: str, **attributes: object) -> Markup:
+    """Return an image with its data."""
+    return encoded_image(base64.b64encode(png).decode("ascii"), alt, **attributes)
+
+
+def encoded_image(data: str, alt: str, **attributes: object) -> Markup:
+    """Return an image of a PNG file in base64."""
+    return element("img", src=f"data:image/png;base64,{data}", alt=alt, **attributes)
+
+
+def figure(content: Markup, *caption: object, **attributes: object) -> Markup:
+    """Return a picture with its caption."""
+    return element("figure", content, element("figcaption", *caption), **attributes)
+
+
+def table(
+    rows: Iterable[Sequence[object]],
+    head: Sequence[str] = (),
+    *,
+    caption: object = None,
+    name: Mapping[str, object] = _NO_ATTRIBUTES,
+    cell: Mapping[str, object] = _NO_ATTRIBUTES,
+    **attributes: object,
+) -> Markup:
+    """Return rows whose first value is their name; `name`, `cell`: attributes of the cells."""
+    body = [
+        element(
+            "tr",
+            element("th", first, scope="row", **name),
+            *(element("td", value, **cell) for value in rest),
+        )
+        for first, *rest in rows
+    ]
+    heads = [element("th", text, scope="col") for text in head]
+    return element(
+        "table",
+        *([] if caption is None else [element("caption", caption)]),
+        *([element("thead", element("tr", *heads))] if heads else []),
+        element("tbody", *body),
+        **attributes,
+    )
+
+
+def page(title: str, *content: object, style: str = "") -> str:
+    """Return a complete document."""
+    head = joined(
+        (element("meta", charset="utf-8"), element("title", title), element("style", Markup(style)))
+    )
+    return f'<!doctype html><html lang="en">{head}{element("body", *content)}</html>\n'

@@ -1,0 +1,302 @@
+"""What a bloom does at the border of the image, and across the seam of two views."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from vkbloom._argument_types import checked
+from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
+
+_DEFAULT = Probe()
+#: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
+#: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
+BORDER_LIMITS: Final = {
+    "stale": 1e-3,
+    "wrap": 0.01,
+    "inside": 0.025,
+    "edge": 2.0,
+    "corner": 3.0,
+    "lost": 0.05,
+    "flat": 0.1,
+}
+# Side of the light, and the period of a chain of four halvings, in pixels.
+_LIGHT: Final = 3
+_PERIOD: Final = 16
+# How much larger the image before is.
+_LARGER: Final = 32
+
+
+@checked
+def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
+    """Return the energy of a light at the border, divided by that of a light in the middle.
+
+    E(p) / E(c), where E(p) is the sum of the bloom of a square of 3 x 3 pixels from the pixel p on,
+    less that of a black image, and c is the middle.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+
+    Returns
+    -------
+    dict of str to float
+        "edge": the larger of the middle of the left and of the upper edge; "corner": the upper left
+        corner. 1 in a bloom that loses no light and adds none. A bloom that repeats the outermost
+        pixels has more, one that reads black outside less.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite, or the bloom of the light in the middle is black.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    dark = probe.apply(bloom, probe.flat(0.0))[0]
+    shares = {
+        name: float(_spread(bloom, probe, dark, at)[0].sum()) / _expected(bloom, probe, dark, at)[1]
+        for name, at in _places(probe).items()
+    }
+    return {"edge": max(shares["left"], shares["top"]), "corner": shares["corner"]}
+
+
+@checked
+def assert_border(
+    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+) -> None:
+    """Assert that a border neither adds light nor takes it away.
+
+    With the bloom h of a square of 3 x 3 pixels in the middle, and E the sum of such a bloom: 1.5
+    standard deviations of h from an edge, the bloom is h, cut off by the frame ("inside" is the
+    light that differs, "wrap" that at the opposite edge, as shares of E of the middle). At the
+    border, E is at least the part of h that is in the frame, less "lost", and at most "edge" or
+    "corner" times E of the middle. The bloom of a flat image is the same in a corner as in the
+    middle, within "flat". The bloom of a black image does not show the image before ("stale").
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+        Its image must be large enough that no light reaches the border from the middle.
+    limits : mapping of str to float, optional
+        Limits by figure, in place of those of `BORDER_LIMITS`.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, the result is black, or it is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    allowed = BORDER_LIMITS | dict(limits or {})
+    law = "a light at the border has the bloom of a light far from it, cut off by the frame"
+    dark = _check_stale(bloom, probe, allowed["stale"])
+    told = []
+    for name, at in _near(bloom, probe, dark).items():
+        found, error = _spread(bloom, probe, dark, at)
+        expected, energy = _expected(bloom, probe, dark, at)
+        excess = np.abs(found - expected)
+        excess[excess <= 2 * error] = 0
+        across = int(name == "left")
+        profile = excess.sum(axis=(1 - across, 2)) / energy
+        # Light that comes round is at the far edge; light that is spread too far is nearer.
+        quarter = len(profile) // 4
+        wrapped = profile[-quarter:].sum() - profile[-2 * quarter : -quarter].sum()
+        shares = {"wrap": max(0.0, float(wrapped)), "inside": float(profile.sum())}
+        told += [
+            f"{100 * share:.3g} % of the light of a square near the {name} edge is "
+            + ("at the opposite side" if kind == "wrap" else "where the middle has none")
+            for kind, share in shares.items()
+            if not is_within(law, share, allowed[kind], kind)
+        ]
+    told += _at_the_border(bloom, probe, dark, allowed, law)
+    flat = probe.apply(bloom, probe.flat(probe.value))[0]
+    middle = float(flat[probe.centre[1], probe.centre[0]].mean())
+    if middle > 0:
+        off = abs(float(flat[0, 0].mean()) / middle - 1)
+        if not is_within(law, off, allowed["flat"], "flat"):
+            told.append(
+                f"a flat image has {flat[0, 0].mean() / middle:.3g} times as much bloom in the "
+                "corner as in the middle"
+            )
+    if told:
+        fail("assert_border", law, "; ".join(told))
+
+
+def _at_the_border(
+    bloom: Bloom, probe: Probe, dark: Image, allowed: dict[str, float], law: str
+) -> list[str]:
+    """Return what is wrong with lights in the outermost pixels."""
+    told = []
+    for name, at in _places(probe).items():
+        expected, energy = _expected(bloom, probe, dark, at)
+        share = float(_spread(bloom, probe, dark, at)[0].sum()) / energy
+        inside = float(expected.sum()) / energy
+        kind = "corner" if name == "corner" else "edge"
+        figure(f"energy_{name}", share)
+        if not is_within(law, max(0.0, inside - share), allowed["lost"], "lost"):
+            told.append(
+                f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the frame"
+            )
+        if not is_within(law, share, allowed[kind], kind):
+            told.append(f"a light at the {name} swells to {share:.3g} times its energy")
+    return told
+
+
+def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> Image:
+    """Return the bloom of black, the same before and after that of a bright, larger image."""
+    __tracebackhide__ = True
+    width, height = probe.size
+    larger = dataclasses.replace(probe, size=(width + _LARGER, height + _LARGER))
+    before = probe.apply(bloom, probe.flat(0.0))[0]
+    larger.apply(bloom, larger.flat(probe.value))
+    after = probe.apply(bloom, probe.flat(0.0))[0]
+    off = float(np.abs(after - before).max()) / probe.value
+    law = "the bloom of an image does not depend on the image before"
+    if not is_within(law, off, allowed, "stale"):
+        y, x, _ = np.unravel_index(int(np.abs(after - before).argmax()), after.shape)
+        fail(
+            "assert_border",
+            law,
+            f"after a bright image, a black one has {off:.3g} of its light at x {x}, y {y}",
+        )
+    return after
+
+
+@checked
+def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) -> None:
+    """Assert that no light crosses from one view of a picture to the other.
+
+    The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two
+    views side by side, as for the two eyes of a headset. The left one has noise, the right one is
+    black or has the same noise; then the other way round.
+
+    Parameters
+    ----------
+    bloom : callable
+        ``bloom(image, *, region)``; `region` is (x, y, width, height) in pixels. Returns an image
+        of the picture's size, or of that of the region.
+    probe : Probe
+        Its size is that of a view.
+    limit : float
+        Allowed difference, as a share of the largest value of the bloom, beyond the errors of
+        values.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` takes no region, or returns an image of another size.
+    """
+    __tracebackhide__ = True
+    if not takes(bloom, "region"):
+        raise NotTaken("bloom: it takes no keyword region, so views are not told apart")
+    width, height = probe.size
+    noise = [probe.noise(index, probe.value) for index in (0, 1)]
+    law = "the bloom of a view depends on the pixels of that view alone"
+    for side, name in enumerate(("left", "right")):
+        results = []
+        for other in (probe.flat(0.0), noise[1 - side]):
+            views = [noise[side], other] if side == 0 else [other, noise[side]]
+            given = probe.given(np.concatenate(views, axis=1))
+            found = np.asarray(bloom(given, region=(side * width, 0, width, height)))  # type: ignore[call-arg]
+            if found.shape[1] == 2 * width:
+                found = found[:, side * width : (side + 1) * width]
+            results.append(probe.values(found, probe.given(noise[side])))
+        (alone, error), (beside, _) = results
+        off = np.abs(beside - alone)
+        largest = float(np.abs(alone).max()) or 1.0
+        share = max(0.0, float(off.max()) - 2 * error) / largest
+        if not is_within(law, share, limit, "crosstalk"):
+            y, x, _ = np.unravel_index(int(off.argmax()), off.shape)
+            fail(
+                "assert_views",
+                law,
+                f"the other view changes the {name} one by {share:.3g} of its largest value, most "
+                f"at x {x}, y {y}: {limit:g} allowed",
+            )
+
+
+def _spread(bloom: Bloom, probe: Probe, dark: Image, at: tuple[int, int]) -> tuple[Image, float]:
+    """Return the bloom of a square, less that of black, and the error of its values."""
+    __tracebackhide__ = True
+    image = probe.flat(0.0)
+    image[at[1] : at[1] + _LIGHT, at[0] : at[0] + _LIGHT] = probe.value
+    lit, error = probe.apply(bloom, image)
+    return lit - dark, 2 * error
+
+
+def takes(bloom: object, name: str) -> bool:
+    """Return whether a callable takes a keyword of this name."""
+    try:
+        parameters = inspect.signature(bloom).parameters.values()  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+    return any(one.name == name or one.kind is one.VAR_KEYWORD for one in parameters)
+
+
+def _places(probe: Probe) -> dict[str, tuple[int, int]]:
+    x, y = probe.centre
+    return {"left": (0, y), "top": (x, 0), "corner": (0, 0)}
+
+
+def _near(bloom: Bloom, probe: Probe, dark: Image) -> dict[str, tuple[int, int]]:
+    """Return places 1.5 standard deviations from an edge, at most a quarter of a side."""
+    __tracebackhide__ = True
+    spread, energy = _expected(bloom, probe, dark, probe.centre)
+    near = []
+    for axis, side in enumerate(probe.size):
+        profile = np.abs(spread.mean(axis=2)).sum(axis=axis)
+        variance = profile @ (np.arange(side) - probe.centre[axis] - _LIGHT // 2) ** 2
+        deviation = math.sqrt(float(variance / profile.sum())) if energy > 0 else 0.0
+        near.append(min(max(math.ceil(1.5 * deviation) - _LIGHT // 2, 1), side // 4))
+    return {"left": (near[0], probe.centre[1]), "top": (probe.centre[0], near[1])}
+
+
+def _expected(bloom: Bloom, probe: Probe, dark: Image, at: tuple[int, int]) -> tuple[Image, float]:
+    """Return the bloom of a light near the middle, moved to another place, and its energy.
+
+    The light is a multiple of 16 pixels away, since a chain of halved images spreads each position
+    of a period differently.
+    """
+    __tracebackhide__ = True
+    x, y = (
+        place + _PERIOD * round((middle - place) / _PERIOD)
+        for place, middle in zip(at, probe.centre, strict=True)
+    )
+    spread = _spread(bloom, probe, dark, (x, y))[0]
+    energy = float(spread.sum())
+    _check_lit("assert_border", energy)
+    return _moved(spread, (x, y), at), energy
+
+
+def _moved(spread: Image, place: tuple[int, int], to: tuple[int, int]) -> Image:
+    """Return an image moved by whole pixels, with black where it has none."""
+    moved = np.zeros_like(spread)
+    (x, y), (height, width) = np.subtract(to, place), spread.shape[:2]
+    rows, columns = (
+        (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
+        for by, size in ((y, height), (x, width))
+    )
+    moved[rows[0], columns[0]] = spread[rows[1], columns[1]]
+    return moved
+
+
+def _check_lit(assertion: str, energy: float) -> None:
+    __tracebackhide__ = True
+    if not energy > 0:
+        fail(assertion, "the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")

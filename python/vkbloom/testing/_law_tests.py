@@ -1,0 +1,292 @@
+"""The tests of the laws: each takes a subject and its limit.
+
+A test raises AssertionError if the law does not hold, and ValueError or TypeError if it cannot be
+tested. To add a law, write its test here and its row in `_law_table`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom.testing import _laws as laws
+from vkbloom.testing import _moving_light as moving_light
+from vkbloom.testing import _point_spread as point_spread
+from vkbloom.testing import _scaled_scene as scaled_scene
+from vkbloom.testing._deviations import compare_with_law, fail, figure, is_within
+from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._subject import TEXEL, Subject
+
+# Positions along the diagonal: a period of a chain of four halvings.
+_PERIOD: Final = 16
+# A mean shift that is told, in pixels, and how near its texel is to a whole number of pixels.
+_SHIFT: Final = 0.05
+_COLOUR: Final = (1.0, 0.5, 0.25)
+# Gains that are 1 but for roundings; the values whose mean gain is measured; and its limit.
+# Truncated half floats have a mean error of -0.035 %, rounded ones of 0.
+_NEARLY: Final = 5e-3
+_VALUES: Final = 16
+_BIAS: Final = 2e-4
+
+
+def gain(subject: Subject, limit: float) -> None:
+    figure("gain", subject.measured_gain)
+    promised = subject.measured_gain if subject.gain is None else subject.gain
+    laws.assert_gain(subject.bloom, promised, subject.probe)
+    if subject.gain is not None or abs(promised - 1) < _NEARLY:
+        _unbiased(subject, 1.0 if subject.gain is None else promised)
+
+
+def _unbiased(subject: Subject, promised: float) -> None:
+    """Compare the mean gain of many values, since truncated half floats lose light in each pass."""
+    probe = subject.probe
+    flat = probe.given(probe.flat(probe.value))
+    if not promised or np.asarray(subject.bloom(flat)).dtype != np.float16:
+        return
+    shares = np.random.default_rng(probe.seed).uniform(0.5, 1.0, _VALUES)
+    gains = []
+    x, y = probe.centre
+    for value in shares * probe.value:
+        given = probe.given(probe.flat(value))
+        result, _ = probe.values(subject.bloom(given), given)
+        gains.append(float(result[y, x].mean()) / float(probe.values(given, given)[0][y, x].mean()))
+    off, law = float(np.mean(gains)) / promised - 1, "half floats are rounded, not truncated"
+    if not is_within(law, abs(off), _BIAS, "bias"):
+        fail(
+            "assert_gain",
+            law,
+            f"the mean gain of {_VALUES} values is off by {100 * off:+.3g} %: {100 * _BIAS:.2g} % "
+            "allowed",
+        )
+
+
+def centroid_kept(subject: Subject, limit: float) -> None:
+    _lit(subject)
+    point_spread.assert_centroid_kept(subject.bloom, subject.probe, within=limit)
+
+
+def separable(subject: Subject, limit: float) -> None:
+    _lit(subject)
+    point_spread.assert_separable(subject.bloom, subject.probe)
+
+
+def _lit(subject: Subject) -> None:
+    spread, error = subject.pixel
+    if not spread.max(axis=(0, 1)).min() > error:
+        raise ValueError("the bloom of a pixel is black, as after a median or a threshold")
+
+
+def bounded_fireflies(subject: Subject, limit: float) -> None:
+    laws.assert_bounded_fireflies(subject.bloom, limit, subject.probe)
+
+
+def additive(subject: Subject, limit: float) -> None:
+    if subject.picture is not None and subject.intensity is not None:
+        laws.assert_additive(subject.picture, subject.bloom, subject.intensity, subject.probe)
+    else:
+        laws.assert_additive(subject.picture or subject.bloom, probe=subject.probe)
+
+
+def unclamped(subject: Subject, limit: float) -> None:
+    """One-sided, so that a threshold holds the law: it only takes light from dark pixels."""
+    bloom, probe = subject.bloom, subject.probe
+    highest = min(subject.highest, 1.0 if probe.dtype.kind == "u" else math.inf)
+    factor = 2.0 ** round(math.log2(highest / probe.value))
+    if not factor > 1:
+        raise ValueError(f"probe: values above {probe.value:g} cannot be given to this bloom")
+    image = probe.noise(0, probe.value)
+    small, small_error = probe.apply(bloom, image)
+    large, large_error = probe.apply(bloom, factor * image)
+    compare_with_law(
+        "assert_unclamped",
+        f"B({factor:g} a) >= {factor:g} B(a): bright pixels are not clamped",
+        large,
+        np.maximum(large, factor * small),
+        large_error + factor * small_error,
+    )
+
+
+def energy(subject: Subject, limit: float) -> None:
+    if subject.measured_gain > 0:
+        _lit(subject)
+    spread = subject.pixel[0]
+    point_spread.check_inside(point_spread.border_share(spread), subject.probe.size)
+    energy = float(spread.sum(axis=(0, 1)).mean())
+    figure("energy", energy)
+    promised = 1.0 if subject.gain is None else subject.gain
+    off, allowed = abs(energy - promised), limit * max(promised, energy)
+    law = f"the bloom of a lit pixel has {promised:.4g} times the light of the pixel"
+    if not is_within(law, off, allowed):
+        fail(
+            "assert_energy",
+            law,
+            f"{energy:.4g} instead of {promised:.4g}: off by {off:.3g}, {allowed:.3g} allowed",
+        )
+
+
+def _coloured(probe: Probe) -> None:
+    if probe.colours < len(_COLOUR):
+        raise ValueError(f"probe: {probe.colours} channel has no colour; 3 channels are needed")
+
+
+def colour(subject: Subject, limit: float) -> None:
+    _coloured(subject.probe)
+    image = subject.probe.flat(subject.probe.value) * np.array(_COLOUR)
+    result, error = subject.probe.apply(subject.bloom, image)
+    expected = image * (result.mean() / image.mean())
+    law = "all channels of a flat coloured image get the same gain"
+    compare_with_law("assert_colour", law, result, expected, error)
+
+
+def grey(subject: Subject, limit: float) -> None:
+    _coloured(subject.probe)
+    image = subject.probe.noise(0, subject.probe.value)[..., :1].repeat(3, axis=2)
+    result, error = subject.probe.apply(subject.bloom, image)
+    expected = np.broadcast_to(result.mean(axis=2, keepdims=True), result.shape)
+    law = "the bloom of a grey image is grey: all channels spread alike"
+    compare_with_law("assert_grey", law, result, expected, 2 * error)
+
+
+def channels(subject: Subject, limit: float) -> None:
+    probe = subject.probe
+    _coloured(probe)
+    dark, dark_error = probe.apply(subject.bloom, probe.flat(0.0))
+    for channel in range(3):
+        image = probe.noise(0, probe.value) * (np.arange(3) == channel)
+        result, error = probe.apply(subject.bloom, image)
+        expected = np.where(np.arange(3) == channel, result, dark)
+        law = f"the bloom of light in channel {channel} is in channel {channel}"
+        compare_with_law("assert_channels", law, result, expected, error + dark_error)
+
+
+def stability(subject: Subject, limit: Mapping[str, float]) -> None:
+    found = subject.stability
+    if not found.energy.max() > 0:
+        raise ValueError("the bloom of a small light is black")
+    # Without a figure, such as the radius of a negative variance, there is nothing to judge.
+    known = {name: one for name, one in limit.items() if math.isfinite(getattr(found, name))}
+    try:
+        moving_light.check_stable(found, known, subject.lamp)
+    except ValueError:
+        # At each pixel of the path, no more light leaves the image than lies in its outermost
+        # pixels. So energy and peak may still be wrong by more than that; place and width may not.
+        lost = TEXEL * found.at_border
+        judged = ("ripple", "shimmer")
+        loose = {name: known[name] + lost for name in known if name in judged}
+        whole = dataclasses.replace(found, at_border=0.0)
+        moving_light.check_stable(whole, loose, subject.lamp)
+        raise
+
+
+def resolution(subject: Subject, limit: Mapping[str, float]) -> None:
+    found = subject.resolution
+    if not all(values.mean() > 0 for values in (found.r50, found.r90, found.peak)):
+        raise ValueError("the bloom of a light is black at some size")
+    scaled_scene.check_independent(found, limit["radius"], limit["peak"])
+
+
+def finite(subject: Subject, limit: float) -> None:
+    probe = subject.probe
+    if probe.dtype.kind == "u":
+        raise ValueError(f"probe: {probe.dtype} has neither NaN nor infinity")
+    law = "NaN and infinity of a pixel do not reach others"
+    x, y = probe.centre
+    blooms: dict[str, Bloom] = {"bloom": subject.bloom}
+    if subject.picture is not None:
+        blooms["picture"] = subject.picture
+    for value in (math.nan, math.inf, -math.inf):
+        image = probe.noise(0, probe.value)
+        image[y, x] = value
+        for name, bloom in blooms.items():
+            reached = _not_finite(bloom(probe.given(image)))
+            reached[y, x] = False
+            count = int(reached.sum())
+            if not is_within(law, count, limit, name):
+                fail(
+                    "assert_finite",
+                    law,
+                    f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
+                    f"{limit:g} allowed",
+                )
+
+
+def _not_finite(result: Any) -> NDArray[np.bool_]:
+    array = np.asarray(result)
+    return np.asarray(~np.isfinite(array.reshape(*array.shape[:2], -1)).all(axis=2))
+
+
+def reference(subject: Subject, limit: float) -> None:
+    if subject.differences is None:
+        raise ValueError("the bloom has no reference")
+    law = "each framebuffer is that of the reference"
+    found = subject.reference
+    over = [name for name, off in found.items() if not is_within(law, off, limit, name)]
+    if over:
+        told = ", ".join(f"{name} is off by {found[name]:.3g}" for name in over)
+        fail("assert_reference", law, f"{told} of its largest value, {limit:g} allowed")
+
+
+def shift_explained(subject: Subject, why: str) -> str:
+    """Return whether light is shifted at all positions, or only moves around its place."""
+    bloom, probe = subject.bloom, subject.probe
+    # All positions of a period at once: a square whose side is a multiple of it.
+    side = 2 ** int(math.log2(max(1, min(probe.size) // 4)))
+    left, top = ((length - side) // 2 for length in probe.size)
+    square = probe.flat(0.0)
+    square[top : top + side, left : left + side] = probe.value
+    lit = probe.apply(bloom, square)[0] - probe.apply(bloom, probe.flat(0.0))[0]
+    mean = np.subtract(_centroid(lit), _centroid(square))
+    parts = [
+        f"{size:+.3g} pixels along {axis}{_half_texels(2 * abs(size))}"
+        for axis, size in zip("xy", mean, strict=True)
+        if abs(size) > _SHIFT
+    ]
+    for axis, size in zip("xy", mean, strict=True):
+        figure(f"shift_{axis}", float(size))
+    x, y = (max(0, place - _PERIOD // 2) for place in probe.centre)
+    places = [(x + i, y + i) for i in range(min(_PERIOD, probe.size[0] - x, probe.size[1] - y))]
+    down = int(abs(mean[1]) > abs(mean[0]))
+    shifts = np.array(
+        [
+            _centroid(point_spread.point_spread(bloom, probe, at=place))[down] - place[down]
+            for place in places
+        ]
+    )
+    shifts = shifts[np.isfinite(shifts)]
+    if parts:
+        why = f"All light is shifted by {' and '.join(parts)}, on average over all positions." + (
+            " No chain of halved images does that: a pass reads the corner of a pixel in place of "
+            "its middle."
+            if "texel" in "".join(parts)
+            else ""
+        )
+    if not shifts.size:
+        return why
+    alike = parts and np.ptp(shifts) < abs(shifts.mean()) / 4
+    return (
+        f"{why} Measured along {'xy'[down]} over {shifts.size} positions: {shifts.min():+.3g} to "
+        f"{shifts.max():+.3g} pixels, {round(shifts.mean(), 6) + 0.0:+.3g} on average"
+        + ("; all positions move alike, as with a missing half texel." if alike else ".")
+    )
+
+
+def _half_texels(texel: float) -> str:
+    """Return the levels of halved images of which a shift is half a texel, as words."""
+    whole = round(texel)
+    if not whole or abs(texel - whole) > 2 * _SHIFT:
+        return ""
+    levels = [2**bit for bit in range(whole.bit_length()) if whole >> bit & 1]
+    sizes = [f"1/{level} of the size" if level > 1 else "full size" for level in levels]
+    each = "each of the levels" if len(levels) > 1 else "the level"
+    return f" (half a texel of {each} at {' and '.join(sizes)})"
+
+
+def _centroid(image: Image) -> tuple[float, float]:
+    """Return x and y of the centroid; NaN without light."""
+    total, centroid, _ = moving_light.moments(image.mean(axis=2))
+    return centroid if total > 0 else (math.nan, math.nan)

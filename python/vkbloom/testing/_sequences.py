@@ -1,0 +1,310 @@
+"""Sequences of pictures: flashes that harm, and flicker that is seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+
+__all__ = ["Flash", "Flicker", "flash", "flicker"]
+
+# WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
+# relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
+# a quarter of any field of ten degrees.
+_CHANGE: Final = 0.1
+_DARK: Final = 0.8
+_RED: Final = 0.8
+_RED_CHANGE: Final = 20 / 320
+_FLASHES: Final = 3
+_FIELD: Final = 10.0
+_SHARE: Final = 0.25
+_LUMINANCE: Final = np.array([0.2126, 0.7152, 0.0722])
+# The longer side of the pictures that are judged, in pixels: a field has about this many.
+_FIELD_PIXELS: Final = 32
+# Allowance for roundings of a difference that is exactly the limit.
+_EXACT: Final = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flash:
+    """Flashes of a sequence, by the thresholds of WCAG 2.2.
+
+    Attributes
+    ----------
+    general, red : bool
+        Whether the sequence fails: there are more than three flashes within a second, on at least
+        a quarter of a field of ten degrees.
+    flashes, red_flashes : int
+        The most flashes of a pixel within a second.
+    area, red_area : float
+        The largest share of a field that has more than three flashes within a second, 0 to 1.
+    second : float
+        Where the worst second begins.
+    """
+
+    general: bool
+    red: bool
+    flashes: int
+    red_flashes: int
+    area: float
+    red_area: float
+    second: float
+
+    def __str__(self) -> str:
+        """Return a line for each kind of flash."""
+        return "\n".join(
+            f"{name} flashes: {'fails' if failed else 'passes'}, up to {count} a second, on "
+            f"{100 * area:.3g} % of a field of 10 degrees"
+            for name, failed, count, area in (
+                ("general", self.general, self.flashes, self.area),
+                ("red", self.red, self.red_flashes, self.red_area),
+            )
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flicker:
+    """How visible the flicker of a sequence is.
+
+    Attributes
+    ----------
+    jod : float or None
+        Quality in just-objectionable-difference units of ColorVideoVDP, 10 without flicker; None if
+        the package ``cvvdp`` is not installed.
+    frequencies : ndarray of float64, shape (N,)
+        In Hz, from one period of the sequence to half of the frame rate.
+    contrast : ndarray of float64, shape (N,)
+        Amplitude of the luminance at each frequency, divided by its mean, at the pixel where it is
+        the largest.
+    """
+
+    jod: float | None
+    frequencies: NDArray[np.float64]
+    contrast: NDArray[np.float64]
+
+
+@checked
+def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flash:
+    """Judge a sequence by the general and the red flash thresholds of WCAG 2.2.
+
+    A general flash is a pair of opposing changes of relative luminance by at least 0.1, where the
+    darker picture is below 0.8. A red flash is a pair of opposing changes of max(0, R - G - B) by
+    more than 20 / 320, one of whose pictures is a saturated red: R / (R + G + B) of at least 0.8. A
+    sequence fails if a quarter of any field of ten degrees has more than three flashes within a
+    second.
+
+    Parameters
+    ----------
+    frames : iterable of ndarray, shape (H, W, 3) or (H, W, 4)
+        Integers are in sRGB; floats are linear light, and 1 is the white of the display. What is
+        beyond 0..1 is clamped.
+    fps : float
+        Frames per second.
+    degrees : float
+        Width of the picture in degrees of the field of view, such as 40 for a monitor.
+
+    Returns
+    -------
+    Flash
+
+    Raises
+    ------
+    TypeError, ValueError
+        There are less than two frames, they have different sizes, or a number is out of range.
+
+    Notes
+    -----
+    Source: W3C, Web Content Accessibility Guidelines 2.2, success criterion 2.3.1 and "general
+    flash and red flash thresholds". 0.006 steradians are a quarter of a field of ten degrees.
+    """
+    check_number("fps", fps, 1e-3, 1e5)
+    check_number("degrees", degrees, 1e-3, 360.0)
+    luminances, reds, saturated = [], [], []
+    for light in _lights(frames, degrees):
+        luminances.append(light @ _LUMINANCE)
+        reds.append(np.maximum(0, light[..., 0] - light[..., 1] - light[..., 2]))
+        total = light.sum(axis=2)
+        saturated.append((light[..., 0] >= (_RED - _EXACT) * total) & (total > 0))
+    field = _FIELD / degrees * luminances[0].shape[1]
+    general = _flashes(luminances, fps, field, _CHANGE, lambda low, i, j: low < _DARK)
+    red = _flashes(
+        reds, fps, field, _RED_CHANGE, lambda low, i, j: _at(saturated, i) | _at(saturated, j)
+    )
+    return Flash(
+        general=general[1] >= _SHARE,
+        red=red[1] >= _SHARE,
+        flashes=general[0],
+        red_flashes=red[0],
+        area=general[1],
+        red_area=red[1],
+        second=max(general, red, key=lambda found: found[1])[2],
+    )
+
+
+def _at(planes: list[NDArray[np.bool_]], index: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return of each pixel the value in its own frame."""
+    stacked = np.stack(planes)
+    rows, columns = np.indices(index.shape)
+    return np.asarray(stacked[index, rows, columns])
+
+
+def _flashes(
+    planes: list[NDArray[np.float64]], fps: float, field: float, change: float, counts: Any
+) -> tuple[int, float, float]:
+    """Return the most flashes of a pixel in a second, the largest share of a field, and when.
+
+    A change runs from one extreme of a pixel to the next. It begins to count once it is as large as
+    `change` and `counts(darker value, frame of its start, frame)` is true.
+    """
+    shape = planes[0].shape
+    direction, counted = np.zeros(shape, np.int8), np.zeros(shape, np.bool_)
+    low, high = planes[0].copy(), planes[0].copy()
+    start, darker = np.zeros(shape, np.intp), planes[0].copy()
+    lowest_at, highest_at = np.zeros(shape, np.intp), np.zeros(shape, np.intp)
+    changes: list[NDArray[np.bool_]] = []
+    for index, plane in enumerate(planes):
+        lowest_at, low = np.where(plane < low, index, lowest_at), np.minimum(plane, low)
+        highest_at, high = np.where(plane > high, index, highest_at), np.maximum(plane, high)
+        rises = (plane - low >= change - _EXACT) & (direction != 1)
+        falls = (high - plane >= change - _EXACT) & (direction != -1) & ~rises
+        turned = rises | falls
+        start = np.where(rises, lowest_at, np.where(falls, highest_at, start))
+        darker = np.where(rises, low, np.where(falls, plane, np.minimum(darker, plane)))
+        direction = np.where(rises, 1, np.where(falls, -1, direction)).astype(np.int8)
+        counted &= ~turned
+        new = (direction != 0) & ~counted & counts(darker, start, np.full_like(start, index))
+        counted |= new
+        changes.append(new)
+        # The extreme at the end of this change is searched from here on.
+        lowest_at, low = np.where(turned, index, lowest_at), np.where(turned, plane, low)
+        highest_at, high = np.where(turned, index, highest_at), np.where(turned, plane, high)
+    frames = math.floor(fps + _EXACT) + 1
+    total = np.cumsum(np.stack(changes), axis=0, dtype=np.int32)
+    most, area, when = 0, 0.0, 0.0
+    for end in range(len(planes)):
+        first = end - frames
+        pairs = (total[end] - (total[first] if first >= 0 else 0)) // 2
+        most = max(most, int(pairs.max()))
+        if (pairs > _FLASHES).any():
+            share = _largest_share(pairs > _FLASHES, field)
+            if share > area:
+                area, when = share, max(0, first + 1) / fps
+    return most, area, when
+
+
+def _largest_share(flashing: NDArray[np.bool_], field: float) -> float:
+    """Return the largest share of a disc with the diameter `field` that is flashing.
+
+    Of a picture smaller than the field, the rest of the field counts as calm.
+    """
+    radius = field / 2
+    reach = math.ceil(radius)
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    disc = (x**2 + y**2 <= radius**2).astype(np.float64)
+    padded = np.pad(flashing.astype(np.float64), reach)
+    shape = tuple(a + b - 1 for a, b in zip(padded.shape, disc.shape, strict=True))
+    sums = np.fft.irfft2(np.fft.rfft2(padded, shape) * np.fft.rfft2(disc, shape), shape)
+    return min(1.0, float(sums.max() / disc.sum()))
+
+
+def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[np.float64]]:
+    """Yield the linear light of each frame, reduced to about the pixels that a field needs."""
+    shape: tuple[int, ...] | None = None
+    count = 0
+    for count, frame in enumerate(frames, start=1):  # noqa: B007  it is read after the loop
+        array = np.asarray(frame)
+        if array.ndim != 3 or array.shape[2] not in (3, 4) or array.dtype.kind not in "uf":
+            raise ValueError(
+                f"frames: shape {array.shape} of {array.dtype} is not (H, W, 3) or (H, W, 4) of "
+                "integers or floats"
+            )
+        if shape not in (None, array.shape):
+            raise ValueError(f"frames: shape {array.shape} after {shape}; all must be the same")
+        shape = array.shape
+        yield _reduced(_linear(array[..., :3]), degrees)
+    if count < 2:
+        raise ValueError(f"frames: {count} given; a sequence has at least 2")
+
+
+def _linear(colours: NDArray[Any]) -> NDArray[np.float64]:
+    if colours.dtype.kind == "f":
+        return np.clip(np.nan_to_num(colours.astype(np.float64)), 0, 1)
+    share = colours / np.iinfo(colours.dtype).max
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+
+def _reduced(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Return the means of square boxes, so that a field has about `_FIELD_PIXELS` boxes."""
+    height, width, _ = light.shape
+    side = max(1, int(width * _FIELD / degrees / _FIELD_PIXELS))
+    side = min(side, height, width)
+    kept = light[: height // side * side, : width // side * side]
+    boxes = kept.reshape(height // side, side, width // side, side, 3)
+    means: NDArray[np.float64] = boxes.mean(axis=(1, 3))
+    return means
+
+
+@checked
+def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
+    """Measure how visible the flicker of a sequence is.
+
+    Parameters
+    ----------
+    frames : iterable of ndarray, shape (H, W, 3) or (H, W, 4)
+        As for `flash`. A sequence of something that does not move.
+    fps : float
+        Frames per second.
+
+    Returns
+    -------
+    Flicker
+        With the package ``cvvdp``, `jod` compares the sequence with its mean picture, as
+        ColorVideoVDP does for a standard display in 4K.
+
+    Raises
+    ------
+    TypeError, ValueError
+        There are less than two frames, they have different sizes, or `fps` is out of range.
+
+    Notes
+    -----
+    Source: Mantiuk et al., "ColorVideoVDP: A visual difference predictor for image, video and
+    display distortions", SIGGRAPH 2024.
+    """
+    check_number("fps", fps, 1e-3, 1e5)
+    lights = np.stack(list(_lights(frames, _FIELD)))
+    luminances = lights @ _LUMINANCE
+    mean = luminances.mean(axis=0)
+    count = len(luminances)
+    amplitudes = 2 * np.abs(np.fft.rfft(luminances, axis=0))[1:] / count
+    if count % 2 == 0:
+        amplitudes[-1] /= 2
+    largest = max(float(mean.max()), 1e-300)
+    contrast = (amplitudes / np.maximum(mean, 1e-3 * largest)).max(axis=(1, 2))
+    return Flicker(
+        jod=_jod(lights, fps),
+        frequencies=np.asarray(np.fft.rfftfreq(count, 1 / fps)[1:], np.float64),
+        contrast=contrast,
+    )
+
+
+def _jod(lights: NDArray[np.float64], fps: float) -> float | None:
+    try:
+        import pycvvdp  # noqa: PLC0415  an extra, and it imports PyTorch
+    except ImportError:
+        return None
+    metric = pycvvdp.cvvdp(display_name="standard_4k", heatmap=None)
+    still = np.broadcast_to(lights.mean(axis=0), lights.shape)
+    encoded = [
+        np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
+        for x in (lights, still)
+    ]
+    jod, _ = metric.predict(*encoded, dim_order="FHWC", frames_per_second=fps)
+    return float(jod)

@@ -1,0 +1,220 @@
+"""Shape of the point spread: how round it is, and whether the size of the image changes it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
+from vkbloom.testing._point_spread import point_spread
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = ["SIZE_LIMITS", "assert_round", "assert_sizes", "roundness"]
+
+_DEFAULT = Probe()
+#: Shares of the peak whose contours are measured.
+LEVELS: Final = (0.5, 0.1, 0.01)
+#: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
+SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05}
+# Contours nearer to their middle, in pixels, are a few pixels, which are never round.
+_LEAST_RADIUS: Final = 3.0
+_ANGLES: Final = 90
+_SQUARE: Final = 16
+
+
+@checked
+def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
+    """Return how far from circles the contours of the point spread are.
+
+    For each of 1/2, 1/10 and 1/100 of the peak: the greatest distance of the contour from the
+    centroid, divided by the smallest. 1 is a circle, 1.41 a square. Distances below three pixels
+    count as three. Contours that are nearer everywhere, or that leave the image, are not in the
+    result.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+
+    Returns
+    -------
+    dict of float to float
+        Greatest over smallest distance, by the share of the peak.
+
+    Raises
+    ------
+    AssertionError
+        A result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    plane = point_spread(bloom, probe).mean(axis=2)
+    peak = float(plane.max())
+    if not peak > 0:
+        return {}
+    # The core around the peak, since skirts may leave the image on one side.
+    core = np.where(plane >= peak * LEVELS[0], plane, 0)
+    y, x = (
+        float(core.sum(axis=axis) @ np.arange(core.shape[1 - axis])) / float(core.sum())
+        for axis in (1, 0)
+    )
+    # The nearest border; a contour beyond it is not closed.
+    most = min(x, y, plane.shape[1] - 1 - x, plane.shape[0] - 1 - y)
+    steps = np.arange(0.0, most, 0.125)
+    angles = np.arange(_ANGLES) * (2 * math.pi / _ANGLES)
+    rays = _bilinear(
+        plane, x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps)
+    )
+    found = {}
+    for level in LEVELS:
+        above = rays >= level * peak
+        if not above.any(axis=1).all() or above[:, -1].any():
+            continue
+        last = len(steps) - 1 - above[:, ::-1].argmax(axis=1)
+        inner, outer = (rays[np.arange(_ANGLES), last + i] for i in (0, 1))
+        radii = steps[last] + 0.125 * (inner - level * peak) / np.maximum(inner - outer, 1e-300)
+        if radii.max() >= _LEAST_RADIUS:
+            found[level] = float(radii.max() / max(radii.min(), _LEAST_RADIUS))
+    return found
+
+
+@checked
+def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) -> None:
+    """Assert that the bloom of a pixel is round.
+
+    The law: of the contours at 1/2, 1/10 and 1/100 of the peak, the greatest distance from the
+    centroid is at most `limit` times the smallest. A box has 1.41, a bilinear tent 1.21, 1.07 and
+    1.28, a Gaussian 1.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+    limit : float
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or all contours are smaller than three pixels or leave the
+        image.
+    """
+    __tracebackhide__ = True
+    check_number("limit", limit, 1.0, math.inf)
+    found = roundness(bloom, probe)
+    if not found:
+        raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
+    law = "the contours of the bloom of a pixel are circles"
+    told = [
+        f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction as in "
+        "another"
+        for level, ratio in found.items()
+        if not is_within(law, ratio, limit, f"round_{level:g}")
+    ]
+    if told:
+        fail("assert_round", law, f"{'; '.join(told)}: {limit:.3g} allowed")
+
+
+@checked
+def assert_sizes(
+    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+) -> None:
+    """Assert that a bloom is nearly the same in images whose sizes differ by a few pixels.
+
+    The law: in images of 16 n - 3 to 16 n + 3 pixels, with the largest n below the probe's size for
+    which 16 n is no power of 2, the bloom of a square of 16 x 16 pixels has the same width (the
+    root of the added variance), centroid (beside that of the square) and energy.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+    limits : mapping of str to float, optional
+        Largest difference from the size 16 n: "width" and "energy" as shares, "centroid" in pixels;
+        by default 0.05, 0.05, 0.3.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, a result is black or not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    allowed = SIZE_LIMITS | dict(limits or {})
+    width, height = (_beside(side) for side in probe.size)
+    # At the same pixels in all sizes, since a chain of halved images spreads each differently.
+    at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
+    base = _square_figures(bloom, dataclasses.replace(probe, size=(width, height)), at)
+    law = "the bloom of a square does not depend on whether the size is a multiple of 16"
+    told: dict[str, str] = {}
+    for step in (-3, -2, -1, 1, 2, 3):
+        size = (width + step, height + step)
+        found = _square_figures(bloom, dataclasses.replace(probe, size=size), at)
+        off = {
+            "width": abs(found[0] - base[0]) / base[0] if base[0] > 0 else 0.0,
+            "energy": abs(found[1] - base[1]) / base[1],
+            "centroid": math.hypot(found[2] - base[2], found[3] - base[3]),
+        }
+        for name, value in off.items():
+            if not is_within(law, value, allowed[name], name) and name not in told:
+                unit = " pixels" if name == "centroid" else " of it"
+                told[name] = (
+                    f"at {size[0]} x {size[1]} the {name} differs by {value:.3g}{unit} from that "
+                    f"at {width} x {height}: {allowed[name]:.3g} allowed"
+                )
+    if told:
+        fail("assert_sizes", law, "; ".join(told.values()))
+
+
+def _beside(side: int) -> int:
+    """Return a multiple of 16 up to a side that is no power of 2."""
+    multiple = max(3, side // 16)
+    return 16 * (multiple - (multiple & (multiple - 1) == 0))
+
+
+def _square_figures(
+    bloom: Bloom, probe: Probe, at: tuple[int, int]
+) -> tuple[float, float, float, float]:
+    """Return width, energy, and the shift along x and y of the bloom of a square."""
+    __tracebackhide__ = True
+    image = probe.flat(0.0)
+    left, top = at
+    image[top : top + _SQUARE, left : left + _SQUARE] = probe.value
+    lit = (probe.apply(bloom, image)[0] - probe.apply(bloom, probe.flat(0.0))[0]).mean(axis=2)
+    energy = float(lit.sum())
+    if not energy > 0:
+        fail("assert_sizes", "the bloom of a square is not black", f"its energy is {energy:.3g}")
+    variance, shifts = 0.0, []
+    for axis, first in ((0, left), (1, top)):
+        profile = lit.sum(axis=axis) / energy
+        places = np.arange(len(profile)) - (first + (_SQUARE - 1) / 2)
+        shifts.append(float(profile @ places))
+        variance += float(profile @ (places - shifts[-1]) ** 2) - (_SQUARE**2 - 1) / 12
+    figure("squared_width", variance)
+    return math.sqrt(max(variance, 0.0)), energy, shifts[0], shifts[1]
+
+
+def _bilinear(plane: Image, x: Image, y: Image) -> Image:
+    """Return the values between pixels, for positions inside of the image."""
+    left, top = (np.floor(places).astype(np.intp) for places in (x, y))
+    right, below = (
+        np.minimum(first + 1, side - 1)
+        for first, side in zip((left, top), plane.shape[::-1], strict=True)
+    )
+    part, down = x - left, y - top
+    upper = plane[top, left] * (1 - part) + plane[top, right] * part
+    lower = plane[below, left] * (1 - part) + plane[below, right] * part
+    values: Image = upper * (1 - down) + lower * down
+    return values

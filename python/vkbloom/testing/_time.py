@@ -1,0 +1,259 @@
+"""Bloom in time: jitter of the camera, and what stays of a light that has moved."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._border import takes
+from vkbloom.testing._deviations import fail, figure, is_within
+from vkbloom.testing._moving_light import area_sampled
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
+
+_DEFAULT = Probe()
+#: Limits by figure: changes of the bloom's light as shares of its mean, and how many times as
+#: bright a pixel must be as a flat image to pass a threshold.
+JITTER_LIMITS: Final = {"flicker": 0.05, "resolved": 0.02, "threshold": 1.5}
+#: Limits by figure, as shares of the light: what stays in the first frame; changes of a still.
+HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
+# Frames after a jump: of a bloom that is given the time, and of any other.
+_FRAMES: Final = 60
+_FEW_FRAMES: Final = 8
+_RATE: Final = 60.0
+# Bisections of a threshold, and the lowest value that is tried, as a share of the probe's.
+_HALVINGS: Final = 12
+_LEAST: Final = 2.0**-12
+# Of the images of thin scenes in pixels.
+_SIDE: Final = 64
+
+
+def halton(count: int) -> NDArray[np.float64]:
+    """Return the offsets of a camera's jitter: the Halton sequence of bases 2 and 3, less a half.
+
+    - Returns: ndarray of float64, shape (count, 2): x and y in pixels, -0.5 to 0.5.
+    """
+    return np.array([[_inverse(i, 2) - 0.5, _inverse(i, 3) - 0.5] for i in range(1, count + 1)])
+
+
+def _inverse(index: int, base: int) -> float:
+    share, result = 1.0, 0.0
+    while index:
+        share /= base
+        index, digit = divmod(index, base)
+        result += share * digit
+    return result
+
+
+@checked
+def assert_jitter(
+    bloom: Bloom,
+    probe: Probe = _DEFAULT,
+    *,
+    feedback: float = 0.9,
+    limits: Mapping[str, float] | None = None,
+) -> None:
+    """Assert that the jitter of a camera does not make a bloom flicker.
+
+    A point, a line along x and a line at an angle, half a pixel wide and sampled by their area,
+    are seen by a camera that follows a Halton path of 8, then of 16 positions. The law: the light
+    of the bloom is the same in each frame. "flicker" is (largest - smallest) / mean of its sum,
+    "resolved" the same of a reference TAA: s_t = feedback s_t-1 + (1 - feedback) a_t, whose result
+    blooms. And a lit pixel blooms from the same value on as a flat image: "threshold" is the first
+    divided by the second.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone.
+    probe : Probe
+        Its value must be far above a threshold.
+    feedback : float
+        Share of the frames before, 0 to 1.
+    limits : mapping of str to float, optional
+        Limits by figure; by default 0.05, 0.02, 1.5.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable.
+    """
+    __tracebackhide__ = True
+    check_number("feedback", feedback, 0.0, 1.0)
+    allowed = JITTER_LIMITS | dict(limits or {})
+    law = "the light of a bloom does not change with the jitter of the camera"
+    told = []
+    small = dataclasses.replace(probe, size=(min(probe.size[0], _SIDE), min(probe.size[1], _SIDE)))
+    for name, scene in _SCENES.items():
+        frames = [scene(small, x, y) for x, y in halton(16)]
+        resolved = list(_taa(frames, feedback))[::4]
+        lights, settled = (
+            np.array([_light(bloom, small, frame) for frame in part]) for part in (frames, resolved)
+        )
+        if not lights.mean() > 0:
+            told.append(f"the bloom of a thin {name} is black in all frames")
+            is_within(law, math.inf, allowed["flicker"], "flicker")
+            continue
+        for kind, where, values in (
+            ("flicker", "8 positions", lights[:8]),
+            ("flicker", "16 positions", lights),
+            ("resolved", "16 positions, after TAA", settled),
+        ):
+            off = float(np.ptp(values) / values.mean())
+            figure(f"{name}, {where}", off)
+            if not is_within(law, off, allowed[kind], kind):
+                told.append(
+                    f"{name}, {where}: the light changes by {off:.3g} of its mean, "
+                    f"{allowed[kind]:g} allowed"
+                )
+    ratio = _threshold_ratio(bloom, small)
+    if not is_within(law, ratio, allowed["threshold"], "threshold"):
+        told.append(
+            f"a lit pixel blooms from {ratio:.3g} times the value on that a flat image needs: the "
+            "threshold reads an average"
+        )
+    if told:
+        fail("assert_jitter", law, "; ".join(told))
+
+
+def _point(probe: Probe, x: float, y: float) -> Image:
+    return area_sampled(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (0.5, 0.5))
+
+
+def _line(probe: Probe, x: float, y: float) -> Image:
+    """Return a line of 24 pixels along x."""
+    return area_sampled(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (24.0, 0.5))
+
+
+def _angled(probe: Probe, x: float, y: float) -> Image:
+    """Return a line at an angle, as squares whose centres are a quarter of a pixel apart."""
+    total = np.zeros((probe.size[1], probe.size[0]))
+    for step in np.arange(-12, 12, 0.25):
+        at = (probe.centre[0] + x + step, probe.centre[1] + y + step / 3)
+        total += area_sampled(probe.size, at, (0.25, 0.5))
+    return total
+
+
+_SCENES: Final[dict[str, Callable[[Probe, float, float], Image]]] = {
+    "point": _point,
+    "line": _line,
+    "angled line": _angled,
+}
+
+
+def _taa(frames: list[Image], feedback: float) -> Iterator[Image]:
+    """Yield the resolved frames of a second round, which starts from the mean of the first."""
+    resolved: Image = np.mean(frames, axis=0)
+    for frame in frames:
+        resolved = feedback * resolved + (1 - feedback) * frame
+        yield resolved
+
+
+def _light(bloom: Bloom, probe: Probe, share: Image) -> float:
+    """Return the sum of the bloom of a plane, whose values are shares of the probe's value."""
+    __tracebackhide__ = True
+    image = np.repeat(share[:, :, np.newaxis], probe.colours, axis=2) * probe.value
+    return float(probe.apply(bloom, image)[0].sum())
+
+
+def _threshold_ratio(bloom: Bloom, probe: Probe) -> float:
+    """Return the value from which a pixel blooms, divided by that of a flat image."""
+    __tracebackhide__ = True
+
+    def blooms(value: float, pixel: bool) -> bool:
+        image = probe.point(probe.centre, value) if pixel else probe.flat(value)
+        return bool(probe.apply(bloom, image)[0].max() > 1e-6 * value)
+
+    def least(pixel: bool) -> float:
+        low, high = _LEAST * probe.value, probe.value
+        for _ in range(_HALVINGS):
+            middle = math.sqrt(low * high)
+            low, high = (low, middle) if blooms(middle, pixel) else (middle, high)
+        return high
+
+    if blooms(_LEAST * probe.value, False) or not blooms(probe.value, True):
+        return 1.0
+    return least(True) / least(False)
+
+
+@checked
+def assert_history(
+    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+) -> None:
+    """Assert that a bloom shows the image of now, and nothing of the images before.
+
+    A light stands still for 8 frames, then jumps. "stays" is the light of the first bloom after the
+    jump that a bloom of the same image 60 frames later has not, as a share (8 frames later, if the
+    bloom takes no time); the figure "frames" tells for how many frames it stays above its limit.
+    "steady" is (largest - smallest) / mean of the light in the second half of these frames.
+
+    Parameters
+    ----------
+    bloom : callable
+        ``bloom(image)`` or ``bloom(image, *, time)``, with the time in seconds; called in the order
+        of the frames, at 60 frames a second.
+    probe : Probe
+    limits : mapping of str to float, optional
+        Limits by figure; by default 0.01 of both.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or the bloom is black.
+    """
+    __tracebackhide__ = True
+    allowed = HISTORY_LIMITS | dict(limits or {})
+    law = "the bloom of an image depends on that image alone"
+    clock = iter(range(1 << 30))
+
+    def at(image: Image) -> Image:
+        options: dict[str, Any] = {"time": next(clock) / _RATE} if takes(bloom, "time") else {}
+        return probe.apply(lambda given: bloom(given, **options), image)[0]
+
+    x, y = probe.centre
+    before, after = (
+        _square(probe, (max(0, min(probe.size[0] - 3, x + step)), y)) for step in (-8, 8)
+    )
+    count = _FRAMES if takes(bloom, "time") else _FEW_FRAMES
+    for _ in range(_FEW_FRAMES):
+        at(before)
+    images = [at(after) for _ in range(count)]
+    last = float(images[-1].sum())
+    if not last > 0:
+        raise ValueError("the bloom of a small light is black")
+    left = [float(np.abs(image - images[-1]).sum()) / last for image in images]
+    sums = np.array([image.sum() for image in images[count // 2 :]])
+    steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
+    figure("frames", float(sum(share > allowed["stays"] for share in left)))
+    told = []
+    if not is_within(law, steady, allowed["steady"], "steady"):
+        told.append(
+            f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
+        )
+    if not is_within(law, left[0], allowed["stays"], "stays"):
+        told.append(
+            f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
+            f"and {sum(share > allowed['stays'] for share in left)} frames are above "
+            f"{allowed['stays']:g}"
+        )
+    if told:
+        fail("assert_history", law, "; ".join(told))
+
+
+def _square(probe: Probe, at: tuple[int, int]) -> Image:
+    """Return an image with 3 x 3 lit pixels."""
+    image = probe.flat(0.0)
+    image[at[1] : at[1] + 3, at[0] : at[0] + 3] = probe.value
+    return image

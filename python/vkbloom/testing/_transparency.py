@@ -1,0 +1,122 @@
+"""Glow over transparent ground."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_number
+from vkbloom.testing._deviations import NotTaken, fail, is_within
+from vkbloom.testing._probe import Bloom, Image, Probe
+
+__all__ = ["assert_alpha"]
+
+_DEFAULT = Probe()
+# Below common thresholds, since a threshold is not linear.
+_BACKDROPS = (0.0, 0.25)
+
+
+@checked
+def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) -> None:
+    """Assert that glow over transparent ground is the glow of the flattened picture.
+
+    Images are premultiplied. With the picture F(a), its alpha A and a backdrop b, the law is
+    F(a) + (1 - A) b = F(a + (1 - alpha) b) - F((1 - alpha) b) + (1 - alpha) b: the picture over any
+    backdrop looks as if it had been flattened first, less the bloom of the backdrop itself. For the
+    bloom alone, its colours do not depend on alpha.
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image of four channels and returns one of the same height and width: the picture
+        with its bloom and its alpha, or the bloom alone.
+    probe : Probe
+        Its `channels` do not count.
+    limit : float
+        Allowed difference, as a share of the brightest value of the image.
+
+    Raises
+    ------
+    AssertionError
+        The law does not hold, or a result is not finite.
+    TypeError, ValueError
+        `bloom` is not such a callable, or does not take alpha.
+    """
+    __tracebackhide__ = True
+    check_number("limit", limit, 0.0, 1.0)
+    if probe.dtype.kind == "u" or probe.colours < 3:
+        raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
+    glow, is_picture = _colours_alike(bloom, probe, *_lights(probe, (1.0, 0.5)), limit)
+    if not is_picture:
+        return
+    # Without half transparent lights: a threshold of their sum with the backdrop is not linear.
+    colours, alpha = _lights(probe, (1.0,))
+    glow = _apply(bloom, probe, colours, alpha)
+    law = "the picture over any backdrop looks as if it had been flattened first"
+    for level in _BACKDROPS:
+        behind = (1 - alpha) * level * np.ones(3)
+        seen = glow[..., :3] + (1 - glow[..., 3:]) * level
+        flattened = _apply(bloom, probe, colours + behind, np.ones_like(alpha))[..., :3]
+        backdrop = _apply(bloom, probe, behind, np.ones_like(alpha))[..., :3]
+        off = seen - (flattened - backdrop + behind)
+        _judge(law, off, colours.max(), limit, f"over a backdrop of {level:g}, ")
+
+
+def _lights(probe: Probe, shares: tuple[float, ...]) -> tuple[Image, Image]:
+    """Return the colours and the alpha of lights, one for each alpha that is given."""
+    width, height = probe.size
+    alpha = np.zeros((height, width, 1))
+    colours = np.zeros((height, width, 3))
+    x, y = probe.centre
+    for share, (left, top) in zip(shares, ((x - 8, y - 8), (x + 4, y + 2)), strict=False):
+        window = np.s_[max(0, top) : top + 5, max(0, left) : left + 5]
+        alpha[window] = share
+        colours[window] = share * probe.value * np.array([1.0, 0.5, 0.75])
+    return colours, alpha
+
+
+def _colours_alike(
+    bloom: Bloom, probe: Probe, colours: Image, alpha: Image, limit: float
+) -> tuple[Image, bool]:
+    """Return the result over transparent ground, and whether it is a picture with alpha."""
+    __tracebackhide__ = True
+    try:
+        found = _apply(bloom, probe, colours, alpha)
+    except (TypeError, ValueError) as error:
+        raise NotTaken(f"bloom: it takes no image of four channels ({error})") from None
+    opaque = _apply(bloom, probe, colours, np.ones_like(alpha))
+    law = "the colours of a premultiplied bloom do not depend on alpha"
+    _judge(law, found[..., :3] - opaque[..., :3], colours.max(), limit, "")
+    # A picture contains its image; the bloom alone has another light, or no alpha of its own.
+    is_picture = found.shape[2] == 4 and bool(
+        (found[..., :3] >= colours - limit * colours.max()).all() and np.ptp(found[..., 3]) > 0
+    )
+    return found, is_picture
+
+
+def _apply(bloom: Bloom, probe: Probe, colours: Image, alpha: Image) -> Image:
+    given: NDArray[Any] = np.concatenate([colours, alpha], axis=2).astype(probe.dtype)
+    found = np.asarray(bloom(given))
+    if found.ndim != 3 or found.shape[:2] != given.shape[:2] or found.shape[2] not in (3, 4):
+        raise ValueError(f"it returns shape {found.shape} for {given.shape}")
+    result: Image = found.astype(np.float64)
+    return result
+
+
+def _judge(law: str, off: Image, largest: float, limit: float, where: str) -> None:
+    """Compare differences with the limit."""
+    __tracebackhide__ = True
+    place = np.unravel_index(int(np.abs(off).argmax()), off.shape)
+    share = abs(float(off[place])) / largest
+    if not is_within(law, share, limit, "alpha"):
+        y, x, channel = place
+        fail(
+            "assert_alpha",
+            law,
+            f"{where}x {x}, y {y}, channel {channel} is too "
+            f"{'bright' if off[place] > 0 else 'dark'} by {share:.3g} of the brightest value: "
+            f"{limit:g} allowed",
+        )

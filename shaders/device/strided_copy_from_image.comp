@@ -1,0 +1,5 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#define FROM_IMAGE
+#include "device/strided_copy.glsl"

@@ -1,0 +1,86 @@
+"""Flashes by the thresholds of WCAG 2.2, and flicker by its contrast."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vkbloom.testing import flash, flicker
+
+FPS = 240
+Image = NDArray[Any]
+
+
+def flashing(
+    hertz: float, change: float, shape: str = "square", base: float = 0.3, seconds: float = 1.5
+) -> NDArray[np.float64]:
+    wave = np.sin(2 * np.pi * hertz * np.arange(round(FPS * seconds)) / FPS + 1e-6)
+    return base + change / 2 * (wave if shape == "sine" else np.sign(wave))
+
+
+def frames(light: NDArray[np.float64], colour: tuple[float, float, float] = (1, 1, 1)) -> Image:
+    picture = light[:, np.newaxis, np.newaxis, np.newaxis] * np.array(colour)
+    return np.broadcast_to(picture, (len(light), 6, 8, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("shape", ["sine", "square"])
+@pytest.mark.parametrize("hertz", [4, 5, 10, 15])
+def test_the_general_threshold_is_a_tenth(hertz: float, shape: str) -> None:
+    low, high = 0.0, 0.5
+    while high - low > 5e-4:
+        middle = (low + high) / 2
+        failed = flash(frames(flashing(hertz, middle, shape)), FPS, degrees=40).general
+        low, high = (low, middle) if failed else (middle, high)
+    assert high == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize("hertz", [1, 2, 3])
+def test_three_flashes_a_second_pass(hertz: float) -> None:
+    found = flash(frames(flashing(hertz, 0.5)), FPS, degrees=40)
+    assert (found.general, found.flashes) == (False, hertz)
+
+
+@pytest.mark.parametrize(("base", "failed"), [(0.9, False), (0.8, True)])
+def test_the_darker_picture_is_below_0_8(base: float, failed: bool) -> None:
+    found = flash(frames(flashing(6, 0.05 + 0.051 * 2, base=base)), FPS, degrees=40)
+    assert found.general is failed
+
+
+def test_red_flashes() -> None:
+    dim = frames(flashing(5, 0.08, base=0.2), (1, 0, 0))
+    found = flash(dim, FPS, degrees=40)
+    assert (found.general, found.red) == (False, True)
+    assert "red flashes: fails, up to 5 a second" in str(found)
+    pink = frames(flashing(5, 0.08, base=0.2), (1, 0.4, 0.4))
+    assert not flash(pink, FPS, degrees=40).red
+
+
+@pytest.mark.parametrize(("share", "failed"), [(0.2, False), (0.3, True)])
+def test_a_quarter_of_a_field_counts(share: float, failed: bool) -> None:
+    light = flashing(5, 0.4)
+    still = np.full((len(light), 64, 64, 3), 0.3, np.float32)
+    side = round(64 * np.sqrt(share * np.pi / 4))
+    start = (64 - side) // 2
+    still[:, start : start + side, start : start + side] = light[:, None, None, None]
+    assert flash(still, FPS, degrees=10).general is failed
+
+
+def test_frames_are_checked() -> None:
+    picture = np.zeros((4, 4, 3), np.uint8)
+    with pytest.raises(ValueError, match="a sequence has at least 2"):
+        flash([picture], FPS, degrees=40)
+    with pytest.raises(ValueError, match="all must be the same"):
+        flicker([picture, picture[:2]], FPS)
+    with pytest.raises(ValueError, match="is not"):
+        flash([picture[..., 0]] * 2, FPS, degrees=40)
+
+
+def test_contrast_at_each_frequency() -> None:
+    found = flicker(frames(flashing(6, 0.06, "sine", seconds=1)), FPS)
+    peak = int(found.contrast.argmax())
+    assert found.frequencies[peak] == pytest.approx(6)
+    assert found.contrast[peak] == pytest.approx(0.1, rel=1e-4)
+    assert np.delete(found.contrast, peak).max() < 1e-4
