@@ -112,33 +112,31 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A pass of the mip pyramid: `own` and `coarse` are the shares of this level and of the smaller
-// one. The steps are the distances of the taps in texels of the image that is read. If a level is
-// exactly twice as large as the smaller one, `taps` has the same weights on integer texels. The
-// threshold is for a first level that reads the image itself.
-#define PYRAMID_BLOCK(B, READS, INPUT, VEC4S) \
-    SAMPLING_ROWS(B, INPUT) \
+// A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size
+// and of the filtered image; the taps along rows and along columns. If the target is exactly twice
+// as large, `taps` has the same weights on integer texels.
+#define FILTER_ROWS(B, INPUT, VEC4S) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
-    INPUT(B, float, step_x) \
-    INPUT(B, float, step_y) \
-    THRESHOLD_ROWS(B, READS) \
+    VEC4S(B, taps_x, MAX_FILTER_TAPS) \
+    VEC4S(B, taps_y, MAX_FILTER_TAPS) \
     VEC4S(B, taps, 1)
 
-// The last upsampling of a pyramid, fused with the composite.
-#define DOUBLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, coarse) \
-    COMPOSITE_ROWS(B, READS, INPUT) \
-    VEC4S(B, taps, 1)
+// A pass that filters an image. The threshold is for one that reads the image itself.
+#define FILTER_BLOCK(B, READS, INPUT, VEC4S) \
+    SAMPLING_ROWS(B, INPUT) \
+    FILTER_ROWS(B, INPUT, VEC4S) \
+    THRESHOLD_ROWS(B, READS)
 
-// The same by any factor.
-#define UPSAMPLE_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
+// A filter that makes the bloom, fused with the composite.
+#define FILTER_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     PLACE_ROWS(B, INPUT) \
-    INPUT(B, float, coarse) \
+    FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// The first pass of a published method, which reads the frame. The steps are the distances of its
-// taps in texels of the frame.
+// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by
+// brightness, and the first pass of a published method, which reads the frame. The steps are the
+// distances of its taps in texels of what it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -159,12 +157,6 @@
 #define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     VEC4S(B, shares, 2)
-
-// A pass of dual Kawase. The threshold is for a first level that reads the image itself.
-#define KAWASE_BLOCK(B, READS, INPUT, VEC4S) \
-    READS(B, offset) \
-    SAMPLING_ROWS(B, INPUT) \
-    THRESHOLD_ROWS(B, READS)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
 // weight of each for each channel. The threshold is for the first iteration.
@@ -192,8 +184,9 @@
     VEC4S(B, ghosts, MAX_GHOSTS)
 
 // Of an adjoint pass that reads many pixels for the texels of a block, which is `summed_width` x
-// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each texel
-// and each group of rows, in blocks of which `summed_columns` are beside each other (summed.glsl).
+// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each
+// texel and each group of rows, in blocks of which `summed_columns` are beside each other
+// (summed.glsl).
 #define SUMMED_ROWS(B, INPUT) \
     INPUT(B, int, summed_x) \
     INPUT(B, int, summed_y) \
@@ -208,17 +201,17 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its adjoint
-// are equal where they differ by no more than the rounding.
+// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its
+// adjoint are equal where they differ by no more than the rounding.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
     INPUT(B, float, rounding) \
     VEC4S(B, factors, 1)
 
-// Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows from
-// its end at the left or right or at the bottom, or back from its other end. `distance` is that of
-// the pixels that are mixed.
+// Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows
+// from its end at the left or right or at the bottom, or back from its other end. `distance` is
+// that of the pixels that are mixed.
 #define STAR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, step_x) \
     INPUT(B, int, step_y) \
@@ -227,8 +220,8 @@
     INPUT(B, float, fade) \
     INPUT(B, float, limit)
 
-// Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of the
-// sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
+// Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
+// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
@@ -242,9 +235,9 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
-// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels; the
-// factor of the colours of what is added. A filter between levels of exactly half and twice the size is
-// of EXACT_*; `taps` are those of an upsampling, as of PYRAMID_BLOCK.
+// The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
+// the factor of the colours of what is added. A filter between levels of exactly half and twice the
+// size is of EXACT_*; `taps` are those of an upsampling, as of FILTER_ROWS.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
@@ -267,11 +260,11 @@
 
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
-// Elements from `kept` on are not stored. The first stage pads the line: its first `extent` elements
-// are texels, and elements from `turn` on are positions before the first texel. The product with a
-// kernel with colours reads the frequency of the opposite sign. To find it, it needs the radices of
-// the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used), the rows' number
-// of elements, and the radices of the columns' stages without the last one.
+// Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
+// elements are texels, and elements from `turn` on are positions before the first texel. The
+// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
+// the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
+// the rows' number of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -295,8 +288,8 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`: all
-// channels are equal.
+// texels, how many of them before and after its centre count, and the period of the line. `grey`:
+// all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -315,7 +308,7 @@
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
 #define OWN_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, OWN_VEC4S)
-#define OWN_VEC4S 64
+#define OWN_VEC4S                         64
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(own, OWN_BLOCK) \
@@ -324,12 +317,10 @@
     BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
     BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
-    BLOCK(pyramid, PYRAMID_BLOCK) \
-    BLOCK(double_final, DOUBLE_FINAL_BLOCK) \
-    BLOCK(upsample_final, UPSAMPLE_FINAL_BLOCK) \
+    BLOCK(filter, FILTER_BLOCK) \
+    BLOCK(filter_final, FILTER_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
     BLOCK(gather, GATHER_BLOCK) \
-    BLOCK(kawase, KAWASE_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(flare, FLARE_BLOCK) \
     BLOCK(dirt, DIRT_BLOCK) \
@@ -427,9 +418,9 @@
 // Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
 // the size of their scales, the taps of an iteration of a streak, and how often the size of the
 // bloom buffers is halved.
-#define MAX_STAGES    (GATHERED_LEVELS - 2)
+#define MAX_STAGES   (GATHERED_LEVELS - 2)
 #define MAX_GHOSTS   16
-#define GHOST_LIMIT   16.0
+#define GHOST_LIMIT  16.0
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
 
@@ -450,11 +441,11 @@
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
-// On an H100, halving 3840 x 2160 of float32 takes 103 us in strips of 1 x 4 by 32 invocations, 140 in
-// strips of 4 x 16 by 8, and 109 from tiles in shared memory.
-#define HALVE_INVOCATIONS   32
-#define HALVE_COLUMNS       1
-#define HALVE_ROWS          4
+// On an H100, halving 3840 x 2160 of float32 takes 103 us in strips of 1 x 4 by 32 invocations, 140
+// in strips of 4 x 16 by 8, and 109 from tiles in shared memory.
+#define HALVE_INVOCATIONS 32
+#define HALVE_COLUMNS     1
+#define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
@@ -465,12 +456,11 @@
 #define DOUBLE_WORDS_ROWS             64
 #define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
 #define TEXEL_ROWS                    16
-#define UPSAMPLE_COLUMNS(CHANNEL)     (16 / (CHANNEL))
-#define UPSAMPLE_ROWS                 64
-#define GRID_COLUMNS                  4
+#define WINDOW_COLUMNS(CHANNEL)       (8 / (CHANNEL))
+#define WINDOW_ROWS                   64
 #define SHRINK_ROWS                   32
-#define FILTER_COLUMNS                4
-#define FILTER_ROWS                   16
+#define GATHER_COLUMNS                4
+#define GATHER_ROWS                   16
 #define GODOT_COLUMNS                 8
 #define HDRP_OUTPUTS                  8
 #define STREAK_COLUMNS                8
@@ -480,41 +470,42 @@
 #define TILE_RUNS                     4
 #define TILE_RADIUS                   16
 // Tiles of levels of exactly twice the size, and of the transposes of both: their pixels, and the
-// invocations along a column. On an H100 with float32, the tile of four rows of the second transpose takes
-// 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16, 256 invocations composite
-// 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one of 32 x 16, 151 in one of 64 x 16.
-#define DOUBLE_TILE_COLUMNS           64
-#define DOUBLE_TILE_ROWS              16
-#define DOUBLE_TILE_RUNS              4
-#define ADJOINT_HALVE_COLUMNS         32
-#define ADJOINT_HALVE_ROWS            16
-#define ADJOINT_HALVE_RUNS            4
-#define ADJOINT_DOUBLE_COLUMNS        61
-#define ADJOINT_DOUBLE_ROWS           4
-#define FUSED_VEC4S                   5
+// invocations along a column. On an H100 with float32, the tile of four rows of the second
+// transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
+// 256 invocations composite 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one
+// of 32 x 16, 151 in one of 64 x 16.
+#define DOUBLE_TILE_COLUMNS    64
+#define DOUBLE_TILE_ROWS       16
+#define DOUBLE_TILE_RUNS       4
+#define ADJOINT_HALVE_COLUMNS  32
+#define ADJOINT_HALVE_ROWS     16
+#define ADJOINT_HALVE_RUNS     4
+#define ADJOINT_DOUBLE_COLUMNS 61
+#define ADJOINT_DOUBLE_ROWS    4
+#define FUSED_VEC4S            5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
 // butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
 // clamped, since their sums would overflow.
-#define FFT_INVOCATIONS 64
-#define FFT_ROW_COLUMNS 8
-#define FFT_MOST_RADIX  64
-#define FFT_SMALL_RADIX 16
+#define FFT_INVOCATIONS  64
+#define FFT_ROW_COLUMNS  8
+#define FFT_MOST_RADIX   64
+#define FFT_SMALL_RADIX  16
 #define FFT_SMALL_PIXELS 131072
-// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups run
-// at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
+// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups
+// run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
 // FFT_MOST_GROUP_RADIX.
 #define FFT_MOST_GROUP_RADIX  16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
-// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels that
-// is added up at once.
+// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels
+// that is added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
-// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of an
-// invocation that writes words.
+// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of
+// an invocation that writes words.
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 
@@ -527,7 +518,12 @@
 #define HDRP_NEAR       0.4
 #define HDRP_KERNEL \
     0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
-#define GODOT_KERNEL    0.2024, 0.1790, 0.1240, 0.0672, 0.0285
+#define GODOT_KERNEL 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
+
+// Of a filter: the most taps along an axis, kernels, and texels of a window.
+#define MAX_FILTER_TAPS 5
+#define MAX_KERNELS     3
+#define MAX_WINDOW      10
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -537,17 +533,17 @@
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
-// is known to have no NaN and no infinity. With NEXT_PIXEL the outer taps of halve_grid.comp are between
-// the texels of the next pixel. With FROM_IMAGE, a downsampling to half the size reads
-// the image itself and applies the threshold, and an adjoint pass writes the cotangents of a source's
-// image. BY is what these are of. With ENLARGED the target of shrink.comp has more rows than the
-// source. STORED is the format of the target (STORED_*). FIRST
-// marks an engine's first level. LEVELS is the number of levels that a pass adds up. GROUPS is what
-// a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose
-// workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a
-// first stage that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp)
-// RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for
-// each of GROUP_WIDTH lines.
+// is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
+// (lib/filter.glsl). EXACT says that their images are in this ratio, or for strips the widths of
+// these. With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
+// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
+// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
+// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
+// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
+// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
+// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
+// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
+// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -559,7 +555,6 @@
     CONSTANT(7, THRESHOLD_MODE, threshold_mode) \
     CONSTANT(8, THRESHOLDED, thresholded) \
     CONSTANT(9, ANTI_FLICKER, anti_flicker) \
-    CONSTANT(10, FIREFLY_FILTER, firefly_filter) \
     CONSTANT(11, DIRECTION, direction) \
     CONSTANT(12, RADIUS, radius) \
     CONSTANT(13, ADD_OWN, add_own) \
@@ -587,11 +582,14 @@
     CONSTANT(35, GROUP_HEIGHT, group_height) \
     CONSTANT(36, ROLLED, rolled) \
     CONSTANT(37, FINITE, finite) \
-    CONSTANT(38, NEXT_PIXEL, next_pixel) \
     CONSTANT(39, BY, by) \
     CONSTANT(40, BOUNDARY, boundary) \
     CONSTANT(41, PREFILTERED, prefiltered) \
-    CONSTANT(42, ENLARGED, enlarged)
+    CONSTANT(42, ENLARGED, enlarged) \
+    CONSTANT(43, EXACT, exact) \
+    CONSTANT(44, TAP_COUNT, taps) \
+    CONSTANT(45, KERNELS, kernels) \
+    CONSTANT(46, WINDOW, window)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -645,6 +643,11 @@
     NAME(QUALITY_MEDIUM, 1, medium) \
     NAME(QUALITY_LOW, 2, low)
 
+#define FILTER_NAMES(NAME) \
+    NAME(FILTER_GAUSSIAN, 0, gaussian) \
+    NAME(FILTER_KAWASE, 1, kawase) \
+    NAME(FILTER_DUAL, 2, dual)
+
 #define CHOICES(CHOICE) \
     CHOICE(composite, COMPOSITE_NAMES) \
     CHOICE(tonemap, TONEMAP_NAMES) \
@@ -653,7 +656,8 @@
     CHOICE(texel, TEXEL_NAMES) \
     CHOICE(boundary, BOUNDARY_NAMES) \
     CHOICE(type, TYPE_NAMES) \
-    CHOICE(quality, QUALITY_NAMES)
+    CHOICE(quality, QUALITY_NAMES) \
+    CHOICE(filter, FILTER_NAMES)
 
 // Modes that the core chooses, with the same names in C and GLSL.
 #define MODE_NAMES(NAME) \
@@ -682,9 +686,7 @@
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
     NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
-    NAME(UPSAMPLE_UNIT_TENT, 5, unit_tent) \
-    NAME(UPSAMPLE_PAIR, 6, pair) \
-    NAME(GROUPS_PYRAMID, 0, pyramid) \
+    NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
     NAME(GROUPS_BLENDER, 3, blender) \
@@ -694,11 +696,13 @@
     NAME(GROUPS_URP, 7, urp) \
     NAME(GROUPS_UNREAL, 8, unreal) \
     NAME(GROUPS_BEVY, 9, bevy) \
-    NAME(GROUPS_KAWASE, 10, kawase) \
     NAME(GROUPS_KINO, 11, kino) \
+    NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
+    NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
+    NAME(EXACT_SAME, 3, exact_same) \
     NAME(BY_SCENE, 0, by_scene) \
     NAME(BY_BLOOM, 1, by_bloom) \
     NAME(BY_MASK, 2, by_mask) \

@@ -133,9 +133,21 @@ struct vkb_pass_row {
     // Of a pass that changes resources, or reads changed ones: other than in the request before, so
     // that it runs in each request; 0: of no such pass.
     uint64_t turn;
+    // What the pass computes, whatever shader it has: the block, or its transpose.
     enum vkb_block block;
+    bool transposed;
     union vkb_params params;
 };
+
+static inline bool vkb_computes(const struct vkb_pass_row *pass, enum vkb_block block)
+{
+    return pass->block == block && !pass->transposed;
+}
+
+static inline bool vkb_transposes(const struct vkb_pass_row *pass, enum vkb_block block)
+{
+    return pass->block == block && pass->transposed;
+}
 
 struct vkb_graph {
     struct vkb_image_row *images;

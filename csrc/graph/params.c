@@ -73,10 +73,9 @@ void vkb_params_set_rows(enum vkb_block block, const struct vkb_params_rows *row
     switch (block) {
         SET_ROWS(blur)
         SET_ROWS(threshold)
-        SET_ROWS(pyramid)
+        SET_ROWS(filter)
         SET_ROWS(prefilter)
         SET_ROWS(gather)
-        SET_ROWS(kawase)
         SET_ROWS(blender_end)
     default:
         break;

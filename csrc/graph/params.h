@@ -34,6 +34,10 @@ enum vkb_block {
 #undef VKB_BLOCK_ENUM
 };
 
+#define VKB_BLOCK_ONE(block, ROWS) +1
+enum { VKB_BLOCK_COUNT = 1 PARAMETER_BLOCKS(VKB_BLOCK_ONE) };
+#undef VKB_BLOCK_ONE
+
 extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 
 // Writes the fields of a block without the padding between them, whose content is undefined.
@@ -134,6 +138,7 @@ enum vkb_texel { TEXEL_NAMES(VKB_NAME_ENUM) };
 enum vkb_boundary { BOUNDARY_NAMES(VKB_NAME_ENUM) };
 enum vkb_type { TYPE_NAMES(VKB_NAME_ENUM) };
 enum vkb_quality { QUALITY_NAMES(VKB_NAME_ENUM) };
+enum vkb_blur_filter { FILTER_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 

@@ -6,51 +6,22 @@
 #include <stdio.h>
 #include <string.h>
 
-// A family of passes. Those whose weights depend on the brightness have an adjoint of their own.
-struct family {
-    const struct vkb_shader *shader;
-    vkb_transpose *transpose, *weighted;
+// The transpose of a pass by its block.
+static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
+    [VKB_BLOCK_composite] = vkb_transpose_composite,
+    [VKB_BLOCK_godot_final] = vkb_transpose_godot_composite,
+    [VKB_BLOCK_threshold] = vkb_transpose_threshold,
+    [VKB_BLOCK_blur] = vkb_transpose_blur,
+    [VKB_BLOCK_filter] = vkb_transpose_filter,
+    [VKB_BLOCK_gather] = vkb_transpose_gather,
+    [VKB_BLOCK_prefilter] = vkb_transpose_groups,
+    [VKB_BLOCK_blender_end] = vkb_transpose_blender_end,
+    [VKB_BLOCK_streaks] = vkb_transpose_streaks,
+    [VKB_BLOCK_flare] = vkb_transpose_flare,
+    [VKB_BLOCK_dirt] = vkb_transpose_dirt,
+    [VKB_BLOCK_star] = vkb_transpose_star,
+    [VKB_BLOCK_sun_beams] = vkb_transpose_sun_beams,
 };
-
-static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
-{
-    static const struct family families[] = {
-        {&vkb_shader_composite_frag, vkb_transpose_composite, NULL},
-        {&vkb_shader_threshold_frag, vkb_transpose_threshold, NULL},
-        {&vkb_shader_blur_frag, vkb_transpose_blur, NULL},
-        {&vkb_shader_pyramid_down_frag, vkb_transpose_down, vkb_transpose_groups},
-        {&vkb_shader_pyramid_up_frag, vkb_transpose_up, NULL},
-        {&vkb_shader_gather_frag, vkb_transpose_gather, NULL},
-        {&vkb_shader_kawase_down_frag, vkb_transpose_kawase_down, NULL},
-        {&vkb_shader_kawase_up_frag, vkb_transpose_kawase_up, NULL},
-        {&vkb_shader_box_down_frag, vkb_transpose_box, vkb_transpose_groups},
-        {&vkb_shader_bevy_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_urp_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_unreal_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_kino_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_pygfx_down_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_filament_prefilter_frag, vkb_transpose_filament_reduction, NULL},
-        {&vkb_shader_filament_down_frag, vkb_transpose_filament_down, NULL},
-        {&vkb_shader_hdrp_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_hdrp_blur_frag, vkb_transpose_hdrp_blur, NULL},
-        {&vkb_shader_godot_blur_frag, vkb_transpose_godot_blur, NULL},
-        {&vkb_shader_godot_final_frag, vkb_transpose_godot_composite, NULL},
-        {&vkb_shader_blender_prefilter_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_blender_down_frag, vkb_transpose_groups, NULL},
-        {&vkb_shader_blender_end_frag, vkb_transpose_blender_end, NULL},
-        {&vkb_shader_streaks_frag, vkb_transpose_streaks, NULL},
-        {&vkb_shader_ghosts_frag, vkb_transpose_flare, NULL},
-        {&vkb_shader_halo_frag, vkb_transpose_flare, NULL},
-        {&vkb_shader_dirt_frag, vkb_transpose_dirt, NULL},
-        {&vkb_shader_simple_star_comp, vkb_transpose_star, NULL},
-        {&vkb_shader_sun_beams_frag, vkb_transpose_sun_beams, NULL},
-    };
-
-    for (size_t i = 0; i < sizeof families / sizeof families[0]; ++i)
-        if (families[i].shader == pass->shader)
-            return pass->constants.firefly_filter ? families[i].weighted : families[i].transpose;
-    return NULL;
-}
 
 // The image of a framebuffer's cotangents, which the source brings.
 static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source *source,
@@ -131,7 +102,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
 {
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
-        vkb_transpose *transpose = find_transpose(&pass);
+        vkb_transpose *transpose = transposes[pass.block];
         if (pass.target_count != 1 || vkb_brought(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
         const bool convolved = pass.block == VKB_BLOCK_fft;

@@ -35,12 +35,9 @@ static void choose_sizes(struct vkb_levels *levels)
 // The pass from the frame to the first level.
 static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
 {
-    struct vkb_pass_row row =
-        vkb_prefilter_row(levels, &vkb_shader_bevy_prefilter_frag, from, levels->downs[0]);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BEVY, from, levels->downs[0]);
 
-    row.params.prefilter.step_x = (float)levels->settings->values.scale_x;
-    row.params.prefilter.step_y = (float)levels->settings->values.scale_y;
-    row.reach += 2.0f * row.params.prefilter.step_y;
+    vkb_set_steps(&row, levels->settings->values.scale_x, levels->settings->values.scale_y);
     vkb_mask_prefilter(levels, &row);
     return row;
 }
@@ -57,10 +54,10 @@ bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_so
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
         if (!vkb_levels_down(&levels, level, error))
             return false;
-        const struct vkb_pass_row row =
-            level ? vkb_scaled_down_row(&levels, false, from, levels.downs[level])
-                  : first_row(&levels, from);
-        if (!vkb_graph_add_pass(graph, &row, error))
+        const struct vkb_pass_row row = first_row(&levels, source->glow);
+        if (level ? !vkb_levels_reduce(&levels, settings->values.scale_x, settings->values.scale_y,
+                                       from, levels.downs[level], error)
+                  : !vkb_graph_add_pass(graph, &row, error))
             return false;
     }
     for (uint32_t level = 0; level + 1 < levels.count; ++level) {

@@ -47,12 +47,9 @@ static bool add_bloom(struct glare *glare, uint32_t *light, struct vkb_error *er
         levels->sizes[level] = vkb_halved(levels->sizes[level - 1]);
         if (!vkb_levels_image(levels, "down_%u", level, levels->sizes[level], to, error))
             return false;
-        struct vkb_pass_row row =
-            level == 1 ? vkb_pyramid_row(levels, &vkb_shader_blender_down_frag, from, *to)
-                       : vkb_down_row(levels, false, from, *to);
-        if (level == 1)
-            row.constants.groups = GROUPS_BLENDER;
-        if (!vkb_graph_add_pass(levels->graph, &row, error))
+        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BLENDER, from, *to);
+        if (level == 1 ? !vkb_graph_add_pass(levels->graph, &row, error)
+                       : !vkb_levels_reduce(levels, 1.0, 1.0, from, *to, error))
             return false;
     }
     combination.target_step = true;
@@ -306,8 +303,8 @@ static bool add_highlights(struct glare *glare, struct vkb_error *error)
         return false;
     if (factor == 1)
         levels->downs[0] = glow;
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_blender_prefilter_frag,
-                                                source->glow, levels->downs[0]);
+    struct vkb_pass_row row =
+        vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
     if (factor > 1) {
         row.constants.radius = (int32_t)factor;
         row.reach = INFINITY;

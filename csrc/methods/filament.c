@@ -1,7 +1,7 @@
 // Filament's bloom at its low quality. Source: google/filament, filament/src/PostProcessManager.cpp
 // @ 003e5005713c, bloom().
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 #include <math.h>
 
@@ -33,8 +33,7 @@ static void choose_sizes(struct vkb_levels *levels)
 static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                           struct vkb_error *error)
 {
-    struct vkb_pass_row row =
-        vkb_prefilter_row(levels, &vkb_shader_filament_prefilter_frag, from, to);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_FILAMENT, from, to);
 
     if (from == levels->source->glow)
         vkb_mask_prefilter(levels, &row);
@@ -61,17 +60,20 @@ static bool add_halvings(const struct vkb_levels *levels, uint32_t *image, struc
     return true;
 }
 
+// A level with even sides: 3 x 3 bilinear taps that approximate a Gaussian (bloomDownsample9.mat
+// @ 523a261b1052).
 static bool add_down(const struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
 {
     const uint32_t from = levels->downs[level - 1];
     const struct vkb_size above = levels->sizes[level - 1];
     const bool even = above.width % 2 == 0 && above.height % 2 == 0;
     const uint32_t to = levels->downs[level];
-    const struct vkb_pass_row row =
-        even ? vkb_pyramid_row(levels, &vkb_shader_filament_down_frag, from, to)
-             : vkb_down_row(levels, false, from, to);
+    const struct vkb_side_taps taps = {FILAMENT_OFFSET, FILAMENT_OUTER, 1.0 - 2.0 * FILAMENT_OUTER};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
 
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_filter_add(&row, 0, taps, taps);
+    return even ? vkb_filter_end(levels, &row, error)
+                : vkb_levels_reduce(levels, 1.0, 1.0, from, to, error);
 }
 
 bool vkb_add_filament(const struct vkb_settings *settings, const struct vkb_bloom_source *source,

@@ -222,8 +222,7 @@ static bool add_halvings(const struct vkb_levels *levels, int halvings, uint32_t
         if (!vkb_levels_step(levels, "glare_down_%u", (uint32_t)*count - 1, size, &images[*count],
                              error))
             return false;
-        const struct vkb_pass_row row = vkb_down_row(levels, false, from, images[*count]);
-        if (!vkb_graph_add_pass(levels->graph, &row, error))
+        if (!vkb_levels_reduce(levels, 1.0, 1.0, from, images[*count], error))
             return false;
     }
     return true;

@@ -1,7 +1,7 @@
 // Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
 // Assets/Kino/Bloom/Bloom.cs.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 #include <math.h>
 
@@ -19,6 +19,21 @@ static double choose_sizes(struct vkb_levels *levels)
     return 0.5 + lg - trunc(lg);
 }
 
+// A box of 4 x 4 texels, as four diagonal taps at a distance of one texel.
+static bool add_box(const struct vkb_levels *levels, bool firefly_filter, uint32_t from,
+                    uint32_t to, struct vkb_error *error)
+{
+    const struct vkb_side_taps sides = {1.0, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+
+    if (firefly_filter) {
+        row = vkb_groups_row(levels, GROUPS_BOX, from, to);
+        return vkb_graph_add_pass(levels->graph, &row, error);
+    }
+    vkb_filter_add(&row, 0, sides, sides);
+    return vkb_filter_end(levels, &row, error);
+}
+
 bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -29,8 +44,7 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     combination.radius_x = combination.radius_y = choose_sizes(&levels);
     if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
         return false;
-    struct vkb_pass_row prefilter =
-        vkb_prefilter_row(&levels, &vkb_shader_kino_prefilter_frag, source->glow, from);
+    struct vkb_pass_row prefilter = vkb_groups_row(&levels, GROUPS_KINO, source->glow, from);
     prefilter.constants.anti_flicker = settings->values.anti_flicker;
     vkb_mask_prefilter(&levels, &prefilter);
     if (!vkb_graph_add_pass(graph, &prefilter, error))
@@ -38,11 +52,8 @@ bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_so
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
         if (!vkb_levels_down(&levels, level, error))
             return false;
-        struct vkb_pass_row row =
-            vkb_pyramid_row(&levels, &vkb_shader_box_down_frag, from, levels.downs[level]);
-        row.constants.groups = GROUPS_BOX;
-        row.constants.firefly_filter = settings->values.anti_flicker && level == 0;
-        if (!vkb_graph_add_pass(graph, &row, error))
+        if (!add_box(&levels, settings->values.anti_flicker && level == 0, from,
+                     levels.downs[level], error))
             return false;
     }
     return vkb_levels_combine(&levels, &combination, bloom, error);

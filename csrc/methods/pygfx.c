@@ -28,14 +28,15 @@ bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_s
         if (!vkb_levels_down(&levels, level, error))
             return false;
         size = vkb_halved(size);
-        struct vkb_pass_row row =
-            level ? vkb_down_row(&levels, false, from, levels.downs[level])
-                  : vkb_pyramid_row(&levels, &vkb_shader_pygfx_down_frag, from, levels.downs[0]);
-        if (level == 0) {
-            row.constants.groups =
-                settings->values.karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX;
-            vkb_mask_prefilter(&levels, &row);
+        if (level > 0) {
+            if (!vkb_levels_reduce(&levels, 1.0, 1.0, from, levels.downs[level], error))
+                return false;
+            continue;
         }
+        struct vkb_pass_row row = vkb_groups_row(
+            &levels, settings->values.karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX, from,
+            levels.downs[0]);
+        vkb_mask_prefilter(&levels, &row);
         if (!vkb_graph_add_pass(graph, &row, error))
             return false;
     }

@@ -3,7 +3,7 @@
 // @ 00d472fae509; HDRP: com.unity.render-pipelines.high-definition, HDRenderPipeline.PostProcess.cs
 // @ 0148835ea9ba, BloomBlur.compute @ 0e4ca4d79b2c.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 #include <math.h>
 
@@ -30,12 +30,71 @@ static uint32_t level_count(uint32_t width, uint32_t height, double spared, int 
     return (uint32_t)fmin(fmax(count, 1.0), most);
 }
 
+// The levels below the first one, which is prefiltered, and the bloom from them.
+typedef bool add_urp(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
+
+static bool add_gaussian(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+{
+    const struct vkb_combination combination = scattered(levels->settings, UPSAMPLE_LINEAR);
+    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .step_x = 2.0};
+
+    for (uint32_t level = 1; level < levels->count; ++level)
+        if (!vkb_levels_blur(levels, level, levels->downs[level - 1], &kernel, error))
+            return false;
+    return vkb_levels_combine(levels, &combination, bloom, error);
+}
+
+// URP 17: the first level, mixed again and again with the mean of four diagonal taps, each time
+// further away. With a scatter of nearly 1 it is the mean alone.
+static bool add_kawase(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+{
+    const double scatter = levels->settings->values.scatter;
+    const double share = scatter >= 0.999 ? 1.0 : 0.05 + 0.9 * scatter;
+    const struct vkb_side_taps own = {0.0, 0.0, 1.0 - share}, centre = {0.0, 0.0, 1.0};
+    uint32_t from = levels->downs[0], to;
+
+    for (uint32_t i = 0; i < levels->count; ++i, from = to) {
+        const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
+        if (!vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0], &to, error))
+            return false;
+        struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+        vkb_filter_add(&row, 0, own, centre);
+        vkb_filter_add(&row, 1, (struct vkb_side_taps){distance, 0.5 * share, 0.0},
+                       (struct vkb_side_taps){distance, 0.5, 0.0});
+        if (!vkb_filter_end(levels, &row, error))
+            return false;
+    }
+    return vkb_levels_enlarge(levels, from, 1.0, bloom, error);
+}
+
+// URP 17: dual Kawase, whose way up begins with the last level and adds no other.
+static bool add_dual(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+{
+    const double offset = 0.3 + levels->settings->values.scatter;
+    uint32_t from, to;
+
+    for (uint32_t level = 1; level < levels->count; ++level)
+        if (!vkb_levels_down(levels, level, error)
+            || !vkb_kawase_down(levels, 1.0, levels->downs[level - 1], levels->downs[level], error))
+            return false;
+    from = levels->downs[levels->count - 1];
+    for (uint32_t level = levels->count - 1; level-- > 0; from = to)
+        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &to, error)
+            || !vkb_kawase_up(levels, offset, from, to, error))
+            return false;
+    return vkb_levels_enlarge(levels, from, 1.0, bloom, error);
+}
+
+static add_urp *const urp_filters[] = {
+    [FILTER_GAUSSIAN] = add_gaussian,
+    [FILTER_KAWASE] = add_kawase,
+    [FILTER_DUAL] = add_dual,
+};
+
 bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    const struct vkb_combination combination = scattered(settings, UPSAMPLE_LINEAR);
-    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .step_x = 2.0};
     struct vkb_size size = vkb_halved(source->buffers);
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 
@@ -43,15 +102,10 @@ bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_sou
         levels.sizes[levels.count++] = size;
     if (!vkb_levels_down(&levels, 0, error))
         return false;
-    struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, &vkb_shader_urp_prefilter_frag, source->glow, levels.downs[0]);
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_URP, source->glow, levels.downs[0]);
     vkb_mask_prefilter(&levels, &row);
-    if (!vkb_graph_add_pass(graph, &row, error))
-        return false;
-    for (uint32_t level = 1; level < count; ++level)
-        if (!vkb_levels_blur(&levels, level, levels.downs[level - 1], &kernel, error))
-            return false;
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    return vkb_graph_add_pass(graph, &row, error)
+        && urp_filters[settings->choices[VKB_CHOICE_filter]](&levels, bloom, error);
 }
 
 // scale * W / 2^(k + 1), rounded half to even.
@@ -64,11 +118,13 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                           uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_hdrp_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_hdrp_blur_frag, from, to);
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
     vkb_reach_nine(&row);
+    vkb_drop_reads(&row, 1);
+    row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;
     row.constants.first = first;
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
@@ -113,8 +169,7 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
                                                        rounded(frame.height, down, levels.count)};
     if (!vkb_levels_step(&levels, "reduced", 0, levels.sizes[0], &from, error))
         return false;
-    struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, &vkb_shader_hdrp_prefilter_frag, source->glow, from);
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_HDRP, source->glow, from);
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;

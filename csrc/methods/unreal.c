@@ -55,8 +55,7 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
         shares[level] /= total;
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
         return false;
-    struct vkb_pass_row row =
-        vkb_prefilter_row(&levels, &vkb_shader_unreal_prefilter_frag, source->glow, from);
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_UNREAL, source->glow, from);
     row.constants.node = settings->values.node;
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))

@@ -16,6 +16,7 @@ struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint3
 {
     struct vkb_pass_row row = vkb_fullscreen_row("", shader, VKB_NO_IMAGE);
 
+    row.transposed = true;
     while (row.read_count < count) {
         row.reads[row.read_count] = reads[row.read_count];
         ++row.read_count;

@@ -89,10 +89,8 @@ void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y
 // The families of passes.
 vkb_transpose vkb_transpose_composite, vkb_transpose_godot_composite, vkb_transpose_threshold,
     vkb_transpose_blender_end;
-vkb_transpose vkb_transpose_blur, vkb_transpose_down, vkb_transpose_up, vkb_transpose_gather,
-    vkb_transpose_kawase_down, vkb_transpose_kawase_up, vkb_transpose_box,
-    vkb_transpose_filament_down, vkb_transpose_filament_reduction, vkb_transpose_hdrp_blur,
-    vkb_transpose_godot_blur;
+vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather,
+    vkb_transpose_hdrp_blur, vkb_transpose_godot_blur;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
 // Glare.

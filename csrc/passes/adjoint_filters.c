@@ -1,7 +1,7 @@
 // The adjoints of linear filters. Each reads its taps from the parameters of the forward row.
 #include "passes/adjoint.h"
 #include "passes/blur.h"
-#include "passes/levels.h"
+#include "passes/filter.h"
 
 #include <math.h>
 #include <string.h>
@@ -68,40 +68,6 @@ void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
     add_taps(&filter->y, 0, distance, side, 1.0 - 2.0 * side);
 }
 
-bool vkb_transpose_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                        struct vkb_error *error)
-{
-    const struct vkb_pyramid_params *params = &pass->params.pyramid;
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    vkb_filter_thirteen(&filter, params->step_x, params->step_y);
-    filter.exact = vkb_halves(pass) ? EXACT_HALF : 0;
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
-}
-
-bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                       struct vkb_error *error)
-{
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    filter.x.count = filter.y.count = 0;
-    add_taps(&filter.x, 0, 1.0, 0.5, 0.0);
-    add_taps(&filter.y, 0, 1.0, 0.5, 0.0);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
-}
-
-bool vkb_transpose_filament_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                 struct vkb_error *error)
-{
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    vkb_filter_three(&filter, FILAMENT_OFFSET, FILAMENT_OUTER);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
-}
-
 // A kernel of nine taps, pixels of the target apart.
 static void set_nine(const double half[5], enum vkb_border border, struct vkb_axis *axis)
 {
@@ -165,54 +131,45 @@ bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 
-// False: the kind of filter is unknown.
-static bool set_upsampling(enum vkb_mode kind, double step, struct vkb_axis *axis)
+// What the taps of a row sample, by UPSAMPLE_*.
+static const enum vkb_kind kinds[] = {
+    [UPSAMPLE_LINEAR] = VKB_KIND_LINEAR,
+    [UPSAMPLE_CUBIC] = VKB_KIND_CUBIC,
+    [UPSAMPLE_INSET_LINEAR] = VKB_KIND_INSET_LINEAR,
+    [UPSAMPLE_INSET_CUBIC] = VKB_KIND_INSET_CUBIC,
+};
+
+static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
+                     struct vkb_axis *axis)
 {
-    switch ((int)kind) {
-    case UPSAMPLE_LINEAR:
-        return true;
-    case UPSAMPLE_CUBIC:
-        axis->kind = VKB_KIND_CUBIC;
-        return true;
-    case UPSAMPLE_INSET_LINEAR:
-        axis->kind = VKB_KIND_INSET_LINEAR;
-        return true;
-    case UPSAMPLE_INSET_CUBIC:
-        axis->kind = VKB_KIND_INSET_CUBIC;
-        axis->count = 0;
-        add_taps(axis, 0, 1.0, 1.0, 0.0);
-        return true;
-    case UPSAMPLE_UNIT_TENT:
-    case UPSAMPLE_TENT:
-        axis->count = 0;
-        add_taps(axis, 0, kind == UPSAMPLE_TENT ? step : 1.0, 0.25, 0.5);
-        return true;
-    default:
-        return false;
+    axis->count = 0;
+    for (int32_t i = 0; i < count; ++i) {
+        struct vkb_tap *tap = &axis->taps[axis->count++];
+        *tap = (struct vkb_tap){.offset = taps[i][0]};
+        for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
+            tap->weights[kernel] = taps[i][kernel + 1];
     }
+    axis->kind = kinds[kind];
 }
 
-bool vkb_transpose_up(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                      struct vkb_error *error)
+bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                          struct vkb_error *error)
 {
-    const struct vkb_pyramid_params *params = &pass->params.pyramid;
-    const enum vkb_mode kind = (enum vkb_mode)pass->constants.upsample;
+    const struct vkb_filter_params *params = &pass->params.filter;
+    const struct vkb_constants *constants = &pass->constants;
     const uint32_t cotangents = vkb_brought(adjoint, pass);
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    if (!set_upsampling(kind, params->step_x, &filter.x)
-        || !set_upsampling(kind, params->step_y, &filter.y))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "adjoint: pass %s has an unknown filter",
-                        pass->name);
+    filter.kernels = (uint32_t)constants->kernels;
     filter.gain = params->coarse;
-    if (vkb_doubles(pass)) {
-        filter.exact = EXACT_DOUBLE;
-        memcpy(filter.up, params->taps[0], sizeof filter.up);
-    }
+    filter.exact = constants->exact;
+    memcpy(filter.up, params->taps[0], sizeof filter.up);
+    set_taps(params->taps_x, constants->taps, (enum vkb_mode)constants->upsample, &filter.x);
+    set_taps(params->taps_y, constants->taps, (enum vkb_mode)constants->upsample, &filter.y);
     if (!vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[0], error))
         return false;
-    if (!pass->constants.add_own)
+    if (!constants->add_own)
         return true;
     vkb_filter_begin(adjoint->graph, pass->reads[1], pass->targets[0], &filter);
     filter.gain = params->own;
@@ -227,51 +184,10 @@ bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     for (int level = 0; level < pass->constants.levels; ++level) {
         vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
         filter.gain = pass->params.gather.shares[level / 4][level % 4];
-        if (!set_upsampling((enum vkb_mode)pass->constants.upsample, 0.0, &filter.x)
-            || !set_upsampling((enum vkb_mode)pass->constants.upsample, 0.0, &filter.y))
-            return vkb_fail(error, VKB_ERROR_GENERAL, "adjoint: pass %s has an unknown filter",
-                            pass->name);
+        filter.x.kind = filter.y.kind = kinds[pass->constants.upsample];
         if (!vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[level],
                               error))
             return false;
     }
     return true;
-}
-
-// The centre, and four taps around it.
-bool vkb_transpose_kawase_down(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                               struct vkb_error *error)
-{
-    const double distance = 0.5 * pass->params.kawase.offset;
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    filter.kernels = 2;
-    filter.gain = 0.5;
-    filter.x.count = filter.y.count = 0;
-    add_taps(&filter.x, 0, 0.0, 0.0, 1.0);
-    add_taps(&filter.y, 0, 0.0, 0.0, 1.0);
-    add_taps(&filter.x, 1, distance, 0.5, 0.0);
-    add_taps(&filter.y, 1, distance, 0.5, 0.0);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
-}
-
-// Two taps along rows, two along columns, and four diagonal ones.
-bool vkb_transpose_kawase_up(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                             struct vkb_error *error)
-{
-    const double distance = pass->params.kawase.offset;
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    filter.kernels = 3;
-    filter.gain = 1.0 / 12.0;
-    filter.x.count = filter.y.count = 0;
-    add_taps(&filter.x, 0, distance, 1.0, 0.0);
-    add_taps(&filter.y, 0, 0.0, 0.0, 1.0);
-    add_taps(&filter.x, 1, 0.0, 0.0, 1.0);
-    add_taps(&filter.y, 1, distance, 1.0, 0.0);
-    add_taps(&filter.x, 2, 0.5 * distance, 1.0, 0.0);
-    add_taps(&filter.y, 2, 0.5 * distance, 2.0, 0.0);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }

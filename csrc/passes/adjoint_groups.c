@@ -82,44 +82,6 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
     }
 }
 
-// The parameters that the shader reads, from the block of the forward pass.
-static void take_params(const struct vkb_pass_row *pass, struct vkb_prefilter_params *params)
-{
-    if (pass->block == VKB_BLOCK_prefilter) {
-        *params = pass->params.prefilter;
-        return;
-    }
-    memset(params, 0, sizeof *params);
-    params->target_width = pass->params.pyramid.target_width;
-    params->target_height = pass->params.pyramid.target_height;
-    const bool unit = pass->shader != &vkb_shader_pyramid_down_frag;
-    params->step_x = unit ? 1.0f : pass->params.pyramid.step_x;
-    params->step_y = unit ? 1.0f : pass->params.pyramid.step_y;
-}
-
-// The groups by the shader of the forward pass.
-static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
-{
-    static const struct {
-        const struct vkb_shader *shader;
-        enum vkb_mode groups;
-    } known[] = {
-        {&vkb_shader_box_down_frag, GROUPS_BOX},
-        {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
-        {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
-        {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
-        {&vkb_shader_kino_prefilter_frag, GROUPS_KINO},
-        {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
-        {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
-        {&vkb_shader_blender_prefilter_frag, GROUPS_HIGHLIGHTS},
-    };
-
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i)
-        if (known[i].shader == pass->shader)
-            return known[i].groups;
-    return (enum vkb_mode)pass->constants.groups;
-}
-
 static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
 {
     switch (groups) {
@@ -186,8 +148,21 @@ static bool bring_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *p
 bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                           struct vkb_error *error)
 {
-    const enum vkb_mode groups = groups_of(pass);
+    const enum vkb_mode groups = (enum vkb_mode)pass->constants.groups;
     const int count = count_of(groups, pass);
+    struct vkb_filter filter;
+
+    if (groups == GROUPS_HDRP_BLUR)
+        return vkb_transpose_hdrp_blur(adjoint, pass, error);
+    if (groups == GROUPS_GODOT_BLUR)
+        return vkb_transpose_godot_blur(adjoint, pass, error);
+    // Without threshold and mask Filament's reduction is a filter.
+    if (groups == GROUPS_FILAMENT && !pass->constants.thresholded && !pass->constants.masked) {
+        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        vkb_filter_three(&filter, 1.0, 0.25);
+        return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0],
+                                error);
+    }
     const uint32_t height = adjoint->graph->images[pass->targets[0]].height;
     const bool stacked =
         count > 1 && groups != GROUPS_BLENDER && (uint64_t)count * height <= adjoint->max_side;
@@ -196,28 +171,14 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_groups_frag, reads, 3);
 
     row.constants = pass->constants;
-    row.constants.groups = groups;
     row.constants.levels = 0;
     row.constants.radix_1 = 1;
     row.block = VKB_BLOCK_prefilter;
-    take_params(pass, &row.params.prefilter);
+    row.params.prefilter = pass->params.prefilter;
     // Its groups are texels then. The shader reads the mask in the same way.
     if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, reads[0], pass->targets[0])
         && vkb_same_size(adjoint->graph, reads[1], pass->targets[0]))
         row.constants.sampling = SAMPLING_TEXEL;
     return (stacked ? bring_stacked : bring_each)(adjoint, pass, &row, count, error)
         && vkb_bring_mask(adjoint, pass, &row, error);
-}
-
-// Without threshold and mask the reduction is a filter.
-bool vkb_transpose_filament_reduction(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                      struct vkb_error *error)
-{
-    struct vkb_filter filter;
-
-    if (pass->constants.thresholded || pass->constants.masked)
-        return vkb_transpose_groups(adjoint, pass, error);
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    vkb_filter_three(&filter, 1.0, 0.25);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }

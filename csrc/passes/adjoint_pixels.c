@@ -62,8 +62,9 @@ static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 static bool is_clamped(const struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].shader == &vkb_shader_pygfx_down_frag
-            || graph->passes[i].shader == &vkb_shader_urp_prefilter_frag)
+        if (graph->passes[i].constants.groups == GROUPS_PYGFX
+            || graph->passes[i].constants.groups == GROUPS_PYGFX_KARIS
+            || graph->passes[i].constants.groups == GROUPS_URP)
             return true;
     return false;
 }

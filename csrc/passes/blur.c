@@ -71,7 +71,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
 
 bool vkb_is_line_blur(const struct vkb_pass_row *pass)
 {
-    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader == &vkb_shader_blur_frag
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
         && pass->constants.direction != DIRECTION_BOTH;
 }
 

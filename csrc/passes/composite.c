@@ -87,5 +87,5 @@ bool vkb_add_composite(const struct vkb_settings *settings,
 
 bool vkb_is_composite(const struct vkb_pass_row *pass)
 {
-    return pass->shader == &vkb_shader_composite_frag && pass->constants.composite != COMPOSITE_OFF;
+    return vkb_computes(pass, VKB_BLOCK_composite) && pass->constants.composite != COMPOSITE_OFF;
 }

@@ -1,6 +1,7 @@
 #include "passes/levels.h"
 
 #include "passes/blur.h"
+#include "passes/filter.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -100,20 +101,10 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
     return row;
 }
 
-struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
-                                    const struct vkb_shader *fragment, uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
-
-    row.block = VKB_BLOCK_pyramid;
-    VKB_SET_TARGET(&row, pyramid, &levels->graph->images[to]);
-    return row;
-}
-
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
-    row->params.pyramid.step_x = (float)step_x;
-    row->params.pyramid.step_y = (float)step_y;
+    row->params.prefilter.step_x = (float)step_x;
+    row->params.prefilter.step_y = (float)step_y;
     row->reach = (float)(VKB_FILTER_REACH + 2.0 * fabs(step_y));
 }
 
@@ -129,42 +120,20 @@ static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t sma
         && graph->images[large].height == 2 * graph->images[small].height;
 }
 
-struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                 uint32_t from, uint32_t to)
+bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
+                       uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_pyramid_down_frag, from, to);
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
 
-    if (!firefly_filter && is_twice(levels->graph, from, to))
+    vkb_filter_add(&row, 0, (struct vkb_side_taps){2.0 * step_x, 0.25, 0.5},
+                   (struct vkb_side_taps){2.0 * step_y, 0.25, 0.5});
+    vkb_filter_add(&row, 1, (struct vkb_side_taps){step_x, 0.5, 0.0},
+                   (struct vkb_side_taps){step_y, 0.5, 0.0});
+    if (is_twice(levels->graph, from, to) && step_x == 1.0 && step_y == 1.0) {
         row.constants.sampling = SAMPLING_TEXEL;
-    row.constants.firefly_filter = firefly_filter;
-    vkb_set_steps(&row, 1.0, 1.0);
-    return row;
-}
-
-struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                        uint32_t from, uint32_t to)
-{
-    const struct vkb_values *values = &levels->settings->values;
-    struct vkb_pass_row row = vkb_down_row(levels, firefly_filter, from, to);
-
-    if (values->scale_x != 1.0 || values->scale_y != 1.0) {
-        // With these sizes the taps are not in the middle between texels.
-        row.constants.sampling = SAMPLING_FETCH;
-        vkb_set_steps(&row, values->scale_x, values->scale_y);
+        row.constants.exact = EXACT_HALF;
     }
-    return row;
-}
-
-bool vkb_halves(const struct vkb_pass_row *pass)
-{
-    return pass->shader == &vkb_shader_pyramid_down_frag
-        && pass->constants.sampling == SAMPLING_TEXEL;
-}
-
-bool vkb_doubles(const struct vkb_pass_row *pass)
-{
-    return pass->shader == &vkb_shader_pyramid_up_frag
-        && pass->constants.sampling == SAMPLING_TEXEL;
+    return vkb_filter_end(levels, &row, error);
 }
 
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
@@ -182,6 +151,16 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
     }
     VKB_SET_TARGET(&row, prefilter, &levels->graph->images[to]);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
+    return row;
+}
+
+struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
+                                   uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_prefilter_frag, from, to);
+
+    row.constants.groups = groups;
+    vkb_set_steps(&row, 1.0, 1.0);
     return row;
 }
 
@@ -242,39 +221,48 @@ static void find_up_taps(double radius, float taps[4])
         taps[i] = (float)sums[i];
 }
 
+// How UPSAMPLE_TENT and the others sample a smaller level, with the distances of a tent's taps in
+// its texels.
+static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double radius_x,
+                       double radius_y)
+{
+    struct vkb_side_taps x = {0.0, 0.0, 1.0}, y = x;
+
+    row->constants.upsample = kernel;
+    if (kernel == UPSAMPLE_TENT) {
+        row->constants.upsample = UPSAMPLE_LINEAR;
+        x = (struct vkb_side_taps){radius_x, 0.25, 0.5};
+        y = (struct vkb_side_taps){radius_y, 0.25, 0.5};
+    } else if (kernel == UPSAMPLE_INSET_CUBIC) {
+        x = y = (struct vkb_side_taps){1.0, 1.0, 0.0};
+    }
+    vkb_filter_add(row, 0, x, y);
+}
+
 // Upsamples the smaller level `from` to `to`, and adds the level `own`, if there is one.
 static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
                    double coarse_share, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_pyramid_row(levels, &vkb_shader_pyramid_up_frag, from, to);
-    struct vkb_pyramid_params *params = &row.params.pyramid;
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, coarse_share);
     const struct vkb_image_row *smaller = &levels->graph->images[from];
     const struct vkb_image_row *larger = &levels->graph->images[to];
-
-    row.constants.add_own = own != VKB_NO_IMAGE;
-    row.constants.upsample = kernel;
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = own != VKB_NO_IMAGE ? own : from;
-    row.read_count = 2;
     const double unit = combination->width_step ? smaller->width : 1;
-    if (combination->target_step)
-        vkb_set_steps(&row, (double)smaller->width / larger->width,
-                      (double)smaller->height / larger->height);
-    else
-        vkb_set_steps(&row, combination->radius_x * unit, combination->radius_y * unit);
-    if (is_twice(levels->graph, to, from)
-        && (kernel == UPSAMPLE_LINEAR
-            || (kernel == UPSAMPLE_TENT && params->step_x == params->step_y
-                && fabsf(params->step_x) <= 1.0f))) {
-        row.constants.sampling = SAMPLING_TEXEL;
-        find_up_taps(kernel == UPSAMPLE_TENT ? params->step_x : 0.0, params->taps[0]);
+    double x = combination->radius_x * unit, y = combination->radius_y * unit;
+
+    if (combination->target_step) {
+        x = (double)smaller->width / larger->width;
+        y = (double)smaller->height / larger->height;
     }
-    if (kernel == UPSAMPLE_TENT && params->step_x == 1.0f && params->step_y == 1.0f)
-        row.constants.upsample = UPSAMPLE_UNIT_TENT;
-    params->own = (float)own_share;
-    params->coarse = (float)coarse_share;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_filter_add_own(&row, own, own_share);
+    set_kernel(&row, kernel, x, y);
+    if (is_twice(levels->graph, to, from)
+        && (kernel == UPSAMPLE_LINEAR || (kernel == UPSAMPLE_TENT && x == y && x <= 1.0))) {
+        row.constants.sampling = SAMPLING_TEXEL;
+        row.constants.exact = EXACT_DOUBLE;
+        find_up_taps(kernel == UPSAMPLE_TENT ? x : 0.0, row.params.filter.taps[0]);
+    }
+    return vkb_filter_end(levels, &row, error);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
@@ -335,6 +323,8 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
 
     row.constants.upsample = kernel;
     row.constants.levels = (int32_t)levels->count;
+    row.constants.taps = row.constants.kernels = 1;
+    row.constants.window = kernel == UPSAMPLE_CUBIC ? 4 : 2;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.read_count = GATHERED_LEVELS;
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)

@@ -51,17 +51,15 @@ bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t
                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
 // The row of a pass from one image to another that filters its taps in the shader: without a block
-// yet; with the pyramid's block; with the prefilter's block.
+// yet; with the prefilter's block.
 struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
                                      const struct vkb_shader *fragment, uint32_t from, uint32_t to);
-struct vkb_pass_row vkb_pyramid_row(const struct vkb_levels *levels,
-                                    const struct vkb_shader *fragment, uint32_t from, uint32_t to);
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
                                       const struct vkb_shader *fragment, uint32_t from,
                                       uint32_t to);
 
-// Sets the distances of the taps of a row with the pyramid's block, in texels of what it reads. The
-// outer ones are two steps away.
+// Sets the distances of the taps of a row with the prefilter's block, in texels of what it reads.
+// The outer ones are two steps away.
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
 
 // For a blur of nine taps, a pixel of the target apart, whose source may be twice as large. Borders
@@ -71,19 +69,15 @@ void vkb_reach_nine(struct vkb_pass_row *row);
 // Makes a prefilter multiply its result by the mask of the source, if there is one.
 void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
 
-// The row of a downsampling with the pyramid's 13 taps, with or without a firefly filter.
-struct vkb_pass_row vkb_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                 uint32_t from, uint32_t to);
+// The row of a pass that makes of its taps what GROUPS_* says: of a downsampling that weights
+// groups of them by brightness, or of the first pass of a published method. The steps are one
+// texel.
+struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
+                                   uint32_t from, uint32_t to);
 
-// The same with the settings' scale of the taps' distances.
-struct vkb_pass_row vkb_scaled_down_row(const struct vkb_levels *levels, bool firefly_filter,
-                                        uint32_t from, uint32_t to);
-
-// Whether a row is such a downsampling from exactly twice the size, or an upsampling to exactly
-// twice the size. Then its taps are on integer texels. (Not with a firefly filter, which weights
-// groups of taps.)
-bool vkb_halves(const struct vkb_pass_row *pass);
-bool vkb_doubles(const struct vkb_pass_row *pass);
+// A pass that downsamples with the pyramid's 13 taps, whose inner ones are at these distances.
+bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
+                       uint32_t to, struct vkb_error *error);
 
 // The kernel of a separable blur while downsampling.
 struct vkb_kernel {

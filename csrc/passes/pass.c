@@ -29,6 +29,12 @@ void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask)
     row->read_count = 2;
 }
 
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
+{
+    while (row->read_count > read_count)
+        row->reads[--row->read_count] = 0;
+}
+
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 {
     const struct vkb_image_row *first = &graph->images[a], *second = &graph->images[b];

@@ -67,4 +67,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader
 // Makes a pass that reads one image read the mask after it; VKB_NO_IMAGE: no mask.
 void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 
+// Removes all images after the first `read_count` from the images that the pass reads.
+void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
+
 #endif

@@ -60,6 +60,6 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
 
 bool vkb_is_threshold(const struct vkb_pass_row *pass)
 {
-    return pass->shader == &vkb_shader_threshold_frag && pass->constants.sampling == SAMPLING_TEXEL
+    return vkb_computes(pass, VKB_BLOCK_threshold) && pass->constants.sampling == SAMPLING_TEXEL
         && !pass->constants.masked && !pass->constants.alpha;
 }

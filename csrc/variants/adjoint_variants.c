@@ -204,7 +204,7 @@ static void drop_read(struct vkb_pass_row *row, uint32_t number)
 
 bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
-    return pass->shader == &vkb_shader_adjoint_composite_frag && !pass->constants.masked
+    return vkb_transposes(pass, VKB_BLOCK_composite) && !pass->constants.masked
         && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.from_image
         && pass->reads[0] == pass->reads[1]
         && (pass->constants.composite == COMPOSITE_ADD
@@ -249,9 +249,9 @@ static void read_words_of_composite(const struct vkb_variant_choice *choice,
 bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
-    const bool blend = pass->shader == &vkb_shader_adjoint_composite_frag;
-    const bool threshold = pass->shader == &vkb_shader_adjoint_threshold_frag;
+    const bool filter = pass->block == VKB_BLOCK_adjoint_filter;
+    const bool blend = vkb_transposes(pass, VKB_BLOCK_composite);
+    const bool threshold = vkb_transposes(pass, VKB_BLOCK_threshold);
     struct vkb_pass_row row;
 
     *fits = (filter || blend || threshold) && vkb_are_floats(choice, pass)
@@ -289,7 +289,7 @@ bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
 {
     struct vkb_pass_row row;
 
-    *fits = pass->shader == &vkb_shader_adjoint_groups_frag && pass->constants.radix_1 > 1;
+    *fits = vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.radix_1 > 1;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -307,7 +307,7 @@ bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
 bool vkb_add_adjoint_levels(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
-    const bool filter = pass->shader == &vkb_shader_adjoint_filter_frag;
+    const bool filter = pass->block == VKB_BLOCK_adjoint_filter;
     const int32_t exact = filter ? pass->params.adjoint_filter.exact : 0;
     struct vkb_pass_row row;
 
@@ -339,7 +339,7 @@ bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
 {
     struct vkb_pass_row row;
 
-    *fits = pass->shader == &vkb_shader_adjoint_filter_frag;
+    *fits = pass->block == VKB_BLOCK_adjoint_filter;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);

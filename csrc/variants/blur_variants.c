@@ -110,6 +110,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     struct vkb_pass_row line = line_row(choice, pass, &kernel, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
+    row.constants.bloom = BLOOM_LINES;
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
@@ -239,9 +240,8 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
 
     if (vkb_is_composite(pass))
         enlarging = vkb_writer_of(choice->graph, pass->reads[1]);
-    *fits = enlarging
-         && (enlarging->shader == &vkb_shader_enlarge_frag
-             || enlarging->shader == &vkb_shader_enlarge_dispatch);
+    *fits = enlarging && enlarging->block == VKB_BLOCK_threshold
+         && enlarging->constants.bloom == BLOOM_LINES;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -289,14 +289,15 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The pass that writes the cotangents of an image, if it has this shader and nothing else brings
+// The pass that writes the cotangents of an image, if it has this block and nothing else brings
 // any; else NULL.
 static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, uint32_t image,
-                                               const struct vkb_shader *shader)
+                                               enum vkb_block block)
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
-    return pass && pass->shader == shader && !pass->constants.add_own && !pass->constants.masked
+    return pass && vkb_transposes(pass, block) && !pass->constants.add_own
+                && !pass->constants.masked
              ? pass
              : NULL;
 }
@@ -313,7 +314,7 @@ static bool find_any_chain(const struct vkb_graph *graph, int radius, struct cha
 static bool is_differentiated(const struct vkb_graph *graph, uint32_t bloom)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].shader == &vkb_shader_adjoint_composite_frag
+        if (vkb_transposes(&graph->passes[i], VKB_BLOCK_composite)
             && vkb_pass_reads(&graph->passes[i], bloom))
             return true;
     return false;
@@ -348,12 +349,11 @@ static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_p
                                int radius, struct chain *chain,
                                const struct vkb_pass_row **by_bloom)
 {
-    const struct vkb_shader *filter = &vkb_shader_adjoint_filter_frag;
-    const struct vkb_shader *composite = &vkb_shader_adjoint_composite_frag;
-    const bool thresholds = pass->shader == &vkb_shader_adjoint_threshold_frag
+    const enum vkb_block filter = VKB_BLOCK_adjoint_filter, composite = VKB_BLOCK_composite;
+    const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
                          && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
-    if (!(thresholds || (pass->shader == filter && pass->constants.from_image))
+    if (!(thresholds || (pass->block == filter && pass->constants.from_image))
         || !pass->constants.add_own || !find_any_chain(graph, radius, chain))
         return false;
     const struct vkb_pass_row *first =

@@ -1,9 +1,8 @@
 // Variants of downsampling to exactly half the size and of upsampling to exactly twice the size.
 #include "variants/variant.h"
 
-#include "passes/levels.h"
+#include "passes/filter.h"
 
-#include <math.h>
 #include <string.h>
 
 static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
@@ -11,8 +10,6 @@ static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_
 static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(halve_taps);
 static const struct vkb_shader *const reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
-static const struct vkb_shader *const grid_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(halve_grid);
 static const struct vkb_shader *const shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
 static const struct vkb_shader *const godot_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(godot_rows);
@@ -69,52 +66,42 @@ static bool loads_to_double(const struct vkb_variant_choice *choice,
              : choice->device->limits.maxComputeWorkGroupInvocations >= invocations;
 }
 
-// If a threshold pass writes the larger level, adds a fused pass that reads the image itself. It
-// may replace `halving`, the variant of `pass`.
-static bool add_halved_image(const struct vkb_variant_choice *choice,
-                             const struct vkb_pass_row *pass, const struct vkb_pass_row *halving,
-                             struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    struct vkb_pass_row row;
-
-    if (!threshold)
-        return true;
-    memcpy(&row, halving, sizeof row);
-    row.reads[0] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    row.constants.format =
-        vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
-    VKB_TAKE_THRESHOLD(&row, pyramid, threshold);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
     const struct vkb_graph *plain = &choice->plain;
     struct vkb_pass_row row;
 
-    *fits = vkb_halves(pass) && loads(choice, pass);
+    *fits = vkb_filter_exact(pass) == EXACT_HALF && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
+    vkb_drop_reads(&row, 1);
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && add_halved_image(choice, pass, &row, error);
+        && vkb_add_thresholded(choice, pass, &row, error);
+}
+
+// What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
+static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
+{
+    return vkb_computes(pass, VKB_BLOCK_prefilter) ? (enum vkb_mode)pass->constants.groups : 0;
+}
+
+static bool has_unit_steps(const struct vkb_pass_row *pass)
+{
+    return pass->params.prefilter.step_x == 1.0f && pass->params.prefilter.step_y == 1.0f;
 }
 
 // Whether the pass weights the taps of a downsampling, which are one and two texels apart.
 static bool weights_taps(const struct vkb_pass_row *pass)
 {
-    if (pass->shader == &vkb_shader_pyramid_down_frag)
-        return pass->params.pyramid.step_x == 1.0f && pass->params.pyramid.step_y == 1.0f;
-    return !pass->constants.masked
-        && (pass->shader == &vkb_shader_pygfx_down_frag
-            || pass->shader == &vkb_shader_blender_down_frag
-            || pass->shader == &vkb_shader_box_down_frag);
+    const enum vkb_mode groups = groups_of(pass);
+
+    return (groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX || groups == GROUPS_PYGFX_KARIS
+            || groups == GROUPS_BLENDER || groups == GROUPS_BOX)
+        && has_unit_steps(pass) && !pass->constants.masked;
 }
 
 // Whether the target has exactly half of the size of the image that the pass reads.
@@ -146,12 +133,12 @@ bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vk
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
 
-    *fits = pass->shader == &vkb_shader_godot_blur_frag
+    *fits = groups_of(pass) == GROUPS_GODOT_BLUR
          && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
          && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
          && vkb_fits_words(choice, pass);
     return !*fits
-        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, FILTER_ROWS, error);
+        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, GATHER_ROWS, error);
 }
 
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -165,26 +152,6 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
                      HALVE_WORDS_ROWS, error);
 }
 
-// What reduce.comp makes of its taps, as GROUPS_*; 0: it has no such taps.
-static enum vkb_mode reduced_groups(const struct vkb_pass_row *pass)
-{
-    static const struct {
-        const struct vkb_shader *shader;
-        enum vkb_mode groups;
-    } rows[] = {
-        {&vkb_shader_filament_prefilter_frag, GROUPS_FILAMENT},
-        {&vkb_shader_hdrp_prefilter_frag, GROUPS_HDRP},
-        {&vkb_shader_urp_prefilter_frag, GROUPS_URP},
-        {&vkb_shader_unreal_prefilter_frag, GROUPS_UNREAL},
-        {&vkb_shader_bevy_prefilter_frag, GROUPS_BEVY},
-    };
-
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
-        if (pass->shader == rows[i].shader)
-            return rows[i].groups;
-    return 0;
-}
-
 // Adds the pass as one of words, and a fused pass that reads the image itself.
 static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                           const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
@@ -193,7 +160,6 @@ static bool add_prefilter(const struct vkb_variant_choice *choice, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    row.constants.groups = reduced_groups(pass);
     row.constants.sampling = 0;
     vkb_drop_reads(&row, 1);
     vkb_make_words(&row, shader, columns, rows);
@@ -205,11 +171,12 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
                      bool *fits, struct vkb_error *error)
 {
     const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
-    const enum vkb_mode groups = reduced_groups(pass);
+    const enum vkb_mode groups = groups_of(pass);
 
-    *fits = groups && groups != GROUPS_BEVY && !pass->constants.masked
-         && is_half(&choice->plain, pass) && pass->params.prefilter.row_offset == 0
-         && loads(choice, pass);
+    *fits = (groups == GROUPS_FILAMENT || groups == GROUPS_HDRP || groups == GROUPS_URP
+             || groups == GROUPS_UNREAL)
+         && !pass->constants.masked && is_half(&choice->plain, pass)
+         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
     return !*fits
         || add_prefilter(choice, pass, reduce_words[format], REDUCE_COLUMNS, HALVE_WORDS_ROWS,
                          error);
@@ -222,9 +189,8 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const uint32_t height =
         params->source_height ? (uint32_t)params->source_height : source->height;
-    const enum vkb_mode groups = reduced_groups(pass);
-    const bool taps = groups == GROUPS_FILAMENT
-                   || (groups == GROUPS_BEVY && params->step_x == 1.0f && params->step_y == 1.0f);
+    const enum vkb_mode groups = groups_of(pass);
+    const bool taps = groups == GROUPS_FILAMENT || (groups == GROUPS_BEVY && has_unit_steps(pass));
 
     *fits = taps && !pass->constants.masked && loads(choice, pass);
     if (!*fits)
@@ -243,63 +209,13 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const uint32_t word = 4 / vkb_formats[format].channel_size;
 
-    *fits = pass->shader == &vkb_shader_hdrp_blur_frag
+    *fits = groups_of(pass) == GROUPS_HDRP_BLUR
          && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-         && pass->params.pyramid.row_offset == 0 && loads(choice, pass);
+         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
     if (!*fits)
         return true;
-    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, FILTER_ROWS, error)
+    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, GATHER_ROWS, error)
                 : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
-}
-
-// Turns a pass with bilinear taps in three rows and columns into one of halve_grid.comp. False: it
-// has none, or they are at other distances.
-static bool read_grid(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
-{
-    struct vkb_kawase_params *params = &row->params.kawase;
-
-    memcpy(row, pass, sizeof *row);
-    row->block = VKB_BLOCK_kawase;
-    if (pass->shader == &vkb_shader_filament_down_frag) {
-        memset(&row->params, 0, sizeof row->params);
-        // The distance of the taps is half of the offset.
-        params->offset = 2.0f * (float)FILAMENT_OFFSET;
-        params->limit = pass->params.pyramid.limit;
-        params->row_offset = pass->params.pyramid.row_offset;
-    } else if (pass->shader != &vkb_shader_kawase_down_frag) {
-        return false;
-    }
-    const float distance = 0.5f * params->offset;
-    const bool next = floorf(0.5f + distance) == 2.0f && floorf(0.5f - distance) == -2.0f;
-    row->constants.groups =
-        pass->shader == &vkb_shader_filament_down_frag ? GROUPS_FILAMENT : GROUPS_KAWASE;
-    row->constants.sampling = 0;
-    row->constants.next_pixel = next;
-    return params->row_offset == 0 && (next || distance <= 0.5f);
-}
-
-bool vkb_add_halved_grid(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                         bool *fits, struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold;
-    struct vkb_pass_row row;
-
-    *fits = read_grid(pass, &row) && is_half(&choice->plain, pass) && loads(choice, pass);
-    if (!*fits)
-        return true;
-    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
-    vkb_make_words(&row, grid_words[format], GRID_COLUMNS, HALVE_WORDS_ROWS);
-    if (!vkb_graph_add_pass(choice->graph, &row, error))
-        return false;
-    threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    if (!threshold)
-        return true;
-    row.reads[0] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    row.constants.format = vkb_stored_as(choice->device, format);
-    VKB_TAKE_THRESHOLD(&row, kawase, threshold);
-    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -309,7 +225,7 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_format format = plain->images[pass->reads[0]].format;
     struct vkb_pass_row row;
 
-    *fits = vkb_doubles(pass) && loads_to_double(choice, pass);
+    *fits = vkb_filter_exact(pass) == EXACT_DOUBLE && loads_to_double(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -329,14 +245,14 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     const struct vkb_graph *plain = &choice->plain;
     const struct vkb_pass_row *up = NULL;
     struct vkb_pass_row row;
-    struct vkb_double_final_params *params = &row.params.double_final;
+    struct vkb_filter_final_params *params = &row.params.filter_final;
     const enum vkb_format format = plain->images[pass->targets[0]].format;
 
     if (vkb_is_composite(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
     // The shader is compiled for one format. The levels of a published method may have their own.
-    *fits = up && vkb_doubles(up) && !up->constants.add_own && !pass->constants.masked
-         && plain->images[pass->reads[0]].format == format
+    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && !up->constants.add_own
+         && !pass->constants.masked && plain->images[pass->reads[0]].format == format
          && plain->images[pass->reads[1]].format == format
          && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
          && loads_to_double(choice, pass);
@@ -350,11 +266,11 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
     vkb_drop_reads(&row, 2);
-    row.block = VKB_BLOCK_double_final;
-    params->coarse = up->params.pyramid.coarse;
-    VKB_TAKE_COMPOSITE(&row, double_final, pass);
+    row.block = VKB_BLOCK_filter_final;
+    params->coarse = up->params.filter.coarse;
+    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
     row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
-    memcpy(params->taps, up->params.pyramid.taps, sizeof params->taps);
+    memcpy(params->taps, up->params.filter.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

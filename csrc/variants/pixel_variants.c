@@ -11,7 +11,6 @@ static const struct vkb_shader *const kino_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(kino_bright);
 static const struct vkb_shader *const highlights_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(highlights);
-static const struct vkb_shader *const scale_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(scale);
 
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -34,14 +33,13 @@ static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass
 static const struct vkb_shader *const *unfiltered_shaders(const struct vkb_graph *graph,
                                                           const struct vkb_pass_row *pass)
 {
-    if (pass->constants.masked || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
+    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || pass->constants.masked
+        || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
         || !vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
         return NULL;
-    return pass->shader == &vkb_shader_kino_prefilter_frag    ? kino_shaders
-         : pass->shader == &vkb_shader_blender_prefilter_frag ? highlights_shaders
-         : pass->shader == &vkb_shader_pyramid_up_frag && vkb_only_scales(graph, pass)
-             ? scale_shaders
-             : NULL;
+    return pass->constants.groups == GROUPS_KINO       ? kino_shaders
+         : pass->constants.groups == GROUPS_HIGHLIGHTS ? highlights_shaders
+                                                       : NULL;
 }
 
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first
@@ -77,8 +75,8 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
 // and infinity from each texel, which filters of the hardware would not.
 static bool reads_images(const struct vkb_pass_row *pass)
 {
-    return pass->shader == &vkb_shader_bevy_prefilter_frag && !pass->constants.masked
-        && pass->constants.sampling != SAMPLING_FILTER;
+    return vkb_computes(pass, VKB_BLOCK_prefilter) && pass->constants.groups == GROUPS_BEVY
+        && !pass->constants.masked && pass->constants.sampling != SAMPLING_FILTER;
 }
 
 bool vkb_add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

@@ -25,12 +25,6 @@ bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
     return writers == 1;
 }
 
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
-{
-    while (row->read_count > read_count)
-        row->reads[--row->read_count] = 0;
-}
-
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height)
 {
@@ -97,8 +91,22 @@ bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vk
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+bool vkb_add_thresholded(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         const struct vkb_pass_row *filtering, struct vkb_error *error)
 {
-    return pass->constants.upsample == UPSAMPLE_LINEAR && !pass->constants.add_own
-        && vkb_same_size(graph, pass->reads[0], pass->targets[0]);
+    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    struct vkb_pass_row row;
+
+    if (!threshold)
+        return true;
+    memcpy(&row, filtering, sizeof row);
+    for (uint32_t i = 0; i < row.read_count; ++i)
+        if (row.reads[i] == pass->reads[0])
+            row.reads[i] = threshold->reads[0];
+    row.fused = true;
+    row.constants.from_image = true;
+    row.constants.format =
+        vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
+    VKB_TAKE_THRESHOLD(&row, filter, threshold);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -30,18 +30,14 @@ vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles, vkb_add_bloom_til
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // The first of these with taps that are weighted by brightness.
 vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
-// The same with bilinear taps in three rows and columns.
-vkb_variant_add vkb_add_halved_grid;
 // First passes of published methods, with taps among 4 x 4 texels of an image of twice the size.
 vkb_variant_add vkb_add_reduced;
 // The same of an image of any larger size.
 vkb_variant_add vkb_add_shrunk;
 // HDRP's blurs, of images of the same size and of twice the size along the line.
 vkb_variant_add vkb_add_hdrp_line;
-// Upsampling by any factor in strips, also fused with the composite; as two passes, along rows and
-// along columns; the sum of several levels that are upsampled so.
-vkb_variant_add vkb_add_upsampled_strips, vkb_add_upsampled_final;
-vkb_variant_add vkb_add_upsampled, vkb_add_gathered, vkb_add_kawase_up;
+// Filters in strips, also fused with the composite; the sum of several levels that are filtered.
+vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images as words.
@@ -76,17 +72,16 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         const struct vkb_pass_row *reducing, struct vkb_error *error);
 
+// If a threshold pass writes what the filter `pass` reads, adds a fused pass that reads the image
+// itself. It may replace `filtering`, the variant of `pass`.
+bool vkb_add_thresholded(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         const struct vkb_pass_row *filtering, struct vkb_error *error);
+
 // Whether a pass brings a factor of the cotangents of its composite to the bloom.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
 
 // Whether the images that a pass reads are words of single floats.
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
-
-// Whether an upsampling by a linear filter reads an image of the target's size.
-bool vkb_only_scales(const struct vkb_graph *graph, const struct vkb_pass_row *pass);
-
-// Removes all images after the first `read_count` from the images that the pass reads.
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,

@@ -31,16 +31,14 @@ float brightest_channel(vec4 value)
     return max(max(value.r, max(value.g, value.b)), 0.0);
 }
 
-// The pyramid's: with the firefly filter, brighter groups weigh less (Karis 2013).
+// The pyramid's firefly filter: brighter groups weigh less (Karis 2013).
 vec4 pyramid_groups(Taps taps)
 {
     vec4 means[5] = group_means(taps);
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     [[unroll]] for (int group = 0; group < 5; ++group) {
-        float share = GROUP_SHARES[group];
-        if (FIREFLY_FILTER != 0)
-            share /= 1.0 + group_luminance(means[group]);
+        float share = GROUP_SHARES[group] / (1.0 + group_luminance(means[group]));
         sum += share * means[group];
         shares += share;
     }
@@ -104,14 +102,14 @@ vec4 blender_groups(Taps taps)
     return usual(0.5 * inner + 0.125 * outer);
 }
 
-// A box of 4 x 4 texels as four taps. The firefly filter weights them by brightness and renormalizes
+// A box of 4 x 4 texels as four taps, weighted by brightness and renormalized
 // (Karis 2013; keijiro/KinoBloom @ 0a04c43fa47d, Bloom.cginc).
 vec4 box_of(vec4 taps[4])
 {
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     [[unroll]] for (int corner = 0; corner < 4; ++corner) {
-        float share = FIREFLY_FILTER != 0 ? 1.0 / (1.0 + brightest_channel(taps[corner])) : 1.0;
+        float share = 1.0 / (1.0 + brightest_channel(taps[corner]));
         sum += share * taps[corner];
         shares += share;
     }

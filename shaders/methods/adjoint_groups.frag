@@ -20,78 +20,13 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 #define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
-#include "lib/kino.glsl"
 #include "lib/adjoint.glsl"
-#include "lib/thirteen_taps.glsl"
-#include "lib/highlights.glsl"
-#include "lib/mean_of_texels.glsl"
+#include "lib/prefilter_taps.glsl"
 
 // The group whose cotangents are wanted, what the groups are, and the cotangents of the pixel.
 int own_group;
 Place place;
 vec4 found[5], brought;
-
-// Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
-int group_count()
-{
-    if (GROUPS == GROUPS_BOX)
-        return 4;
-    if (GROUPS == GROUPS_FILAMENT)
-        return 4;
-    if (GROUPS == GROUPS_URP)
-        return 1;
-    if (GROUPS == GROUPS_UNREAL)
-        return 1;
-    if (GROUPS == GROUPS_HIGHLIGHTS)
-        return 1;
-    if (GROUPS == GROUPS_KINO)
-        return ANTI_FLICKER != 0 ? 5 : 1;
-    return 5;
-}
-
-bool are_of_thirteen()
-{
-    if (GROUPS == GROUPS_PYGFX)
-        return true;
-    if (GROUPS == GROUPS_PYGFX_KARIS)
-        return true;
-    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
-}
-
-// The place of a tap that is a group of its own, in texels.
-vec2 place_of(int group, FilamentTaps pairs)
-{
-    if (GROUPS == GROUPS_BOX)
-        return 2.0 * vec2(group & 1, group >> 1) - 1.0;
-    if (GROUPS == GROUPS_FILAMENT)
-        return mix(pairs.left, pairs.right, bvec2((group & 1) != 0, (group & 2) != 0));
-    if (GROUPS == GROUPS_HDRP)
-        return HDRP_OFFSETS[group];
-    const vec2 cross[5] = vec2[](vec2(0, 0), vec2(-1, 0), vec2(1, 0), vec2(0, -1), vec2(0, 1));
-    return cross[group];
-}
-
-Taps taps_of(Place place)
-{
-    return thirteen_taps(place, vec2(params.step_x, params.step_y));
-}
-
-vec4[5] means(Place place)
-{
-    if (are_of_thirteen())
-        return group_means(taps_of(place));
-    FilamentTaps pairs = filament_taps(place.part);
-    vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    // Its groups share their taps.
-    if (GROUPS == GROUPS_BLENDER)
-        return found;
-    for (int group = 0; group < group_count(); ++group)
-        found[group] = sample_at(source, place, place_of(group, pairs), SAMPLING);
-    // Only Blender's highlights are of blocks of texels.
-    if (RADIUS > 1)
-        found[0] = mean_of_texels(source, PIXEL, params.target_height, RADIUS);
-    return found;
-}
 
 // A group's share without the weight by brightness.
 float share_of(int group, Place place)
@@ -291,26 +226,6 @@ vec4 back_blender(Taps taps, vec4 brought)
                    * (weight * brought + slope * dot(brought, own - sum / weights)) / weights;
     }
     return usual(total);
-}
-
-vec4 prefiltered(vec4 found[5], Place place)
-{
-    vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
-    if (GROUPS == GROUPS_BEVY)
-        return bevy_prefiltered(taps_of(place));
-    if (GROUPS == GROUPS_PYGFX)
-        return pygfx_groups(taps_of(place));
-    if (GROUPS == GROUPS_PYGFX_KARIS)
-        return pygfx_groups(taps_of(place));
-    if (GROUPS == GROUPS_KINO)
-        return kino_bright(found[0], found[1], found[2], found[3], found[4]);
-    if (GROUPS == GROUPS_FILAMENT)
-        return filament_prefiltered(four, filament_taps(place.part).shares);
-    if (GROUPS == GROUPS_HDRP)
-        return hdrp_prefiltered(found);
-    if (GROUPS == GROUPS_HIGHLIGHTS)
-        return highlights(found[0]);
-    return GROUPS == GROUPS_URP ? urp_prefiltered(found[0]) : unreal_prefiltered(found[0]);
 }
 
 // The cotangents of the group, from those of what the method makes of all groups.

@@ -18,14 +18,15 @@ layout(set = 0, binding = 7) uniform sampler2D level_6;
 
 #define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
-#include "lib/upsample.glsl"
+#include "lib/gathered.glsl"
+#include "lib/filter_image.glsl"
 
 vec4 share(sampler2D image, int level)
 {
     if (level >= LEVELS)
         return vec4(0.0);
     float weight = params.shares[level >> 2][level & 3];
-    return weight * upsample(image, ivec2(UPSAMPLE), vec2(0.0));
+    return weight * filtered(image);
 }
 
 vec4 shade()

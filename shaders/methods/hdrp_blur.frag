@@ -8,7 +8,7 @@
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 

@@ -4,7 +4,7 @@
 // Upsampling in the pyramid to exactly twice the size of the smaller level.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 

@@ -4,7 +4,7 @@
 // The last upsampling of the bloom, to exactly twice the size, fused with the composite.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(DOUBLE_FINAL_BLOCK);
+UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"

@@ -4,7 +4,7 @@
 // Upsampling in the pyramid to exactly twice the size of the smaller level, for GPUs.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D smaller;

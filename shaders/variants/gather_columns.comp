@@ -1,18 +1,18 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// Adds up levels of several sizes that filter_rows.comp has filtered along rows: filters each along
+// Adds up levels of several sizes that gather_rows.comp has filtered along rows: filters each along
 // columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
 // no filter.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
-#include "lib/axis.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
+#include "lib/gathered.glsl"
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = FILTER_ROWS;
+const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = GATHER_ROWS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, level_0);
@@ -32,12 +32,13 @@ WRITE_IMAGE(8);
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
-#define AXIS_FILTER filter_column
-#define AXIS_IMAGE usamplerBuffer image, ivec4 shape
-#define AXIS_TEXEL(at) load_floats(image, shape, line, at)
-#include "lib/axis_filter.glsl"
-
-#include "variants/row_axis.glsl"
+// The position of a row of the target in an image of this size, both of which may be bands of rows.
+Axis row_axis(ivec2 size, int y)
+{
+    ivec2 target_size = ivec2(params.target_width, params.target_height);
+    ivec2 complete = ivec2(size.x, params.source_height == 0 ? size.y : params.source_height);
+    return axis_y(place_in_rows(complete, ivec2(0, y), target_size, params.row_offset), size, vec2(1.0));
+}
 
 vec4 sums[COLUMNS];
 
@@ -55,10 +56,14 @@ void add(usamplerBuffer image, int level, int first, int y)
     if (level >= LEVELS)
         return;
     ivec4 shape = read_shapes[level];
-    Axis axis = row_axis(shape.xy, y, UPSAMPLE, 0.0);
+    Window window = window_of(row_axis(shape.xy, y), WINDOW, false);
     float weight = params.shares[level >> 2][level & 3];
-    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        sums[i] += weight * filter_column(image, shape, axis, first + i);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 sum = vec4(0.0);
+        [[unroll]] for (int row = 0; row < WINDOW; ++row)
+            sum += window.weights[row].x * load_floats(image, shape, first + i, window.first + row);
+        sums[i] += weight * sum;
+    }
 }
 
 void write_row(int x, int y)

@@ -10,7 +10,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/godot.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = GODOT_COLUMNS, ROWS = FILTER_ROWS, RADIUS_OF_BLUR = 4;
+const int COLUMNS = GODOT_COLUMNS, ROWS = GATHER_ROWS, RADIUS_OF_BLUR = 4;
 const int SAMPLES = COLUMNS + 2 * RADIUS_OF_BLUR;
 
 layout(local_size_x = ROW_INVOCATIONS) in;

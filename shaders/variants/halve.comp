@@ -9,7 +9,7 @@
 #include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 

@@ -7,7 +7,7 @@
 // texel once, and has each tap for all pixels that share it.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/groups.glsl"
 #include "variants/pixels.glsl"

@@ -6,7 +6,7 @@
 // once for all of them.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"

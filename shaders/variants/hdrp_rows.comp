@@ -5,12 +5,12 @@
 // samples are means of two texels. An invocation has each sample once for all pixels.
 #include "lib/block.glsl"
 
-UNIFORM_BLOCK(PYRAMID_BLOCK);
+UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = HDRP_OUTPUTS, ROWS = FILTER_ROWS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
+const int COLUMNS = HDRP_OUTPUTS, ROWS = GATHER_ROWS, SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);

@@ -52,10 +52,11 @@ class Mutation:
 MUTATIONS = {
     # The centre of the tent, on the way up: 0.25 becomes 0.255.
     "weight wrong by 2 %": Mutation(
-        shader="pyramid_up.frag",
-        original="    vec4 sum = params.coarse * level;\n",
-        mutated="    level += 0.005 * fetch_clamped(smaller, PLACE_IN(smaller).texel);\n"
-        "    vec4 sum = params.coarse * level;\n",
+        shader="filter.frag",
+        original="    if (ADD_OWN != 0)\n",
+        mutated="    if (KERNELS == 1)\n"
+        "        sum += 0.005 * params.coarse * fetch_clamped(source, PLACE_IN(source).texel);\n"
+        "    if (ADD_OWN != 0)\n",
         test=IMAGE.format(settings="Pyramid(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),
@@ -73,12 +74,13 @@ MUTATIONS = {
         cases=": tutorial, ",
     ),
     "missing half-texel": Mutation(
-        shader="kawase_up.frag",
-        original='#include "lib/upsample.glsl"\n',
-        mutated="Place displaced(Place place)\n{\n    place.part -= 0.5;\n    return place;\n}\n"
+        shader="filter.frag",
+        original='#include "lib/filter_image.glsl"\n',
+        mutated="Place displaced(Place place)\n{\n"
+        "    place.part -= KERNELS == 3 ? 0.5 : 0.0;\n    return place;\n}\n"
         "#undef PLACE_IN\n#define PLACE_IN(source) displaced(place_in_rows(COMPLETE_SIZE(source), "
         "PIXEL, ivec2(params.target_width, params.target_height), params.row_offset))\n"
-        '#include "lib/upsample.glsl"\n',
+        '#include "lib/filter_image.glsl"\n',
         test=IMAGE.format(settings="DualKawase(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),

@@ -143,6 +143,9 @@ OTHERS: dict[str, Settings] = {
     "filament-odd": FilamentBloom(resolution=112, levels=5, threshold=0.25),
     "urp-narrow": UrpBloom(scatter=0.0, threshold=None, iterations=2),
     "urp-wide": UrpBloom(scatter=1.0, clamp_max=30.0, iterations=8),
+    # Taps that are in a window, and some that are too far apart for one.
+    "urp-kawase": UrpBloom(filter="kawase"),
+    "urp-dual": UrpBloom(filter="dual", scatter=0.9),
     "hdrp": HdrpBloom(),
     "hdrp-narrow": HdrpBloom(scatter=0.0),
     "hdrp-linear": HdrpBloom(scatter=1.0, high_quality_filtering=False),

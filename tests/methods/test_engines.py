@@ -56,11 +56,14 @@ class Frame(NamedTuple):
     stride: int
 
 
-def read_frame(folder: Path, key: str) -> Frame:
+def read_frame(folder: Path, key: str, inputs: Path | None = None) -> Frame:
     engine, case = key.split("/")
     cases = json.loads((folder / "settings.json").read_text())[engine]["cases"]
     (found,) = (one for one in cases if one["key"] == case)
-    with np.load(folder / "inputs.npz") as images, np.load(folder / "frames.npz") as frames:
+    with (
+        np.load((inputs or folder) / "inputs.npz") as images,
+        np.load(folder / "frames.npz") as frames,
+    ):
         return Frame(images[found["image"]], frames[key], found["stride"])
 
 
@@ -104,6 +107,26 @@ def test_a_bloom_is_its_engines(renderer: Renderer, engine_frames: Path, key: st
     of_device = renderer.apply(image.astype(np.float32), settings)["bloom"]
     assert relative(every(of_reference, stride), expected).max() < 1e-3
     assert relative(every(of_device, stride), expected).max() < 1e-3
+
+
+#: URP 17's further filters, by the frame's key in shared/data/blooms. Images are in ../engines.
+URP_17: dict[str, Settings] = {
+    "urp17/6_odd_kawase_f4": UrpBloom(filter="kawase"),
+    "urp17/11_wide_dual_f4": UrpBloom(filter="dual", scatter=0.2, iterations=8),
+}
+
+
+@pytest.mark.parametrize("key", URP_17)
+def test_filters_of_urp_17(renderer: Renderer, engine_frames: Path, key: str) -> None:
+    folder = engine_frames.parent / "blooms"
+    if not folder.is_dir():
+        pytest.skip("the frames of further engines (../shared/data/blooms) are not here")
+    image, bloom, stride = read_frame(folder, key, engine_frames)
+    settings = URP_17[key].replace(format="rgba32float")
+    of_reference = reference.apply(image.astype(np.float64), settings)["bloom"]
+    of_device = renderer.apply(image.astype(np.float32), settings)["bloom"]
+    for actual in (of_reference, of_device):
+        assert np.abs(every(actual, stride) - bloom).max() < 1e-3 * bloom.max()
 
 
 class Cut(Storage):

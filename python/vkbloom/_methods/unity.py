@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
+BlurFilter = Literal["gaussian", "kawase", "dual"]
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class UrpBloom(Settings):
-    """Bloom of Unity's Universal Render Pipeline: the Gaussian filter without high quality.
+    """Bloom of Unity's Universal Render Pipeline, without high quality.
 
     Parameters
     ----------
+    filter : {"gaussian", "kawase", "dual"}
+        How the bloom spreads. The last two are of URP 17 (Unity 6).
     scatter : float
         Share of the larger blurs, 0 to 1.
     iterations : int
@@ -41,6 +45,12 @@ class UrpBloom(Settings):
     which follow, one pixel. With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, bilinear(up_k+1), s),
     and ``bloom`` is one bilinear sample of up_0. Dirt and tint are not supported.
 
+    "kawase" stays at the size of down_0. As many times as there are levels, n, kawase_i mixes the
+    image before with the mean of four diagonal taps, D = 1/2 + i texels away (i - 1 where i is
+    above floor(n / 2)), by s, or takes the mean alone if the scatter is 0.999 or more. "dual"
+    makes the levels as `DualKawase` does with the offset 1, and goes up with the offset
+    0.3 + scatter without adding them.
+
     Source: Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal:
     Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
     Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298,
@@ -59,6 +69,7 @@ class UrpBloom(Settings):
     composite: Composite = choice_field("composite", ("add",))
     knee: float = number_field("knee", default=0.5)
     format: BloomFormat | None = "rgba16float"
+    filter: BlurFilter = choice_field("filter")
     scatter: float = number_field("scatter")
     iterations: int = number_field("iterations")
     clamp_max: float = number_field("clamp_max", slider=(0, 100))

@@ -14,7 +14,7 @@ from ._sampling import CENTRE, Array, Taps, sample
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import DualKawase
 
-__all__ = ["gain", "passes"]
+__all__ = ["down", "gain", "passes", "up"]
 
 
 def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
@@ -24,12 +24,12 @@ def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
     framebuffers: dict[str, Array] = {}
     image = source.image
     for k, level_size in enumerate(sizes):
-        image = source.store(_down(image, level_size, settings.offset))
+        image = source.store(down(image, level_size, settings.offset))
         framebuffers[f"down_{k}"] = image
     for k in range(len(sizes) - 2, -1, -1):
-        image = source.store(_up(image, sizes[k], settings.offset))
+        image = source.store(up(image, sizes[k], settings.offset))
         framebuffers[f"up_{k}"] = image
-    framebuffers["bloom"] = source.store(_up(image, source.size, settings.offset))
+    framebuffers["bloom"] = source.store(up(image, source.size, settings.offset))
     return framebuffers
 
 
@@ -38,13 +38,13 @@ def gain(settings: DualKawase, size: tuple[int, int]) -> float:
     return 1.0
 
 
-def _down(image: Array, size: tuple[int, int], offset: float) -> Array:
+def down(image: Array, size: tuple[int, int], offset: float) -> Array:
     """Return (4 centre + 4 diagonals at offset / 2 texels of `image`) / 8."""
     diagonals = _pair(offset / 2)
     return (4 * sample(image, size) + sample(image, size, diagonals, diagonals)) / 8
 
 
-def _up(image: Array, size: tuple[int, int], offset: float) -> Array:
+def up(image: Array, size: tuple[int, int], offset: float) -> Array:
     """Return (4 taps on the axes at offset texels + 2 * 4 diagonals at half of that) / 12."""
     axial, diagonals = _pair(offset), _pair(offset / 2)
     axials = sample(image, size, axial, CENTRE) + sample(image, size, CENTRE, axial)

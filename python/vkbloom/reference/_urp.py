@@ -1,4 +1,4 @@
-"""Bloom of Unity's Universal Render Pipeline, its Gaussian filter without high quality.
+"""Bloom of Unity's Universal Render Pipeline, without high quality.
 
 From Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal:
 Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
 from ._levels import halved
 from ._sampling import Array, sample
@@ -33,12 +34,17 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
     down_0 has half the size of the frame: one bilinear tap, clamped, then the soft threshold. Each
     further level has half the size of the one above. Nine taps two texels apart reduce its width,
     then nine taps one pixel apart blur its height. up_k mixes the level with the smaller one, by
-    the scatter; the bloom is up_0. Both are enlarged bilinearly.
+    the scatter; the bloom is up_0. Both are enlarged bilinearly. The other filters are of URP 17.
     """
     height, width, _ = source.image.shape
     level = halved((width, height))
     downs = [source.store(masked(_prefilter(sample(source.image, level), settings), source.mask))]
-    for _ in range(1, _level_count(settings, level)):
+    count = _level_count(settings, level)
+    if settings.filter == "kawase":
+        return _kawase(source, settings, downs[0], count)
+    if settings.filter == "dual":
+        return _dual(source, settings, downs, count)
+    for _ in range(1, count):
         level = halved(level)
         horizontal = source.store(sample(downs[-1], level, x_taps=_taps(2.0)))
         downs.append(source.store(sample(horizontal, level, y_taps=_taps(1.0))))
@@ -46,10 +52,43 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
     return combine(downs, source, own=own, coarse=coarse, upsample=linear, last=linear)
 
 
+def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> dict[str, Array]:
+    """Mix the first level with the mean of four taps, again and again."""
+    height, width, _ = first.shape
+    share = 1.0 if settings.scatter >= 0.999 else 0.05 + 0.9 * settings.scatter
+    images = {"down_0": first}
+    image = first
+    for i in range(count):
+        distance = 0.5 + (i - 1 if i > count // 2 else i)
+        sides = [(-distance, 0.5), (distance, 0.5)]
+        mean = sample(image, (width, height), sides, sides)
+        image = source.store((1 - share) * image + share * mean)
+        images[f"kawase_{i}"] = image
+    return images | {"bloom": source.store.end(linear(image, source.size))}
+
+
+def _dual(
+    source: BlurInput, settings: UrpBloom, downs: list[Array], count: int
+) -> dict[str, Array]:
+    """Go down and up, and add no level on the way up."""
+    while len(downs) < count:
+        height, width, _ = downs[-1].shape
+        downs.append(source.store(dual_kawase.down(downs[-1], halved((width, height)), 1.0)))
+    image, ups = downs[-1], {}
+    for level in range(count - 2, -1, -1):
+        height, width, _ = downs[level].shape
+        image = source.store(dual_kawase.up(image, (width, height), 0.3 + settings.scatter))
+        ups[f"up_{level}"] = image
+    levels = {f"down_{level}": down for level, down in enumerate(downs)}
+    return levels | ups | {"bloom": source.store.end(linear(image, source.size))}
+
+
 def gain(settings: UrpBloom, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: the threshold may change it, the mixes do not."""
     count = _level_count(settings, halved(size))
     first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    if settings.filter != "gaussian":
+        return first
     kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:])
     return first * flat_gain(*_shares(settings, count), [kernel ** (2 * k) for k in range(count)])
 

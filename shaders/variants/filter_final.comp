@@ -1,26 +1,30 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The last upsampling of the bloom, by any factor, fused with the composite.
+// A filter that makes the bloom, fused with the composite.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
-#include "lib/axis.glsl"
 
-UNIFORM_BLOCK(UPSAMPLE_FINAL_BLOCK);
+UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #include "lib/storage.glsl"
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, smaller);
+READ_IMAGE(1, source);
 READ_IMAGE(2, own);
 WRITE_IMAGE(3);
 
 #define HAS_OWN true
+
+vec4 seen(uvec4 raw)
+{
+    return value_of(raw);
+}
 
 uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
 {
     return finished(scene, finish(value_of(scene), as_stored(sum, FORMAT), pixel));
 }
 
-#include "variants/upsample.glsl"
+#include "variants/filter.glsl"

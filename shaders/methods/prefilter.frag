@@ -1,7 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// Bevy's first downsampling: 13 taps.
+// A downsampling that is not linear in groups of its taps, and the first pass of a published method: the
+// taps and what is made of them are by GROUPS (lib/prefilter_taps.glsl).
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 
@@ -19,11 +20,10 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 #define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
-
-#include "lib/thirteen_taps.glsl"
+#include "lib/prefilter_taps.glsl"
 
 vec4 shade()
 {
-    Taps taps = thirteen_taps(PLACE_IN(source), vec2(params.step_x, params.step_y));
-    return stored(mask_value() * bevy_prefiltered(taps));
+    Place place = PLACE_IN(source);
+    return stored(mask_value() * prefiltered(means(place), place));
 }

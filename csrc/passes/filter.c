@@ -1,0 +1,119 @@
+#include "passes/filter.h"
+
+#include <math.h>
+
+struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                                   double gain)
+{
+    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_filter_frag, from, to);
+
+    row.block = VKB_BLOCK_filter;
+    VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
+    row.params.filter.coarse = (float)gain;
+    row.constants.upsample = UPSAMPLE_LINEAR;
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = from;
+    row.read_count = 2;
+    return row;
+}
+
+// Of taps at the same place there is one.
+static uint32_t add_tap(float (*taps)[4], uint32_t count, int kernel, double offset, double weight)
+{
+    uint32_t at = 0;
+
+    if (weight == 0.0)
+        return count;
+    while (at < count && taps[at][0] != (float)offset)
+        ++at;
+    taps[at][0] = (float)offset;
+    taps[at][kernel + 1] += (float)weight;
+    return at < count ? count : count + 1;
+}
+
+static uint32_t add_taps(float (*taps)[4], uint32_t count, int kernel, struct vkb_side_taps added)
+{
+    count = add_tap(taps, count, kernel, -added.distance, added.side);
+    count = add_tap(taps, count, kernel, 0.0, added.middle);
+    return add_tap(taps, count, kernel, added.distance, added.side);
+}
+
+// The taps so far; those beyond have no weight.
+static uint32_t count_taps(float (*taps)[4])
+{
+    uint32_t count = MAX_FILTER_TAPS;
+
+    while (count > 0 && taps[count - 1][1] == 0.0f && taps[count - 1][2] == 0.0f
+           && taps[count - 1][3] == 0.0f)
+        --count;
+    return count;
+}
+
+void vkb_filter_add(struct vkb_pass_row *row, int kernel, struct vkb_side_taps x,
+                    struct vkb_side_taps y)
+{
+    struct vkb_filter_params *params = &row->params.filter;
+    const uint32_t columns = add_taps(params->taps_x, count_taps(params->taps_x), kernel, x);
+    const uint32_t rows = add_taps(params->taps_y, count_taps(params->taps_y), kernel, y);
+
+    row->constants.taps = (int32_t)(columns > rows ? columns : rows);
+    row->constants.kernels = kernel + 1;
+}
+
+void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share)
+{
+    if (own == VKB_NO_IMAGE)
+        return;
+    row->reads[1] = own;
+    row->constants.add_own = true;
+    row->params.filter.own = (float)share;
+}
+
+static double furthest(float (*taps)[4])
+{
+    double distance = 0.0;
+
+    for (int i = 0; i < MAX_FILTER_TAPS; ++i)
+        distance = fmax(distance, fabs(taps[i][0]));
+    return distance;
+}
+
+bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
+                    struct vkb_error *error)
+{
+    struct vkb_filter_params *params = &row->params.filter;
+    const double rows = furthest(params->taps_y);
+    const int32_t window = 2 * (int32_t)ceil(fmax(furthest(params->taps_x), rows)) + 2;
+
+    row->constants.window = row->constants.upsample == UPSAMPLE_CUBIC ? 4
+                          : window <= MAX_WINDOW                      ? window
+                                                                      : 0;
+    row->reach = (float)(VKB_FILTER_REACH + rows);
+    return vkb_graph_add_pass(levels->graph, row, error);
+}
+
+bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                     struct vkb_error *error)
+{
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0};
+    const struct vkb_side_taps sides = {0.5 * offset, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
+
+    vkb_filter_add(&row, 0, centre, centre);
+    vkb_filter_add(&row, 1, sides, sides);
+    return vkb_filter_end(levels, &row, error);
+}
+
+bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                   struct vkb_error *error)
+{
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
+    const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
+    const struct vkb_side_taps twice = {0.5 * offset, 2.0, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0 / 12.0);
+
+    vkb_filter_add(&row, 0, axial, centre);
+    vkb_filter_add(&row, 1, centre, axial);
+    vkb_filter_add(&row, 2, diagonal, twice);
+    return vkb_filter_end(levels, &row, error);
+}

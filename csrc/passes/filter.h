@@ -1,0 +1,50 @@
+// Rows that filter an image. The row says what the filter is: its block has the taps along both
+// axes, each with a weight for up to MAX_KERNELS kernels, and its constants what a tap samples
+// (UPSAMPLE_*). All variants and the transpose follow from these (shaders/lib/filter.glsl).
+#ifndef VKB_FILTER_H
+#define VKB_FILTER_H
+
+#include "passes/levels.h"
+
+// Taps of a kernel along an axis: at this distance on both sides, and in the middle.
+struct vkb_side_taps {
+    double distance, side, middle;
+};
+
+// A row without taps, for the share `gain` of the filtered image.
+struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                                   double gain);
+
+// Adds the taps of a kernel.
+void vkb_filter_add(struct vkb_pass_row *row, int kernel, struct vkb_side_taps x,
+                    struct vkb_side_taps y);
+
+// Adds the share of an image of the target's size; VKB_NO_IMAGE: of none.
+void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share);
+
+// Adds the pass to the graph.
+bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
+                    struct vkb_error *error);
+
+// Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
+// the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial
+// taps at a distance of one texel of the smaller level times the offset, and four diagonal ones at
+// half that distance with twice the weight.
+bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                     struct vkb_error *error);
+bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
+                   struct vkb_error *error);
+
+// Whether a level of exactly twice the size is filtered with the pyramid's 13 taps, or the target
+// has exactly twice the size and four taps along each axis: EXACT_*; 0: neither.
+static inline enum vkb_mode vkb_filter_exact(const struct vkb_pass_row *pass)
+{
+    return (enum vkb_mode)pass->constants.exact;
+}
+
+static inline bool vkb_is_filter(const struct vkb_pass_row *pass)
+{
+    return pass->block == VKB_BLOCK_filter;
+}
+
+#endif

@@ -1,0 +1,171 @@
+// Filters in strips, and the sum of several levels: along rows, then along columns.
+#include "variants/variant.h"
+
+#include "passes/filter.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(filter);
+static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(filter_final);
+static const struct vkb_shader *const rows_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(gather_rows);
+static const struct vkb_shader *const gather_shaders[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(gather_columns);
+
+// The size of an image that is filtered along rows.
+static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
+                                 const struct vkb_pass_row *pass, uint32_t from)
+{
+    return (struct vkb_size){choice->graph->images[pass->targets[0]].width,
+                             choice->graph->images[from].height};
+}
+
+// Whether words reach all pixels of the first `count` images that the pass reads, also filtered.
+static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      uint32_t count)
+{
+    bool fits = vkb_fits_words(choice, pass);
+
+    for (uint32_t i = 0; i < count; ++i) {
+        const struct vkb_size size = rows_size(choice, pass, pass->reads[i]);
+        fits = fits
+            && vkb_image_fits_words(choice->device, VKB_FORMAT_RGBA32_FLOAT, size.width,
+                                    size.height);
+    }
+    return fits;
+}
+
+// Adds an image and the pass that filters a level along rows into it, at the positions of the
+// pixels of the target of `pass`.
+static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                     uint32_t level, uint32_t *rows, struct vkb_error *error)
+{
+    const uint32_t from = pass->reads[level];
+    const struct vkb_size size = rows_size(choice, pass, from);
+    const enum vkb_format format = choice->graph->images[from].format;
+    char name[VKB_NAME_SIZE];
+    struct vkb_pass_row row;
+
+    snprintf(name, sizeof name, "%.20s_rows_%u", pass->name, level);
+    if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, rows, error))
+        return false;
+    memcpy(&row, pass, sizeof row);
+    row.constants.levels = 0;
+    memset(&row.params, 0, sizeof row.params);
+    row.reads[0] = from;
+    vkb_drop_reads(&row, 1);
+    row.targets[0] = *rows;
+    vkb_make_words(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+    const uint32_t levels = (uint32_t)pass->constants.levels;
+    const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
+    const bool own = pass->constants.upsample == UPSAMPLE_LINEAR
+                  && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+                  && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
+
+    *fits = pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.add_own = own;
+    row.constants.sampling = 0;
+    for (uint32_t level = own; level < levels; ++level)
+        if (!add_rows(choice, pass, level, &row.reads[level], error))
+            return false;
+    for (uint32_t level = levels; level < row.read_count; ++level)
+        row.reads[level] = row.reads[0];
+    vkb_make_words(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
+                   GATHER_ROWS);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// Whether the pass is a filter whose taps are in a window, and its images have one format.
+static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
+        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
+        && (!pass->constants.add_own || vkb_has_format_of(graph, pass->reads[1], pass->targets[0]));
+}
+
+// Makes `row`, which has a filter's constants, the strips of the filter `pass`.
+static void make_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_pass_row *row, const struct vkb_shader *const *shaders)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const struct vkb_filter_params *params = &pass->params.filter;
+    const int height = params->source_height ? params->source_height : (int)source->height;
+
+    row->constants.sampling = 0;
+    row->constants.upsample = pass->constants.upsample;
+    row->constants.taps = pass->constants.taps;
+    row->constants.kernels = pass->constants.kernels;
+    row->constants.window = pass->constants.window;
+    row->constants.enlarged = height <= params->target_height;
+    row->constants.exact = source->width == 2 * target->width ? EXACT_HALF
+                         : source->width == target->width     ? EXACT_SAME
+                         : 2 * source->width == target->width ? EXACT_DOUBLE
+                                                              : 0;
+    vkb_make_words(row, shaders[target->format],
+                   WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
+}
+
+bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = fits_strips(&choice->plain, pass) && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    make_strips(choice, pass, &row, strip_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && vkb_add_thresholded(choice, pass, &row, error);
+}
+
+#define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
+#define TAKE_VEC4S(B, name, count) \
+    memcpy(params->name, up->params.filter.name, sizeof params->name);
+
+// Adds the composite, and after it a fused pass that also filters the last level.
+bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_pass_row *up = NULL;
+    struct vkb_pass_row row;
+    struct vkb_filter_final_params *params = &row.params.filter_final;
+
+    if (vkb_is_composite(pass))
+        up = vkb_writer_of(plain, pass->reads[1]);
+    *fits = up && fits_strips(plain, up) && !up->constants.add_own && !pass->constants.masked
+         && vkb_has_format_of(plain, up->reads[0], pass->targets[0])
+         && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])
+         && plain->images[pass->reads[1]].format == plain->images[pass->targets[0]].format
+         && vkb_same_size(plain, pass->reads[1], pass->targets[0]) && vkb_fits_words(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    memset(&row.params, 0, sizeof row.params);
+    row.fused = true;
+    row.reads[0] = up->reads[0];
+    row.reads[1] = pass->reads[0];
+    vkb_drop_reads(&row, 2);
+    row.block = VKB_BLOCK_filter_final;
+    PLACE_ROWS(filter_final, TAKE_INPUT)
+    FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
+    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
+    make_strips(choice, up, &row, final_shaders);
+    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
+    return vkb_add_fullscreen(choice, pass, error)
+        && vkb_graph_add_pass(choice->graph, &row, error);
+}
