@@ -2,7 +2,6 @@
 #include "python/arguments.h"
 #include "python/values.h"
 
-
 // A contiguous array of at least one element, held in the scene; NULL with an exception set.
 static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, const char *what,
                              const char *codes)
