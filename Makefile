@@ -1,7 +1,8 @@
 # make demo: installs what is missing, renders the built-in scene into out/.
 # make test: installs what the tests need, runs all tests. Both are quick the second time.
-# make test-devices: runs all tests on SwiftShader, which comes with Debian's Chromium. (make test runs a
-#   part of all workloads there.) SWIFTSHADER: its manifest. TESTS: some of the tests.
+# make test-devices: runs all tests on SwiftShader, which comes with Debian's Chromium; compiles and
+#   records everything for seven families of AMD's GPUs, without one, on Mesa 22.3.6 and 25.0.7. (make
+#   test runs a part of both.) SWIFTSHADER: its manifest. TESTS: some of the tests.
 # make exhaustive: the same with every case of the tests that otherwise take a few (tests/exhaustive.py),
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
@@ -62,6 +63,7 @@ test-devices: export VKBLOOM_DRIVER := system
 test-devices: build/stamp/core build/stamp/test
 	test -f $(SWIFTSHADER) || { echo "$(SWIFTSHADER) is missing: apt install chromium-common"; exit 2; }
 	$(PYTHON) -m pytest $(PARALLEL) $(TESTS)
+	env -u VK_DRIVER_FILES -u VK_ICD_FILENAMES $(PYTHON) -m tests.device.amd_families
 
 exhaustive: export VKBLOOM_EXHAUSTIVE := 1
 test exhaustive: build/stamp/core build/stamp/test

@@ -114,11 +114,12 @@
     THRESHOLD_ROWS(B, READS)
 
 // A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size
-// and of the filtered image; the taps along rows and along columns. If the target is exactly twice
-// as large, `taps` has the same weights on integer texels.
+// and of the filtered image, whose weights have the sum `divisor`; the taps along rows and along
+// columns. If the target is exactly twice as large, `taps` has the same weights on integer texels.
 #define FILTER_ROWS(B, INPUT, VEC4S) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
+    INPUT(B, float, divisor) \
     VEC4S(B, taps_x, MAX_FILTER_TAPS) \
     VEC4S(B, taps_y, MAX_FILTER_TAPS) \
     VEC4S(B, taps, 1)

@@ -1,5 +1,6 @@
 #include "execute/image_cache.h"
 
+#include "execute/limits.h"
 #include "vulkan/labels.h"
 
 #include <string.h>
@@ -93,25 +94,24 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     }
 }
 
-static VkImageUsageFlags image_usage(enum vkb_format format)
+static VkImageUsageFlags image_usage(const struct vkb_device *device, enum vkb_format format)
 {
     // No pass reads depth.
     return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
          | (format == VKB_FORMAT_DEPTH32_FLOAT
                 ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
                 : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
-                      | VK_IMAGE_USAGE_STORAGE_BIT);
+                      | (device->dispatch ? VK_IMAGE_USAGE_STORAGE_BIT : 0));
 }
 
 bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
                          struct vkb_error *error)
 {
     const enum vkb_format format = row->format;
-    const VkFormatFeatureFlags features = format == VKB_FORMAT_DEPTH32_FLOAT
-                                            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-                                            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
-                                                  | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT
-                                                  | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
+    const VkFormatFeatureFlags features =
+        format == VKB_FORMAT_DEPTH32_FLOAT
+            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
+            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
 
     if (!vkb_device_supports(device, format, features))
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
@@ -136,15 +136,21 @@ static bool check_format(const struct vkb_device *device, const struct vkb_graph
 }
 
 // Dispatches that variants chose do not come here without them.
-static bool check_dispatches(const struct vkb_device *device, const struct vkb_graph *graph,
-                             struct vkb_error *error)
+static bool check_passes(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
 {
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        if (pass->geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "the compute shaders of %s cannot write images, which the pass %s "
                             "needs",
-                            device->adapter.name, graph->passes[i].name);
+                            device->adapter.name, pass->name);
+        // Plans without a renderer know no limits.
+        if (pass->block == VKB_BLOCK_own && device->handle
+            && !vkb_limits_check(device, pass, error))
+            return false;
+    }
     return true;
 }
 
@@ -178,7 +184,7 @@ bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_gra
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (!check_format(device, graph, i, error))
             return false;
-    return check_dispatches(device, graph, error) && check_memory(device, graph, error);
+    return check_passes(device, graph, error) && check_memory(device, graph, error);
 }
 
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
@@ -192,7 +198,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .layers = row->layers ? row->layers : 1,
                                 .levels = 1,
                                 .array = row->layers > 0,
-                                .usage = image_usage(row->format),
+                                .usage = image_usage(device, row->format),
                                 .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);

@@ -9,7 +9,7 @@ static void destroy_entry(const struct vkb_device *device, struct vkb_resource_e
     vk->vkDestroySampler(device->handle, entry->sampler, NULL);
     vk->vkDestroyImageView(device->handle, entry->view, NULL);
     vk->vkDestroyImage(device->handle, entry->image, NULL);
-    vk->vkFreeMemory(device->handle, entry->memory, NULL);
+    vkb_memory_free(device, entry->memory);
     vkb_buffer_destroy(device, &entry->buffer);
     vkb_buffer_destroy(device, &entry->staging);
     vkb_free(entry);

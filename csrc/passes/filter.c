@@ -10,6 +10,7 @@ struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t fro
     row.block = VKB_BLOCK_filter;
     VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
     row.params.filter.coarse = (float)gain;
+    row.params.filter.divisor = 1.0f;
     row.constants.upsample = UPSAMPLE_LINEAR;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = from;
@@ -110,10 +111,12 @@ bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from
     const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
     const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
     const struct vkb_side_taps twice = {0.5 * offset, 2.0, 0.0};
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0 / 12.0);
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
 
     vkb_filter_add(&row, 0, axial, centre);
     vkb_filter_add(&row, 1, centre, axial);
     vkb_filter_add(&row, 2, diagonal, twice);
+    // Its inverse is no float.
+    row.params.filter.divisor = 12.0f;
     return vkb_filter_end(levels, &row, error);
 }

@@ -44,7 +44,8 @@ struct vkb_held_scene {
 
 // (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
 // None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
-// texture (levels, address mode along u, v, magnification, minification, mipmap filter).
+// texture (levels, address mode along u, v, magnification, minification, mipmap filter), these as
+// Vulkan numbers them.
 bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
 void vkb_release_scene(struct vkb_held_scene *scene);
 

@@ -53,10 +53,9 @@ static bool require_ours(const struct vkb_renderer *self, struct vkb_error *erro
 {
     return vkb_renderer_is_ours(self)
         || vkb_fail(error, VKB_ERROR_VALUE,
-                    "the renderer was opened in another process (%ld), from which this one (%ld) "
-                    "was forked; open one here, or, where the driver opens none after a fork, "
-                    "start processes by multiprocessing's method \"spawn\"",
-                    self->process, vkb_current_process());
+                    "the renderer was opened in another process, from which this one was forked; "
+                    "open one here, or, where the driver opens none after a fork, start processes "
+                    "by multiprocessing's method \"spawn\"");
 }
 
 // Called between the slices of a wait: whether a signal handler raised an exception.

@@ -2,8 +2,6 @@
 #include "python/arguments.h"
 #include "python/values.h"
 
-#include <string.h>
-
 // A contiguous array of at least one element, held in the scene; NULL with an exception set.
 static const Py_buffer *hold(struct vkb_held_scene *scene, PyObject *array, const char *what,
                              const char *codes)
@@ -163,59 +161,29 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *levels, const c
     return true;
 }
 
-// The value of that name in rows that a row without a name ends.
-struct name_row {
-    const char *name;
-    int value;
-};
-
-static bool find_name(const struct name_row *rows, const char *name, int *value)
-{
-    for (; rows->name; ++rows)
-        if (strcmp(rows->name, name) == 0) {
-            *value = rows->value;
-            return true;
-        }
-    PyErr_Format(PyExc_ValueError, "texture: unknown %s", name);
-    return false;
-}
-
+// (levels, address mode along u and v, filters: of magnification, minification and mip levels), all
+// but the levels as Vulkan numbers them.
 static bool read_texture(struct vkb_held_scene *scene, PyObject *tuple,
                          struct vkb_texture_data *texture)
 {
-    static const struct name_row address_modes[] = {
-        {"repeat", VK_SAMPLER_ADDRESS_MODE_REPEAT},
-        {"mirror-repeat", VK_SAMPLER_ADDRESS_MODE_MIRRORED_REPEAT},
-        {"clamp-to-edge", VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE},
-        {0},
-    };
-    static const struct name_row filters[] = {
-        {"nearest", VK_FILTER_NEAREST},
-        {"linear", VK_FILTER_LINEAR},
-        {0},
-    };
-    static const struct name_row mipmap_filters[] = {
-        {"nearest", VK_SAMPLER_MIPMAP_MODE_NEAREST},
-        {"linear", VK_SAMPLER_MIPMAP_MODE_LINEAR},
-        {0},
-    };
-    const char *along_u, *along_v, *magnified, *minified, *between;
-    int modes[2], filter[3];
+    enum { MODES = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE + 1, FILTERS = VK_FILTER_LINEAR + 1 };
+    unsigned char modes[2], filters[3];
     PyObject *levels;
 
     if (!vkb_require_tuple(tuple, "texture")
-        || !PyArg_ParseTuple(tuple, "O!sssss", &PyTuple_Type, &levels, &along_u, &along_v,
-                             &magnified, &minified, &between)
-        || !find_name(address_modes, along_u, &modes[0])
-        || !find_name(address_modes, along_v, &modes[1])
-        || !find_name(filters, magnified, &filter[0]) || !find_name(filters, minified, &filter[1])
-        || !find_name(mipmap_filters, between, &filter[2]))
+        || !PyArg_ParseTuple(tuple, "O!bbbbb", &PyTuple_Type, &levels, &modes[0], &modes[1],
+                             &filters[0], &filters[1], &filters[2]))
         return false;
+    if (modes[0] >= MODES || modes[1] >= MODES || filters[0] >= FILTERS || filters[1] >= FILTERS
+        || filters[2] >= FILTERS) {
+        PyErr_SetString(PyExc_ValueError, "texture: there is no such address mode or filter");
+        return false;
+    }
     *texture = (struct vkb_texture_data){
         .address_modes = {(VkSamplerAddressMode)modes[0], (VkSamplerAddressMode)modes[1]},
-        .mag_filter = (VkFilter)filter[0],
-        .min_filter = (VkFilter)filter[1],
-        .mipmap_filter = (VkSamplerMipmapMode)filter[2],
+        .mag_filter = (VkFilter)filters[0],
+        .min_filter = (VkFilter)filters[1],
+        .mipmap_filter = (VkSamplerMipmapMode)filters[2],
     };
     if (!read_picture(scene, levels, "texture", 1, &texture->picture))
         return false;

@@ -7,6 +7,9 @@
 #include <string.h>
 #include <time.h>
 
+// In a header of beta extensions.
+#define PORTABILITY_SUBSET "VK_KHR_portability_subset"
+
 static bool has_extension(const struct vkb_device *device, const char *name, bool *found,
                           struct vkb_error *error)
 {
@@ -124,7 +127,7 @@ static bool exports_timelines(const struct vkb_device *device)
         && (properties.externalSemaphoreFeatures & VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT);
 }
 
-enum { MAX_EXTENSIONS = 6 };
+enum { MAX_EXTENSIONS = 7 };
 
 struct extensions {
     const char *names[MAX_EXTENSIONS];
@@ -161,15 +164,19 @@ static bool choose_exports(struct vkb_device *device, struct extensions *extensi
 static bool choose_extensions(struct vkb_device *device, struct extensions *extensions,
                               struct vkb_error *error)
 {
-    bool has_import;
+    bool has_import, is_subset;
 
     *extensions = (struct extensions){0};
     if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
         || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
         || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
                           error)
+        || !has_extension(device, PORTABILITY_SUBSET, &is_subset, error)
         || !choose_exports(device, extensions, error))
         return false;
+    // Must be enabled where it is. What such devices lack, no pass needs.
+    if (is_subset)
+        extensions->names[extensions->count++] = PORTABILITY_SUBSET;
     if (has_import && imports_buffers(device)) {
         device->import_alignment = import_alignment(device);
         extensions->names[extensions->count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
@@ -338,6 +345,17 @@ static bool has_words(const struct vkb_device *device)
         && has_whole_words(device);
 }
 
+// Whether compute shaders can write images of every format. (Drawing must do elsewhere.)
+static bool stores_all(const struct vkb_device *device)
+{
+    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
+        if (format != VKB_FORMAT_DEPTH32_FLOAT
+            && !vkb_device_supports(device, (enum vkb_format)format,
+                                    VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT))
+            return false;
+    return true;
+}
+
 // A thread of lavapipe with memory for its allocations, twice.
 enum { DEVICE_MIB = 192 };
 
@@ -345,6 +363,7 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
                           bool validation, struct vkb_error *error)
 {
     if (!(device->workers = vkb_workers_create(error))
+        || !(device->allocations = vkb_alloc(error, 1, sizeof *device->allocations))
         || !vkb_adapter_open(adapter_choice, driver, validation, &device->instance,
                              &device->adapter, error)
         || (device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
@@ -354,6 +373,7 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
+    device->dispatch = device->dispatch && stores_all(device);
     device->words = has_words(device);
     return true;
 }
@@ -380,6 +400,8 @@ void vkb_device_destroy(struct vkb_device *device)
 
     vkb_workers_destroy(device->workers);
     device->workers = NULL;
+    vkb_free(device->allocations);
+    device->allocations = NULL;
     if (device->idle)
         device->vk.vkDestroyFence(device->handle, device->idle, NULL);
     device->idle = VK_NULL_HANDLE;

@@ -20,6 +20,7 @@ struct vkb_device {
     struct vkb_workers *workers;  // of the host
     VkPhysicalDeviceMemoryProperties memory;
     VkPhysicalDeviceLimits limits;
+    atomic_uint *allocations;                         // of memory, that are not freed
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
     bool dispatch;       // compute shaders can write images of every format

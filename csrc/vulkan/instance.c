@@ -144,6 +144,8 @@ static const struct wish {
     {"VK_KHR_wayland_surface", "WAYLAND_DISPLAY"},
     {"VK_KHR_win32_surface", NULL},
     {"VK_EXT_metal_surface", NULL},
+    // Adapters that do less than Vulkan demands, such as MoltenVK's, are hidden without.
+    {VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME, NULL},
     // Names are for RenderDoc, which sets this for its layer.
     {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, "ENABLE_VULKAN_RENDERDOC_CAPTURE"},
 };
@@ -179,6 +181,8 @@ static void add_wished(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr 
                 && !(*count > 0 && strcmp(names[0], wish->extension) == 0)) {
                 names[(*count)++] = wish->extension;
                 instance->surfaces |= wish == wishes;
+                instance->portability |=
+                    strcmp(wish->extension, VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME) == 0;
             }
 }
 
@@ -218,23 +222,26 @@ static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAd
     // Of a driver that the loader opens alone, those that this driver has.
     add_wished(instance, driver ? driver : instance->get, extensions, &extension_count);
 
-    return check_created(VK_RESULT(vkCreateInstance(
-                             &(VkInstanceCreateInfo){
-                                 .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
-                                 .pNext = messenger ? &features : NULL,
-                                 .pApplicationInfo =
-                                     &(VkApplicationInfo){
-                                         .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
-                                         .pApplicationName = "vkbloom",
-                                         .apiVersion = VK_API_VERSION_1_1,
-                                     },
-                                 .enabledLayerCount = messenger ? 1 : 0,
-                                 .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
-                                 .enabledExtensionCount = extension_count,
-                                 .ppEnabledExtensionNames = extensions,
-                             },
-                             NULL, &instance->handle)),
-                         driver != NULL, error);
+    return check_created(
+        VK_RESULT(vkCreateInstance(
+            &(VkInstanceCreateInfo){
+                .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
+                .pNext = messenger ? &features : NULL,
+                .flags =
+                    instance->portability ? VK_INSTANCE_CREATE_ENUMERATE_PORTABILITY_BIT_KHR : 0,
+                .pApplicationInfo =
+                    &(VkApplicationInfo){
+                        .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
+                        .pApplicationName = "vkbloom",
+                        .apiVersion = VK_API_VERSION_1_1,
+                    },
+                .enabledLayerCount = messenger ? 1 : 0,
+                .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},
+                .enabledExtensionCount = extension_count,
+                .ppEnabledExtensionNames = extensions,
+            },
+            NULL, &instance->handle)),
+        driver != NULL, error);
 }
 
 static void load_functions(struct vkb_instance *instance)

@@ -53,8 +53,9 @@ struct vkb_instance {
     VkInstance handle;
     char driver[4096];  // the path of its library; "": those that the system's loader finds
     bool validation;
-    bool has_room;  // at its creation there was address space for lavapipe
-    bool surfaces;  // it has VK_KHR_surface, and those of the windows and screens that there are
+    bool has_room;     // at its creation there was address space for lavapipe
+    bool portability;  // adapters that do less than Vulkan demands are not hidden
+    bool surfaces;     // it has VK_KHR_surface, and those of the windows and screens that there are
     PFN_vkGetInstanceProcAddr get;  // of the loader, or of the driver
     struct vkb_instance_table vk;
     VkDebugUtilsMessengerEXT messenger;  // with validation: vkb_messages_receive

@@ -54,6 +54,31 @@ static uint32_t find_memory_type(const struct vkb_device *device, enum vkb_memor
     return fallback;
 }
 
+// More allocations than the adapter allows are invalid, not an error that it reports.
+static bool allocate(const struct vkb_device *device, const VkMemoryAllocateInfo *info,
+                     VkDeviceMemory *memory, struct vkb_error *error)
+{
+    const uint32_t limit = device->limits.maxMemoryAllocationCount;
+
+    if (atomic_fetch_add(device->allocations, 1) >= limit)
+        vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+                 "memory is short: the adapter %s allows %u allocations "
+                 "(maxMemoryAllocationCount); delete uploaded images and frames on the device, or "
+                 "close renderers",
+                 device->adapter.name, limit);
+    else if (VK(error, device->vk.vkAllocateMemory(device->handle, info, NULL, memory)))
+        return true;
+    atomic_fetch_sub(device->allocations, 1);
+    return false;
+}
+
+void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory)
+{
+    device->vk.vkFreeMemory(device->handle, memory, NULL);
+    if (memory)
+        atomic_fetch_sub(device->allocations, 1);
+}
+
 bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
                          const VkMemoryRequirements *requirements, const void *next,
                          VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
@@ -64,15 +89,14 @@ bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind k
     if (type == UINT32_MAX)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
     *flags = device->memory.memoryTypes[type].propertyFlags;
-    const bool done =
-        VK(error, device->vk.vkAllocateMemory(device->handle,
-                                              &(VkMemoryAllocateInfo){
-                                                  .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                                                  .pNext = next,
-                                                  .allocationSize = requirements->size,
-                                                  .memoryTypeIndex = type,
-                                              },
-                                              NULL, memory));
+    const bool done = allocate(device,
+                               &(VkMemoryAllocateInfo){
+                                   .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                   .pNext = next,
+                                   .allocationSize = requirements->size,
+                                   .memoryTypeIndex = type,
+                               },
+                               memory, error);
     if (!done)
         vkb_add_words(error, ". One image or buffer of this call takes %.4g MiB",
                       (double)requirements->size / (1 << 20));
@@ -127,7 +151,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
 {
     device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
-    device->vk.vkFreeMemory(device->handle, buffer->memory, NULL);
+    vkb_memory_free(device, buffer->memory);
     *buffer = (struct vkb_buffer){0};
 }
 
@@ -170,21 +194,20 @@ static bool import_memory(const struct vkb_device *device, void *memory, struct 
     const uint32_t type = find_import_type(device, memory, requirements.memoryTypeBits);
     if (type == UINT32_MAX || requirements.size > buffer->size)
         return false;
-    return VK(error,
-              vk->vkAllocateMemory(
-                  device->handle,
-                  &(VkMemoryAllocateInfo){
-                      .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                      .pNext =
-                          &(VkImportMemoryHostPointerInfoEXT){
-                              .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
-                              .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
-                              .pHostPointer = memory,
-                          },
-                      .allocationSize = buffer->size,
-                      .memoryTypeIndex = type,
-                  },
-                  NULL, &buffer->memory))
+    return allocate(
+               device,
+               &(VkMemoryAllocateInfo){
+                   .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                   .pNext =
+                       &(VkImportMemoryHostPointerInfoEXT){
+                           .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                           .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
+                           .pHostPointer = memory,
+                       },
+                   .allocationSize = buffer->size,
+                   .memoryTypeIndex = type,
+               },
+               &buffer->memory, error)
         && VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0));
 }
 
@@ -472,7 +495,7 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
     device->vk.vkDestroyImageView(device->handle, image->base_view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
-    device->vk.vkFreeMemory(device->handle, image->memory, NULL);
+    vkb_memory_free(device, image->memory);
     *image = (struct vkb_image){0};
 }
 

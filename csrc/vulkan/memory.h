@@ -59,6 +59,9 @@ bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind k
                          VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
                          struct vkb_error *error);
 
+// What is null is not freed.
+void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory);
+
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,

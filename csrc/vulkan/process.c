@@ -5,32 +5,27 @@
 #include <stdbool.h>
 #include <unistd.h>
 
-static atomic_long current;  // 0: not known
-static bool forgets;         // whether a fork's child forgets it
+// One more in each child of a fork. Process ids do not tell a child from its parent in another
+// namespace of ids, as containers have: both may be 1.
+static atomic_long current = 1;
+static bool counts;  // whether a fork's child counts
 
-static void forget(void)
+static void count(void)
 {
-    atomic_store(&current, 0);
+    atomic_fetch_add(&current, 1);
 }
 
-static void forget_in_children(void)
+static void count_in_children(void)
 {
-    forgets = pthread_atfork(NULL, NULL, forget) == 0;
+    counts = pthread_atfork(NULL, NULL, count) == 0;
 }
 
-// Kept, since getpid() is a system call, and each call of a renderer asks several times.
 long vkb_current_process(void)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-    long process = atomic_load(&current);
 
-    if (process != 0)
-        return process;
-    pthread_once(&once, forget_in_children);
-    process = (long)getpid();
-    if (forgets)
-        atomic_store(&current, process);
-    return process;
+    pthread_once(&once, count_in_children);
+    return counts ? atomic_load(&current) : (long)getpid();
 }
 
 void vkb_lock_acquire(struct vkb_lock *lock)

@@ -1,10 +1,10 @@
-// The process id, and locks that are free in a forked process.
+// What tells processes apart, and locks that are free in a forked process.
 #ifndef VKB_PROCESS_H
 #define VKB_PROCESS_H
 
 #include <stdatomic.h>
 
-// The id of this process; never 0.
+// A number that none of the processes has from which this one was forked; never 0.
 long vkb_current_process(void);
 
 // A spinlock, for short times. Zeroed: free.

@@ -53,7 +53,8 @@ vec4 shade()
 {
     if (EXACT == EXACT_HALF)
         return stored(halved());
-    vec4 sum = params.coarse * (EXACT == EXACT_DOUBLE ? doubled() : filtered(source));
+    vec4 sum =
+        params.coarse * (EXACT == EXACT_DOUBLE ? doubled() : filtered(source) / params.divisor);
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, PIXEL, 0);
     return stored(sum);

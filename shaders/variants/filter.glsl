@@ -83,7 +83,7 @@ void main()
     uint rest = number % divisor;
     int texel = int(number / divisor) - 1, row = texel - KEPT / 2;
     vec2 ratio = vec2(source_size.x, height) / vec2(params.target_width, params.target_height);
-    float coarse = params.coarse;
+    float coarse = params.coarse, shares = params.divisor;
     uvec4 raw[COLUMNS];
 
     if (any(greaterThanEqual(first, size)))
@@ -109,7 +109,7 @@ void main()
             if (HAS_OWN)
                 load_own(first.x, y, raw);
             [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-                raw[i] = shade(raw[i], coarse * column_of(window, i), ivec2(first.x + i, y));
+                raw[i] = shade(raw[i], coarse * (column_of(window, i) / shares), ivec2(first.x + i, y));
             store(first.x, y, raw);
             rest += 2u * height;
             ++y;

@@ -3,7 +3,8 @@
 #extension GL_EXT_control_flow_attributes : require
 // Adds up levels of several sizes that gather_rows.comp has filtered along rows: filters each along
 // columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
-// no filter.
+// no filter. As one fragment shader `godot_4_5` takes 475 ms in place of 130 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

@@ -4,7 +4,9 @@
 // Downsampling to exactly half the size with taps that are weighted by brightness. The taps are means
 // of 2 x 2 texels: the outer ones of pairs of rows and columns that begin at even texels, the inner
 // ones of pairs that begin at odd texels. An invocation writes a strip from top to bottom, loads each
-// texel once, and has each tap for all pixels that share it.
+// texel once, and has each tap for all pixels that share it. Without it `pygfx` takes 122 ms in place
+// of 57, `blender_bloom` 172 in place of 106, `kino` 109 in place of 86 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);

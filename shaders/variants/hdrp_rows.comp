@@ -2,7 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // HDRP's horizontal blur of an image of the target's size (FIRST) or of exactly twice its width, whose
-// samples are means of two texels. An invocation has each sample once for all pixels.
+// samples are means of two texels. An invocation has each sample once for all pixels. Without it
+// and hdrp_columns.comp `unity_hdrp` takes 104 ms in place of 67 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);

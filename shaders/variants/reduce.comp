@@ -3,7 +3,8 @@
 #extension GL_EXT_control_flow_attributes : require
 // The first passes of published methods that read an image of exactly twice the target's size, with
 // bilinear taps among 4 x 4 texels. An invocation writes a strip from top to bottom and loads each
-// texel once.
+// texel once. Without it `filament` takes 62 ms in place of 45, `unity_hdrp` 86 in place of 67 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"

@@ -3,7 +3,9 @@
 #extension GL_EXT_control_flow_attributes : require
 // The first passes of published methods that read an image of any other size, with bilinear taps one
 // texel or two apart. An invocation writes a strip from top to bottom. It has each row's taps once,
-// and keeps those of the rows that a pixel needs.
+// and keeps those of the rows that a pixel needs. Without it `bevy_natural` takes 104 ms
+// in place of 72 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"

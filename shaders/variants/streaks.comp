@@ -3,7 +3,9 @@
 #extension GL_EXT_control_flow_attributes : require
 // An iteration of a streak (streaks.frag). The taps of a pass have the same offset at all pixels. So
 // an invocation writes a strip from top to bottom, and filters each row of a tap along the row once,
-// for the two rows of the target that it is part of.
+// for the two rows of the target that it is part of. Without it `blender_streaks` takes
+// 2,660 ms in place of 240 (processor time of 1920 x
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 

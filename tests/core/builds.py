@@ -4,6 +4,7 @@ possible."""
 from __future__ import annotations
 
 import functools
+import json
 import os
 import shutil
 import subprocess
@@ -122,3 +123,38 @@ def core_with_faults(temporary: Path) -> Path:
             succeed(tree, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
             whole.touch()
     return tree
+
+
+# The folder of the validation layer, which must come first to be above the layers of tests.
+_EXPLICIT_LAYERS = tuple(
+    str(folder / "vulkan/explicit_layer.d")
+    for folder in (Path("/usr/share"), Path("/usr/local/share"), Path("/etc"))
+)
+
+
+def build_layer(source: Path, folder: Path) -> Path:
+    """Build a Vulkan layer, VK_LAYER_VKBLOOM_ and the file's name; return its manifest's folder."""
+    require_header("vulkan/vk_layer.h")
+    library = folder / f"{source.stem}.so"
+    options = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-fvisibility=hidden")
+    subprocess.run([*compiler(), *options, source, "-o", library], check=True)
+    about = {
+        "name": f"VK_LAYER_VKBLOOM_{source.stem}",
+        "type": "GLOBAL",
+        "library_path": str(library),
+        "api_version": "1.3.0",
+        "implementation_version": "1",
+        "description": "A device of the tests",
+    }
+    manifest = {"file_format_version": "1.2.0", "layer": about}
+    (folder / f"{source.stem}.json").write_text(json.dumps(manifest))
+    return folder
+
+
+def layer_variables(folder: Path, name: str) -> dict[str, str]:
+    """Return the environment that puts the layer below the validation layer."""
+    folders = (os.environ.get("VK_LAYER_PATH"), *_EXPLICIT_LAYERS, str(folder))
+    return {
+        "VK_LAYER_PATH": os.pathsep.join(filter(None, folders)),
+        "VK_INSTANCE_LAYERS": os.pathsep.join(("VK_LAYER_KHRONOS_validation", name)),
+    }

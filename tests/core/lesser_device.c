@@ -1,6 +1,7 @@
 // A Vulkan layer for tests: the device below it with less than it has. VKBLOOM_LESSER names what is
 // taken, separated by commas. test_lesser_devices.py builds and uses it.
 #define _GNU_SOURCE
+#define VK_ENABLE_BETA_EXTENSIONS  // the portability subset
 #include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -8,7 +9,10 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
+// clang-format off: the second one leaves out what the first one has
+#include <vulkan/vulkan.h>
 #include <vulkan/vk_layer.h>
+// clang-format on
 
 #define INSTANCE_FUNCTIONS(FUNCTION) \
     FUNCTION(vkCreateDevice) \
@@ -96,6 +100,8 @@ static void lower_limits(VkPhysicalDeviceLimits *limits)
     lower(&limits->maxPerStageDescriptorUniformBuffers, 12);
     lower(&limits->maxPerStageDescriptorSampledImages, 16);
     lower(&limits->maxPerStageDescriptorStorageImages, 4);
+    lower(&limits->maxPerStageDescriptorStorageBuffers, 4);
+    lower(&limits->maxDescriptorSetStorageBuffers, 24);
     lower(&limits->maxPerStageResources, 128);
     lower(&limits->maxDescriptorSetSamplers, 96);
     lower(&limits->maxDescriptorSetUniformBuffers, 72);
@@ -112,6 +118,13 @@ static void lower_limits(VkPhysicalDeviceLimits *limits)
     lower(&limits->maxMemoryAllocationCount, 4096);
     lower(&limits->maxSamplerAllocationCount, 4000);
     raise_to(&limits->minUniformBufferOffsetAlignment, 256);
+    raise_to(&limits->minStorageBufferOffsetAlignment, 256);
+    raise_to(&limits->minTexelBufferOffsetAlignment, 256);
+    raise_to(&limits->optimalBufferCopyOffsetAlignment, 256);
+    raise_to(&limits->optimalBufferCopyRowPitchAlignment, 256);
+    lower(&limits->maxBoundDescriptorSets, 4);
+    lower(&limits->maxPushConstantsSize, 128);
+    lower(&limits->maxImageArrayLayers, 256);
     raise_to(&limits->nonCoherentAtomSize, 256);
 }
 
@@ -154,6 +167,8 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
         properties->limits.maxPerStageDescriptorStorageImages = 0;
     if (lacks("indices"))
         properties->limits.maxDrawIndexedIndexValue = 9;
+    if (lacks("allocations"))
+        properties->limits.maxMemoryAllocationCount = 24;
     // Less than the largest image of the test has.
     if (lacks("bands"))
         lower(&properties->limits.maxStorageBufferRange, 1 << 20);
@@ -188,8 +203,14 @@ static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
     if (lacks("gpus"))
         change_id(physical, properties->pNext);
     for (VkBaseOutStructure *next = properties->pNext; next; next = next->pNext)
-        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES
-            && is_nonconformant(physical))
+        if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PORTABILITY_SUBSET_PROPERTIES_KHR)
+            ((VkPhysicalDevicePortabilitySubsetPropertiesKHR *)next)
+                ->minVertexInputBindingStrideAlignment = 4;
+        else if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES
+                 && lacks("limits"))
+            ((VkPhysicalDeviceSubgroupProperties *)next)->subgroupSize = 64;
+        else if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES
+                 && is_nonconformant(physical))
             ((VkPhysicalDeviceDriverProperties *)next)->conformanceVersion =
                 (VkConformanceVersion){0};
         else if (next->sType
@@ -228,6 +249,11 @@ static void change_format(VkFormat format, VkFormatProperties *properties)
         taken |= VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT;
     if (format == VK_FORMAT_R32G32B32A32_SFLOAT && lacks("filter"))
         taken |= VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT;
+    if ((format == VK_FORMAT_R8G8B8A8_UNORM && lacks("store8"))
+        || (format == VK_FORMAT_R16G16B16A16_SFLOAT && lacks("store16"))
+        || (format == VK_FORMAT_R32G32B32A32_SFLOAT && lacks("store32"))
+        || (format == VK_FORMAT_R32_SFLOAT && lacks("store1")))
+        taken |= VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
     if (format == VK_FORMAT_D32_SFLOAT && lacks("depth"))
         taken |= VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT;
     properties->linearTilingFeatures &= ~taken;
@@ -282,10 +308,14 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, 
     VkResult result =
         below.vkEnumerateDeviceExtensionProperties(physical, layer, count, extensions);
 
-    if (lacks("waits") && (!extensions || *count < room)) {
-        if (extensions)
-            extensions[*count] =
-                (VkExtensionProperties){VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME, 1};
+    const char *added = lacks("waits")       ? VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME
+                      : lacks("portability") ? VK_KHR_PORTABILITY_SUBSET_EXTENSION_NAME
+                                             : NULL;
+    if (added && (!extensions || *count < room)) {
+        if (extensions) {
+            extensions[*count] = (VkExtensionProperties){.specVersion = 1};
+            strcpy(extensions[*count].extensionName, added);
+        }
         ++*count;
     }
     if (lacks("gpus") && extensions && *count > 0)
@@ -314,8 +344,11 @@ static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
     if (!lacks("memory"))
         return;
     memory->memoryTypeCount = TYPE_COUNT;
+    memory->memoryHeapCount = 2;
+    memory->memoryHeaps[1] = (VkMemoryHeap){.size = memory->memoryHeaps[0].size};
+    memory->memoryHeaps[0].size /= 2;
     for (int i = 0; i < TYPE_COUNT; ++i)
-        memory->memoryTypes[i] = (VkMemoryType){.propertyFlags = flags[i]};
+        memory->memoryTypes[i] = (VkMemoryType){flags[i], i != DEVICE_TYPE};
 }
 
 static VKAPI_ATTR void VKAPI_CALL get_memory(VkPhysicalDevice physical,
@@ -589,10 +622,16 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     changed.ppEnabledExtensionNames = kept;
     changed.enabledExtensionCount = 0;
     for (uint32_t i = 0; i < info->enabledExtensionCount; ++i)
-        if (!lacks("waits")
-            || strcmp(info->ppEnabledExtensionNames[i], VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME)
+        if ((!lacks("waits")
+             || strcmp(info->ppEnabledExtensionNames[i],
+                       VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME)
+                    != 0)
+            && strcmp(info->ppEnabledExtensionNames[i], VK_KHR_PORTABILITY_SUBSET_EXTENSION_NAME)
                    != 0)
             kept[changed.enabledExtensionCount++] = info->ppEnabledExtensionNames[i];
+    // A device that has the extension must be created with it.
+    if (lacks("portability") && changed.enabledExtensionCount == info->enabledExtensionCount)
+        return VK_ERROR_INITIALIZATION_FAILED;
     VkResult result = below.vkCreateDevice(physical, &changed, callbacks, created);
 #define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkAllocateMemory) {

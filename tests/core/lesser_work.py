@@ -40,6 +40,34 @@ LARGE = (600, 500)
 LARGE_RGB = (704, 500)
 
 
+def custom(bindings: str = "", names: str = "", threads: str = "8 8", shared: int = 1) -> str:
+    """Return a file of one compute pass that needs these."""
+    binds = "".join(f"//!BIND {name}\n" for name in names.split())
+    return f"""{bindings}//!HOOK MAIN
+//!BIND GLOW
+{binds}//!COMPUTE {threads}
+//!SAVE BLOOM
+shared vec4 kept[{shared}];
+void hook() {{
+    kept[gl_LocalInvocationIndex % {shared}] = GLOW_tex(GLOW_pos);
+    barrier();
+    imageStore(out_image, ivec2(gl_GlobalInvocationID), kept[0]);
+}}
+"""
+
+
+BUFFER = "//!BUFFER b{0}\n//!VAR float v{0}\n//!STORAGE\n\n"
+IMAGE = "//!TEXTURE t{0}\n//!SIZE 4 4\n//!FORMAT r32f\n//!STORAGE\n\n"
+#: Methods from files; the first one needs no more than every device has.
+CUSTOM = {
+    "small": custom("".join(map(BUFFER.format, range(4))), "b0 b1 b2 b3", "16 8", 1024),
+    "buffers": custom("".join(map(BUFFER.format, range(5))), "b0 b1 b2 b3 b4"),
+    "images": custom("".join(map(IMAGE.format, range(4))), "t0 t1 t2 t3"),
+    "threads": custom(threads="16 16"),
+    "shared": custom(shared=1025),
+}
+
+
 def use_handles(renderer: Renderer) -> None:
     """One of each size and dtype, more than have memory at once, each used twice."""
     images = [picture(28 + i, 20, 3 + i % 2, dtype) for dtype in DTYPES for i in range(3)]
@@ -111,6 +139,9 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
     for method in (vkbloom.BevyBloom(max_mip_dimension=16), vkbloom.FilamentBloom(resolution=16)):
         attempt("wide", lambda: apply_wide(renderer, method))  # noqa: B023  called here
+    for label, text in CUSTOM.items() if "custom" in sys.argv else ():
+        loaded = vkbloom.load_method(text, name=label)
+        attempt(f"custom {label}", lambda: renderer.apply(picture(28, 20, 3), loaded()))  # noqa: B023
     for size in ((6000, 1), (1, 6000)):
         attempt(f"{size[0]} x {size[1]}", lambda: renderer.render(scene, None, size))  # noqa: B023
     return wrong

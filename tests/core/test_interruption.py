@@ -6,6 +6,8 @@ import gc
 import math
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 import weakref
@@ -481,6 +483,45 @@ def test_a_forked_process(how: str, renderer: Renderer) -> None:
     if how == "exit" and renderer.info.type != "cpu":
         pytest.skip("drivers of GPUs may not end in a child (docs/robustness.md, Forks)")
     assert output("-c", CHILD, how) == "child done\nparent done\n"
+
+
+# Of a process with the id 1, whose child has the id 1 in a namespace of its own.
+SAME_ID = """
+import ctypes, os
+import numpy as np
+import vkbloom
+
+image = np.ones((8, 8, 3), np.float32)
+renderer = vkbloom.Renderer("software")
+assert os.getpid() == 1
+assert ctypes.CDLL(None).unshare(0x20000000) == 0  # CLONE_NEWPID
+child = os.fork()
+if child == 0:
+    try:
+        renderer.apply(image)
+    except ValueError as error:
+        print(os.getpid(), str(error).split(";")[0], flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+"""
+
+
+@UNIX
+@LEAVES_BEHIND
+def test_a_forked_process_with_the_id_of_its_parent() -> None:
+    """As containers have it. Regression: the child used its parent's device."""
+    isolate = ("unshare", "--pid", "--fork", "--kill-child")
+    if subprocess.run([*isolate, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this system gives the tests no namespace of process ids")
+    done = subprocess.run(
+        [*isolate, sys.executable, "-c", SAME_ID],
+        env={**os.environ, "VKBLOOM_TIMEOUT": "5"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    told = "1 the renderer was opened in another process, from which this one was forked\n"
+    assert (done.stdout, done.stderr) == (told, "")
 
 
 # Prints the error of a child whose driver opens no device.

@@ -15,18 +15,12 @@ from typing import Any
 
 import pytest
 
-from tests.core.builds import ROOT, compiler, require_header
-from tests.exhaustive import EXHAUSTIVE
-from tests.processes import python
+from tests.core.builds import ROOT, build_layer, layer_variables
+from tests.exhaustive import EXHAUSTIVE, some
+from tests.processes import output, python
 from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("lesser_device.c")
-
-# The folder of the validation layer, which must come first to be above the layer of these tests.
-EXPLICIT_LAYERS = tuple(
-    str(folder / "vulkan/explicit_layer.d")
-    for folder in (Path("/usr/share"), Path("/usr/local/share"), Path("/etc"))
-)
 
 pytestmark = [
     pytest.mark.skipif(
@@ -34,6 +28,7 @@ pytestmark = [
     ),
 ]
 
+LESS_WORK = ("whole", "smaller", "pyramid", "gathered", "handles", "bands")
 #: The expected errors, by the names in lesser_work.py.
 LAYERS = {
     "layers float32": "Error: .* cannot add up layers in rgba32float images, but in rgba16float"
@@ -49,27 +44,7 @@ def too_large(most: int) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the layer; return the folder of its manifest."""
-    require_header("vulkan/vk_layer.h")
-    folder = tmp_path_factory.mktemp("layer")
-    library = folder / "lesser_device.so"
-    subprocess.run(
-        [
-            *(*compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"),
-            *("-fvisibility=hidden", str(SOURCE), "-o", str(library)),
-        ],
-        check=True,
-    )
-    about = {
-        "name": "VK_LAYER_VKBLOOM_lesser_device",
-        "type": "GLOBAL",
-        "library_path": str(library),
-        "api_version": "1.3.0",
-        "implementation_version": "1",
-        "description": "The device below with less than it has",
-    }
-    manifest = {"file_format_version": "1.2.0", "layer": about}
-    (folder / "lesser_device.json").write_text(json.dumps(manifest))
-    return folder
+    return build_layer(SOURCE, tmp_path_factory.mktemp("layer"))
 
 
 @pytest.fixture(scope="module")
@@ -78,18 +53,19 @@ def name(software: AdapterInfo) -> str:
     return software.name
 
 
+def lavapipes() -> list[Path]:
+    manifests = list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
+    return manifests or pytest.skip("lavapipe is not installed")
+
+
 WORK = ("-m", "tests.core.lesser_work")
 
 
 def run(
     layer: Path, name: str, lesser: str, program: tuple[str, ...] = WORK, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    folders = (os.environ.get("VK_LAYER_PATH"), *EXPLICIT_LAYERS)
     variables = {
-        "VK_LAYER_PATH": os.pathsep.join(filter(None, (*folders, str(layer)))),
-        "VK_INSTANCE_LAYERS": os.pathsep.join(
-            ("VK_LAYER_KHRONOS_validation", "VK_LAYER_VKBLOOM_lesser_device")
-        ),
+        **layer_variables(layer, "VK_LAYER_VKBLOOM_lesser_device"),
         "VKBLOOM_LESSER": lesser,
         "VKBLOOM_TEST_NAME": name,
         "VKBLOOM_CACHE_DIR": "",
@@ -109,7 +85,7 @@ LESSER: list[tuple[str, dict[str, str]]] = [
     ("high,storage", too_large(5000)),
     # Memory of the device's own, and the host's, which is coherent or cached; a buffer does not
     # reach all rows of a large image.
-    ("cpu,memory,bands", {}),
+    ("cpu,memory,bands,portability", {}),
     # Images of single floats are neither blended nor filtered; a buffer does not reach all rows
     # of a large array, to which the last pass stores.
     ("blend,filter,bands", {**LAYERS, **SKY}),
@@ -132,6 +108,56 @@ def test_lesser_devices(layer: Path, name: str, lesser: str, errors: dict[str, s
     taken = lesser.split(",")
     assert result["type"] == ("discrete" if "cpu" in taken else "cpu")
     assert result["timed"] is ("timestamps" not in taken)
+
+
+#: What methods from files need beyond the least of all devices (lesser_work.py).
+CUSTOM = {
+    "buffers": "5 storage buffers; .* allows 4 .maxPerStageDescriptorStorageBuffers",
+    "images": "5 storage images; .* allows 4 .maxPerStageDescriptorStorageImages",
+    "threads": "256 threads of a workgroup; .* allows 128 .maxComputeWorkGroupInvocations",
+    "shared": "16400 bytes of shared memory; .* allows 16384 .maxComputeSharedMemorySize",
+}
+
+
+def test_custom_methods_name_the_limit_that_they_exceed(layer: Path, name: str) -> None:
+    results = []
+    for lesser in ("cpu,limits", "cpu"):
+        done = run(layer, name, lesser, (*WORK, "custom"))
+        assert done.returncode == 0, done.stderr
+        results.append(json.loads(done.stdout)["wrong"])
+    assert [*results[0]] == [f"custom {name}" for name in CUSTOM]
+    for case, words in CUSTOM.items():
+        error = results[0][f"custom {case}"]
+        assert re.search(f"^ValueError: passes: bloom needs {words}", error), error
+    assert results[1] == {}
+
+
+def test_more_allocations_than_the_device_allows(layer: Path, name: str) -> None:
+    done = run(layer, name, "allocations", (*WORK, "handles"))
+    (error,) = json.loads(done.stdout)["wrong"].values()
+    assert re.search("allows 24 allocations .maxMemoryAllocationCount.; delete", error)
+
+
+@pytest.mark.parametrize("format", some(["store8", "store16", "store32", "store1"], 2))
+def test_no_storage_of_a_format(layer: Path, name: str, format: str) -> None:
+    """All workloads are drawn."""
+    done = run(layer, name, f"cpu,{format}", (*WORK, *LESS_WORK))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["wrong"] == {}
+    variable = {"VKBLOOM_VARIANT": "gpu"}
+    done = run(layer, name, f"cpu,{format}", (*WORK, "whole"), **variable)
+    assert "compute shaders of" in done.stderr
+
+
+def test_an_adapter_of_the_portability_subset_is_found(tmp_path: Path) -> None:
+    """The loader hides such drivers, MoltenVK among them, unless an instance asks for them."""
+    manifest = json.loads(lavapipes()[0].read_text())
+    manifest["ICD"]["is_portability_driver"] = True
+    file = tmp_path / "portable.json"
+    file.write_text(json.dumps(manifest))
+    variables = dict.fromkeys(("VK_DRIVER_FILES", "VK_ICD_FILENAMES"), str(file))
+    program = "import vkbloom; print(*(one.type for one in vkbloom.adapters()))"
+    assert output("-c", program, VKBLOOM_DRIVER="system", **variables) == "cpu\n"
 
 
 def test_no_depth(layer: Path, name: str) -> None:
@@ -413,9 +439,7 @@ def check_choices(
     layer: Path, tmp_path: Path, lesser: str, choices: dict[str, str], visible: str | None = None
 ) -> None:
     """Check what each choice opens of the software adapter twice, as two devices."""
-    manifests = list(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
-    if not manifests:
-        pytest.skip("lavapipe is not installed")
+    manifests = lavapipes()
     twin = tmp_path / "twin.json"
     twin.write_text(manifests[0].read_text())
     drivers = os.pathsep.join((str(manifests[0]), str(twin)))

@@ -33,6 +33,7 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "tools/requirements.py": ("all", "numpy"),
     "tools/run_notebooks.py": ("", "nbclient"),
     "tools/soak.py": ("20", "numpy"),
+    "tools/where_it_has_run.py": ("--out .", "numpy"),
     "tools/tables/write.py": ("--quick --out .", "skimage"),
 }
 
@@ -54,6 +55,7 @@ ELSEWHERE: Final = {
     "tools/free_threaded/": "Makefile",
     "tools/fuzz/": "tests/io/test_fuzz.py",
     "tools/libplacebo/": "Makefile",
+    "tools/mesa_backports.sh": "tests/device/amd_families.py",
     "tools/renderer_memory.py": "tests/core/test_lifetime.py",
     "tools/sanitize.sh": "Makefile",
     "tools/sanitizer_report.py": "tools/sanitize.sh",

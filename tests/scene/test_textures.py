@@ -417,7 +417,7 @@ def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
 
 BODY = panel((4, 4))
 RAW_BODY = (BODY.vertices, BODY.indices, None, BODY.texcoords, ((12, 0, 0),))
-RAW_WHITE = (WHITE.levels, "repeat", "repeat", "linear", "linear", "linear")
+RAW_WHITE = (WHITE.levels, 0, 0, 1, 1, 1)
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "textures"))

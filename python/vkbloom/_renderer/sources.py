@@ -208,6 +208,11 @@ def scene_arguments(
     )
 
 
+#: As Vulkan numbers them.
+_ADDRESS_MODES = ("repeat", "mirror-repeat", "clamp-to-edge")
+_FILTERS = ("nearest", "linear")
+
+
 def _scene_arrays(scene: Scene) -> Any:
     """Return the scene's meshes, sky and textures."""
     # Textures by identity, not by content: each is uploaded once.
@@ -218,10 +223,8 @@ def _scene_arrays(scene: Scene) -> Any:
     textures = tuple(
         (
             texture.levels,
-            *texture.address_mode,
-            texture.mag_filter,
-            texture.min_filter,
-            texture.mipmap_filter,
+            *map(_ADDRESS_MODES.index, texture.address_mode),
+            *map(_FILTERS.index, (texture.mag_filter, texture.min_filter, texture.mipmap_filter)),
         )
         for texture in numbers
     )
