@@ -38,7 +38,7 @@ from vkbloom import (
 )
 from vkbloom.reference import _bevy as bevy
 from vkbloom.reference import _kino as kino
-from vkbloom.reference import _unreal as unreal
+from vkbloom.reference import _three as three
 from vkbloom.reference import _urp as urp
 
 Array = NDArray[Any]
@@ -276,17 +276,18 @@ def test_the_cubic_filter_is_the_b_spline() -> None:
 # --- three.js ---
 
 
-def test_unreals_sizes_are_rounded() -> None:
+def test_threes_sizes_are_rounded() -> None:
     framebuffers = reference.passes(np.zeros((90, 77, 1)), ThreeBloom())
     sizes = [a.shape[:2] for name, a in framebuffers.items() if name.startswith("down")]
     assert sizes == [(45, 39), (23, 20), (12, 10), (6, 5), (3, 3)]
     assert framebuffers["up_0"].shape == framebuffers["bright"].shape == (45, 39, 1)
 
 
-def test_unreals_kernels_are_the_published_ones() -> None:
-    """Their sums, worked out from the formula in UnrealBloomPass.js."""
-    sums = [sum(weight for _, weight in unreal._kernel(k)) for k in range(5)]
-    assert_allclose(sums, [0.99454, 0.99577, 0.99624, 0.99649, 0.99665], atol=1e-5)
+def test_threes_kernels_are_the_published_ones() -> None:
+    """Their sums, worked out from the formula in UnrealBloomPass.js; samples of two taps add up."""
+    for settings in (ThreeBloom(), ThreeBloom(variant="r187")):
+        sums = [sum(weight for _, weight in three._taps(k, settings)) for k in range(5)]
+        assert_allclose(sums, [0.99454, 0.99577, 0.99624, 0.99649, 0.99665], atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -97,9 +97,9 @@ def composite(
     return composite_checked(image, light, settings, stored, share)
 
 
-def strength_of(settings: Settings) -> float:
+def strength_of(settings: Settings) -> Any:
     """Return the factor of the bloom; Babylon's weight is a field of its own."""
-    return settings.intensity * float(getattr(settings, "weight", 1.0))
+    return settings.intensity * getattr(settings, "weight", 1.0)
 
 
 def composite_checked(

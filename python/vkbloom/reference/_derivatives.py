@@ -30,7 +30,10 @@ __all__ = [
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
-    {"anamorphism", "bloom_scale", "jitter", "pixels_per_degree", "size", "sun_position"}
+    {
+        *("anamorphic_ratio", "anamorphism", "bloom_scale", "diffusion", "jitter", "kernel"),
+        *("pixels_per_degree", "resolution_scale", "scale", "size", "sun_position"),
+    }
 )
 
 

@@ -7,7 +7,7 @@ PostProcessing/Shaders/Sampling.hlsl, PostProcessing/Runtime/Effects/Bloom.cs.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -85,10 +85,10 @@ def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
     return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
 
 
-def _linear(value: float) -> float:
+def _linear(value: Any) -> Any:
     """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
     if value > 1:
-        return float(value**2.2)
+        return value**2.2
     return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
 
 
