@@ -87,20 +87,6 @@ bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct v
                      levels->source->final, true, bloom, error);
 }
 
-struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
-                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
-
-    row.reads[0] = from;
-    row.read_count = 1;
-    // Filtered in the shader: lavapipe's sampler keeps 8 bits of the position, and the errors of a
-    // chain add up.
-    row.constants.sampling = SAMPLING_FETCH;
-    row.band_rows = VKB_BAND_ANY_ROW;
-    return row;
-}
-
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
     row->params.prefilter.step_x = (float)step_x;

@@ -69,7 +69,8 @@ def smooth_step(share: Array) -> Array:
 
 def with_alpha(colour: Sequence[float], channels: int) -> Array:
     """Return the factors of an image's channels: of rgb the colour, of a fourth channel 1."""
-    return np.array([*colour, 1.0])[:channels]
+    factors: Array = np.concatenate([colour, np.ones(1)])[:channels]
+    return factors
 
 
 def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
