@@ -417,7 +417,7 @@
 #define BLUR_VEC4S  17
 // Taps of a half-kernel whose offsets are given, where TAP_COUNT is set.
 #define OFFSET_VEC4S 3
-#define MAX_LAYERS  8
+#define MAX_LAYERS   8
 // The largest scale and strength of a layer; the smallest is 0.
 #define LAYER_LIMIT 16.0
 
