@@ -18,7 +18,7 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.processes import python
 
-pytestmark = pytest.mark.usefixtures("kept_renderers")
+pytestmark = pytest.mark.usefixtures("kept_renderers", "software")
 
 PATH = ROOT / "examples" / "training_pairs.py"
 

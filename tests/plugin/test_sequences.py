@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from vkbloom import write
+from vkbloom._cli.program import program
 from vkbloom.testing import flash, flicker
 
 FPS = 240
@@ -84,3 +89,16 @@ def test_contrast_at_each_frequency() -> None:
     assert found.frequencies[peak] == pytest.approx(6)
     assert found.contrast[peak] == pytest.approx(0.1, rel=1e-4)
     assert np.delete(found.contrast, peak).max() < 1e-4
+
+
+def test_check_judges_files(tmp_path: Path) -> None:
+    for number, light in enumerate(flashing(6, 0.4, seconds=1)[:120]):
+        write(tmp_path / f"f.{number:04d}.exr", np.full((4, 6, 3), light, np.float32))
+    words = ["check", "--sequence", str(tmp_path / "f.%04d.exr"), "--fps", str(FPS)]
+    done = CliRunner().invoke(program, [*words, "--json"])
+    assert done.exit_code == 1, done.output
+    found = json.loads(done.stdout)
+    assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
+    assert "general flashes: fails" in CliRunner().invoke(program, words).stdout
+    refused = CliRunner().invoke(program, [*words, "--preset", "kino"])
+    assert (refused.exit_code, "without a bloom" in refused.stderr) == (2, True)

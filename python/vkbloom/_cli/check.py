@@ -16,6 +16,7 @@ import click
 from rich.console import Console
 
 import vkbloom
+from vkbloom._cli.check_sequence import judge
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
@@ -109,6 +110,26 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     callback=_laws,
     help="Exit status 1 if one of these laws is not held.",
 )
+@click.option(
+    "--sequence",
+    metavar="PATTERN",
+    help="Judge frames in time instead, such as f.%04d.exr: flashes by WCAG 2.2, and flicker. "
+    "Exit status 1 if the flashes are too many.",
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(0, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="Frames a second of --sequence.",
+)
+@click.option(
+    "--degrees",
+    type=click.FloatRange(0, 360, min_open=True),
+    default=40.0,
+    show_default=True,
+    help="Width of the picture of --sequence in the field of view.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @click.option(
     "--html", "page", metavar="FILE", type=click.Path(), help="Write a page with pictures."
@@ -127,6 +148,9 @@ def command(
     measured: tuple[int, int],
     size: tuple[int, int],
     require: tuple[str, ...],
+    sequence: str | None,
+    fps: float,
+    degrees: float,
     as_json: bool,
     page: str | None,
     adapter: str,
@@ -135,7 +159,8 @@ def command(
 ) -> int:
     """Measure what a bloom is worth.
 
-    FILE is a custom method; its parameters are options. Or give --preset, --method, or --command.
+    FILE is a custom method; its parameters are options. Or give --preset, --method, --command, or
+    --sequence.
     Prints the passes and their times; each law, held or by how much it is not; energy, point
     spread, stability of a moving light, response to the resolution, veiling glare index, the
     differences from the twin, and the nearest preset. Laws are measured with buffers of 32-bit
@@ -143,6 +168,10 @@ def command(
 
     The exit status is 1 if a law of --require is not held, or was not tested.
     """
+    if sequence is not None:
+        if file is not None or program is not None or given("preset") or given("method"):
+            raise click.UsageError("--sequence judges files alone, without a bloom")
+        return judge(sequence, fps, degrees, as_json=as_json)
     _check_choice(file, program, twin)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:

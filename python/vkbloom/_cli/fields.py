@@ -267,11 +267,11 @@ class FieldOptions(click.Option):
                         continue
                     if METHODS.is_added(label) and any(
                         (one.kind, one.choices) != (info.kind, info.choices)
-                        for one in fields.get(name, {}).values()
+                        for one in fields.get(info.option, {}).values()
                     ):
                         # A custom method was loaded for this call: its field has the option.
-                        del fields[name]
-                    fields.setdefault(name, {})[label] = info
+                        del fields[info.option]
+                    fields.setdefault(info.option, {})[label] = info
             made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
             self._made = kinds, made
         return self._made[1]

@@ -30,7 +30,7 @@ _HASHES: Final = re.compile(r"#{2,}|(?<=[._])#(?=\.)")
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
     target = _with_number(target)
-    found = [pair for source in sources for pair in _expanded(source)]
+    found = [pair for source in sources for pair in expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
     is_pattern = _NUMBER.search(os.path.basename(target)) is not None
     is_single = len(sources) == 1 and found == [(sources[0], None)]
@@ -102,7 +102,7 @@ def _with_number(name: str) -> str:
     return os.path.join(folder, _HASHES.sub(lambda run: f"%0{len(run[0])}d", base, count=1))
 
 
-def _expanded(source: str) -> list[tuple[str, int | None]]:
+def expanded(source: str) -> list[tuple[str, int | None]]:
     """Return the files of a word, with their numbers if the word is a pattern."""
     # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):

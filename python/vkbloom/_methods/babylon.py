@@ -61,7 +61,7 @@ class BabylonBloom(Settings):
     composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", fixed="the weight is the factor of the bloom")
     format: BloomFormat | None = "rgba16float"
-    kernel: float = number_field(default=64.0, range=(1, 512))
+    kernel: float = number_field(default=64.0, range=(1, 512), option="kernel-width")
     scale: float = number_field(default=0.5, range=(0.01, 1))
     weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))
 
