@@ -128,6 +128,6 @@ def test_completion(tmp_path: Path, shell: str) -> None:
     assert [set(part.split()) for part in done.stdout.split("---\n")] == [
         {"glares"},
         {"--threshold", "--threshold-scale"},
-        {"unity_urp", "unity_hdrp"},
+        {"unity_urp", "unity_urp_kawase", "unity_urp_dual", "unity_hdrp", "unity_ppv2"},
         set(),
     ], done.stderr

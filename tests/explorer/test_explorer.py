@@ -75,6 +75,10 @@ class TestControls:
                 "pyramid": {"level_weights"},
                 "separable": {"weights", "layers"},
                 "three": {"knee"},
+                "post_processing": {"color"},
+                "pmndrs": {"knee"},
+                "babylon": {"knee"},
+                "playcanvas": {"knee"},
             }
             assert without == {"method", "bloom_size"} | refused.get(name, set())
             first = [field["name"] for field in method["fields"] if field["first"]]

@@ -22,12 +22,10 @@ class BabylonBloom(Settings):
     scale : float
         Size of the blurred image as a share of the frame's, 0.01 to 1.
     weight : float
-        Factor of the bloom in ``final``, 0 to 65504.
+        Factor of the bloom in ``final``, 0 to 65504; `intensity` multiplies it.
     threshold : float or None
         A colour is kept if its luminance is at least threshold^(1 / 2.2), 0 to 65504.
     composite : {"add"}
-    intensity : float
-        1: `weight` takes its place.
     **settings
         The other fields of `Settings`; there is no knee.
 
@@ -59,7 +57,6 @@ class BabylonBloom(Settings):
     threshold: float | None = number_field("threshold", default=0.9, slider=(0, 4))
     knee: float = no_knee("babylon")
     composite: Composite = choice_field("composite", ("add",))
-    intensity: float = number_field("intensity", fixed="the weight is the factor of the bloom")
     format: BloomFormat | None = "rgba16float"
     kernel: float = number_field(default=64.0, range=(1, 512), option="kernel-width")
     scale: float = number_field(default=0.5, range=(0.01, 1))
@@ -89,6 +86,6 @@ class BabylonBloom(Settings):
             "kernel": None,
             "scale_x": self.scale,
             "weights": self.blur_weights,
-            "intensity": self.weight,
+            "intensity": self.intensity * self.weight,
         }
         return settings_block(self.method, vars(self) | values)
