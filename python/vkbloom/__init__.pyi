@@ -36,6 +36,7 @@ from ._methods.pygfx import PygfxBloom
 from ._methods.separable import Separable, gaussian_weights
 from ._methods.three import ThreeBloom
 from ._methods.unity import HdrpBloom, PostProcessingBloom, UrpBloom
+from ._methods.unreal import UnrealBloom
 from ._renderer.adapter import AdapterInfo, adapters
 from ._renderer.default import apply, default_renderer, render
 from ._renderer.device_arrays import DeviceArray
@@ -86,6 +87,7 @@ __all__ = [
     "ShaderError",
     "Streaks",
     "ThreeBloom",
+    "UnrealBloom",
     "UrpBloom",
     "ValidationError",
     "adapters",

@@ -19,6 +19,7 @@ from vkbloom import (
     Renderer,
     Settings,
     ThreeBloom,
+    UnrealBloom,
     UrpBloom,
     reference,
 )
@@ -42,13 +43,15 @@ FRAMES: dict[str, tuple[Settings, float]] = {
         ),
         2**0.1 - 1,
     ),
+    "unreal_standard/0_odd_f4": (UnrealBloom(), 0.675),
+    "unreal_standard/1_wide_f4": (UnrealBloom(), 0.675),
     "babylon/0_odd_f4": (BabylonBloom(), 1.0),
     "babylon/3_even_f4": (BabylonBloom(threshold=0.3, kernel=20.0), 1.0),
     "playcanvas/0_odd_f4": (PlayCanvasBloom(), 1.0),
     "playcanvas/11_wide_f4": (PlayCanvasBloom(blur_level=3, threshold=4.0), 1.0),
 }
-#: What the package does not have: tints of three.js' levels; blooms of Unreal, darktable and film.
-MISSING = {"three_r187/6_even_f4", "unreal_standard", "darktable", "agx_halation"}
+#: What the package does not have: tints of three.js' levels; blooms of darktable and film.
+MISSING = {"three_r187/6_even_f4", "darktable", "agx_halation"}
 
 
 @pytest.fixture(scope="session")

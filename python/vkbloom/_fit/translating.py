@@ -35,6 +35,7 @@ _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "hdrp": ("scatter",),
     "three": ("threshold", "radius"),
     "post_processing": ("threshold", "diffusion"),
+    "unreal": ("size_scale",),
     "pmndrs": ("threshold", "radius"),
     "babylon": ("threshold", "kernel"),
     "playcanvas": ("threshold", "blur_level"),

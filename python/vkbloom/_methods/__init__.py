@@ -30,6 +30,7 @@ METHODS.supply(
         "blender": "blender:BlenderGlare",
         "pygfx": "pygfx:PygfxBloom",
         "post_processing": "unity:PostProcessingBloom",
+        "unreal": "unreal:UnrealBloom",
         "pmndrs": "pmndrs:PmndrsBloom",
         "babylon": "babylon:BabylonBloom",
         "playcanvas": "playcanvas:PlayCanvasBloom",

@@ -124,6 +124,11 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "a sum of levels of what is above 1",
         "Unity-Technologies/PostProcessing @ 32c3155207d3",
     ),
+    "unreal": Preset(
+        lambda: METHODS["unreal"](),
+        "six Gaussians of the complete picture, up to wider than it",
+        "Epic Games, Bloom (Unreal Engine 4.27), by its documentation",
+    ),
     "pmndrs": Preset(
         lambda: METHODS["pmndrs"](),
         "eight levels of what is above 1, as a screen",

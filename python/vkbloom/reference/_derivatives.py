@@ -32,7 +32,16 @@ __all__ = [
 DISCRETE: Final = frozenset(
     {
         *("anamorphic_ratio", "anamorphism", "bloom_scale", "diffusion", "jitter", "kernel"),
-        *("pixels_per_degree", "resolution_scale", "scale", "size", "sun_position"),
+        *(
+            "pixels_per_degree",
+            "resolution_scale",
+            "scale",
+            "size",
+            "size_scale",
+            "sizes",
+            "sun_position",
+            "tints",
+        ),
     }
 )
 

@@ -84,9 +84,9 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     `vkbloom.Settings`.
 
     - `rgb`: ndarray of float64, shape (..., 3) or (..., 4); Alpha is scaled like the colour.
-    - `threshold`: In the units of the image; None keeps everything.
+    - `threshold`: In the units of the image; None and values below 0 keep everything.
     """
-    if threshold is None:
+    if threshold is None or threshold < 0:
         return rgb
     if knee == 0:
         return np.where(luminance(rgb) > threshold, rgb, 0.0)

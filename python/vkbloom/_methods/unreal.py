@@ -1,0 +1,130 @@
+"""Unreal Engine's standard bloom."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._array_cache import kept
+from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._settings.blocks import settings_block
+from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
+from vkbloom._settings.settings import Composite, Settings, no_knee
+
+
+def _read_sizes(sizes: Any) -> tuple[float, ...]:
+    return read_numbers("sizes", sizes, 6, 65504.0)
+
+
+def _read_tints(tints: Any) -> tuple[float, ...]:
+    return read_numbers("tints", tints, 6, 65504.0)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class UnrealBloom(Settings):
+    """Unreal Engine's standard bloom, by its documentation. Nothing of the engine ran.
+
+    Parameters
+    ----------
+    sizes : tuple of 6 floats
+        Diameters of the Gaussians in percent of the frame's width.
+    tints : tuple of 6 floats
+        Factor of each Gaussian.
+    size_scale : float
+        Factor of all sizes, 0 to 64.
+    threshold : float
+        -1, which lets every colour through. Others are not supported.
+    composite : {"add"}
+    intensity : float
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``bloom`` is the convolution of the frame with ``kernel``, the sum of the tints times Gaussians
+    whose sums are 1. The standard deviation is a sixth of the diameter, which is this project's
+    reading of it, and each is cut off at three standard deviations, rounded up to pixels. Outside
+    of the frame are its outermost pixels. The engine blurs at reduced sizes and limits its kernels;
+    this is the formula that it documents.
+
+    Source: Epic Games, "Bloom" (Unreal Engine 4.27), GaussianSumBloomSettings (Python API 5.0).
+
+    Examples
+    --------
+    >>> round(sum(vkbloom.UnrealBloom().tints), 4)
+    0.7947
+    """
+
+    method: ClassVar[str] = "unreal"
+    boundary: ClassVar[str] = "edge"
+    prefilter: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 1.0)
+
+    threshold: float | None = value_field(
+        -1.0, fixed="a threshold of Unreal's standard bloom is not supported"
+    )
+    knee: float = no_knee("unreal")
+    composite: Composite = choice_field("composite", ("add",))
+    intensity: float = number_field("intensity", default=0.675)
+    sizes: tuple[float, ...] = value_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0), read=_read_sizes)
+    tints: tuple[float, ...] = value_field(
+        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), read=_read_tints
+    )
+    size_scale: float = number_field(default=4.0, range=(0, 64))
+
+    def kernel(
+        self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the kernel for a frame in pixels of the bloom buffers, (2 H - 1, 2 W - 1, 3)."""
+        return np.repeat(_plane(self, frame, buffers or frame)[..., np.newaxis], 3, axis=2)
+
+    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
+        """Return the kernel as the core reads it."""
+        return _core_kernel(
+            UnrealBloom(sizes=self.sizes, tints=self.tints, size_scale=self.size_scale),
+            frame,
+            buffers,
+        )
+
+    def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
+        """Return the kernel's width and height, without the kernel."""
+        return 2 * buffers[0] - 1, 2 * buffers[1] - 1
+
+    def _core_block(self) -> bytes:
+        """Return the settings of a convolution."""
+        values = {"threshold": None, "boundary": self.boundary}
+        return settings_block("convolution", vars(self) | values)
+
+
+def _plane(
+    settings: UnrealBloom, frame: tuple[int, int], buffers: tuple[int, int]
+) -> NDArray[np.float64]:
+    lines = []
+    for axis in (1, 0):
+        scale = settings.size_scale * frame[0] / 600 * buffers[axis] / frame[axis]
+        lines.append(np.stack([_line(size * scale, buffers[axis]) for size in settings.sizes]))
+    plane: NDArray[np.float64] = (lines[0] * np.array(settings.tints)[:, np.newaxis]).T @ lines[1]
+    return plane
+
+
+def _line(deviation: float, length: int) -> NDArray[np.float64]:
+    """Return a Gaussian over 2 length - 1 pixels.
+
+    Whatever is further away reads the same outermost pixel as the first and the last of them.
+    """
+    radius = math.ceil(3 * deviation)
+    places = np.arange(-radius, radius + 1)
+    weights = np.exp(-0.5 * (places / deviation) ** 2) if radius else np.ones(1)
+    line = np.zeros(2 * length - 1)
+    np.add.at(line, np.clip(places, 1 - length, length - 1) + length - 1, weights / weights.sum())
+    return line
+
+
+@kept
+def _core_kernel(
+    settings: UnrealBloom, frame: tuple[int, int], buffers: tuple[int, int]
+) -> CoreKernel:
+    return core_kernel(_plane(settings, frame, buffers))
