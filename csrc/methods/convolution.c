@@ -301,3 +301,21 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
     return vkb_convolve(settings, source, same ? &whole : &part, "", graph, bloom, error)
         && (same || vkb_levels_enlarge(&levels, *bloom, 1.0, bloom, error));
 }
+
+// Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.
+bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    struct vkb_bloom_source masked = *source;
+
+    if (source->mask == VKB_NO_IMAGE)
+        return vkb_add_convolution(settings, source, graph, bloom, error);
+    if (!vkb_levels_step(&levels, "masked", 0, source->buffers, &masked.glow, error))
+        return false;
+    // Without a threshold these groups are the image itself.
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, masked.glow);
+    vkb_mask_prefilter(&levels, &row);
+    return vkb_graph_add_pass(graph, &row, error)
+        && vkb_add_convolution(settings, &masked, graph, bloom, error);
+}

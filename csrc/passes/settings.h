@@ -21,6 +21,7 @@
     METHOD(BLENDER, blender, true) \
     METHOD(PYGFX, pygfx, true) \
     METHOD(POST_PROCESSING, post_processing, true) \
+    METHOD(UNREAL, unreal, true) \
     METHOD(PMNDRS, pmndrs, true) \
     METHOD(BABYLON, babylon, true) \
     METHOD(PLAYCANVAS, playcanvas, true) \
@@ -117,7 +118,7 @@ static inline bool vkb_needs_kernel(const struct vkb_settings *settings)
     const int type = settings->choices[VKB_CHOICE_type];
 
     return settings->values.bloom
-        && (settings->method == VKB_METHOD_CONVOLUTION
+        && (settings->method == VKB_METHOD_CONVOLUTION || settings->method == VKB_METHOD_UNREAL
             || (settings->method == VKB_METHOD_BLENDER
                 && (type == TYPE_FOG_GLOW || type == TYPE_KERNEL)));
 }

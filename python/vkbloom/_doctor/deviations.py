@@ -16,6 +16,7 @@ from vkbloom import (
     GodotBloom,
     Pyramid,
     Separable,
+    UnrealBloom,
     reference,
 )
 from vkbloom._settings.settings import Settings
@@ -134,7 +135,7 @@ def _slope(image: NDArray[Any], settings: Settings) -> Limit:
 
 def _is_transform(settings: Settings) -> bool:
     is_fog = isinstance(settings, BlenderGlare) and settings.type == "fog_glow"
-    return is_fog or isinstance(settings, Convolution)
+    return is_fog or isinstance(settings, Convolution | UnrealBloom)
 
 
 def _after_threshold(

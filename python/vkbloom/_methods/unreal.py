@@ -60,11 +60,14 @@ class UnrealBloom(Settings):
     """
 
     method: ClassVar[str] = "unreal"
+    published: ClassVar[bool] = True
     boundary: ClassVar[str] = "edge"
     prefilter: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 1.0)
 
-    threshold: float | None = value_field(
-        -1.0, fixed="a threshold of Unreal's standard bloom is not supported"
+    threshold: float | None = number_field(
+        default=-1.0,
+        range=(-1, 65504),
+        fixed="a threshold of Unreal's standard bloom is not supported",
     )
     knee: float = no_knee("unreal")
     composite: Composite = choice_field("composite", ("add",))
@@ -94,9 +97,9 @@ class UnrealBloom(Settings):
         return 2 * buffers[0] - 1, 2 * buffers[1] - 1
 
     def _core_block(self) -> bytes:
-        """Return the settings of a convolution."""
+        """Return the settings with the core's names and units."""
         values = {"threshold": None, "boundary": self.boundary}
-        return settings_block("convolution", vars(self) | values)
+        return settings_block(self.method, vars(self) | values)
 
 
 def _plane(
