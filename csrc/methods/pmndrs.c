@@ -3,6 +3,8 @@
 #include "methods/methods.h"
 #include "passes/filter.h"
 
+#include <math.h>
+
 static struct vkb_size rounded_half(struct vkb_size size)
 {
     return (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
@@ -36,6 +38,8 @@ bool vkb_add_pmndrs(const struct vkb_settings *settings, const struct vkb_bloom_
         return false;
     struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, from);
     row.constants.node = true;
+    // Not by bands of rows.
+    row.reach = INFINITY;
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;

@@ -195,6 +195,8 @@ BY_FORMULA = {
     # Light leaves the picture, so that a flat one darkens towards its border.
     "spencer_photopic": {"colour"},
     "camera_lens": {"colour"},
+    # Taps outside of the picture are 0, so that it darkens towards its border, too.
+    "pmndrs": {"colour"},
 }
 
 

@@ -20,6 +20,6 @@ def test_a_family_compiles_and_records(tmp_path: Path) -> None:
     found = try_family("navi21", INSTALLED, layers, "few", "planted", "validated")
     assert found["wrong"] == {"shared memory": "65536 bytes, 32768 allowed"}
     assert "RADV NAVI21" in found["adapter"]
-    assert found["count"] > 80
+    assert found["count"] > 60
     assert found["shaders"] > 200
     assert found["vgprs_spilled"] == 0

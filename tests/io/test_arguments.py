@@ -62,7 +62,7 @@ CALLS: dict[str, Callable[[vkbloom.Renderer], object]] = {
     "image: an array is needed, not 'dirt.png'": lambda _: vkbloom.Dirt(image="dirt.png"),
     "radii": lambda _: vkbloom.psf.spencer().encircled_energy(["x"]),
     "reduce: 3": lambda one: vkbloom.grid(IMAGE, axes={"exposure": [2]}, reduce=3, renderer=one),  # type: ignore[arg-type]
-    "axes: {3: [1]}": lambda one: vkbloom.grid(IMAGE, axes={3: [1]}, renderer=one),  # type: ignore[dict-item]
+    "axes: 3": lambda one: vkbloom.grid(IMAGE, axes={3: [1]}, renderer=one),  # type: ignore[dict-item]
     "metadata: 3": lambda _: vkbloom.write("o.png", IMAGE, metadata=3),  # type: ignore[arg-type]
     "path: b'o.png'": lambda _: vkbloom.write(b"o.png", IMAGE),  # type: ignore[arg-type]
     "path: b'i.png'": lambda _: vkbloom.read(b"i.png"),  # type: ignore[call-overload]

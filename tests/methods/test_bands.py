@@ -43,6 +43,10 @@ SETTINGS: dict[str, Settings] = {
 ALIGNED = {"small", "fixed", "godot_4_5", "godot_4_6"}
 
 
+#: Methods that are not made by bands of rows.
+WHOLE = ("post_processing", "pmndrs", "babylon", "playcanvas")
+
+
 @pytest.mark.parametrize(
     ("name", "height", "glows"),
     [
@@ -56,7 +60,7 @@ def test_bands_are_the_whole(renderer: Renderer, name: str, height: int, glows: 
     bloom = BloomByBands.of(renderer._core, settings, image, height, 128)
     # A convolution reaches everywhere, and so do all of Blender's types but one.
     is_far = isinstance(settings, vkbloom.BlenderGlare) and settings.type != "bloom"
-    is_far |= settings.method == "convolution"
+    is_far |= settings.method in ("convolution", "unreal", *WHOLE)
     needs_whole = is_far or (height % 2 and name in ALIGNED)
     assert (bloom is None) == bool(needs_whole)
     if bloom is None:

@@ -86,7 +86,7 @@ class TestRegistered:
         with pytest.raises(click.UsageError, match="has no --haze; give --method haze"):
             settings_of("--haze", "1")
         for command in ("apply", "render", "explore", "grid", "fit"):
-            assert printed(command, "--help").endswith(", haze\n")
+            assert "haze" in printed(command, "--help").split()
             text = printed(command, "--method", "haze", "--help")
             assert "Settings of the method haze:\n  --haze FLOAT" in text
 

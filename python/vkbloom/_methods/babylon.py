@@ -18,7 +18,7 @@ class BabylonBloom(Settings):
     Parameters
     ----------
     kernel : float
-        Width of the blur in pixels of the frame, 1 to 512; times `scale` at most 129.
+        Width of the blur in pixels of the frame, 1 to 256; times `scale` at most 129.
     scale : float
         Size of the blurred image as a share of the frame's, 0.01 to 1.
     weight : float
@@ -58,7 +58,7 @@ class BabylonBloom(Settings):
     knee: float = no_knee("babylon")
     composite: Composite = choice_field("composite", ("add",))
     format: BloomFormat | None = "rgba16float"
-    kernel: float = number_field(default=64.0, range=(1, 512), option="kernel-width")
+    kernel: float = number_field(default=64.0, range=(1, 256), option="kernel-width")
     scale: float = number_field(default=0.5, range=(0.01, 1))
     weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))
 

@@ -31,17 +31,9 @@ __all__ = [
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
     {
-        *("anamorphic_ratio", "anamorphism", "bloom_scale", "diffusion", "jitter", "kernel"),
-        *(
-            "pixels_per_degree",
-            "resolution_scale",
-            "scale",
-            "size",
-            "size_scale",
-            "sizes",
-            "sun_position",
-            "tints",
-        ),
+        *("anamorphic_ratio", "anamorphism", "babylon.kernel", "babylon.scale", "bloom_scale"),
+        *("diffusion", "jitter", "pixels_per_degree", "resolution_scale", "size", "size_scale"),
+        *("sizes", "sun_position", "tints"),
     }
 )
 
@@ -164,10 +156,12 @@ def vjp(
 
 def differentiable(settings: Any) -> dict[str, Any]:
     """Return the values of the real fields with a derivative, by name."""
+    method = getattr(settings, "method", "")
     found = {
         name: getattr(settings, name)
         for name, info in fields_of(type(settings)).items()
-        if name not in DISCRETE and _is_real(getattr(settings, name)) and not info.fixed
+        if not ({name, f"{method}.{name}"} & DISCRETE or info.fixed)
+        and _is_real(getattr(settings, name))
     }
     for place, stage in enumerate(getattr(settings, "glare", ())):
         found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
