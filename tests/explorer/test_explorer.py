@@ -76,6 +76,7 @@ class TestControls:
                 "separable": {"weights", "layers"},
                 "three": {"knee"},
                 "post_processing": {"color"},
+                "unreal": {"knee", "threshold", "sizes", "tints"},
                 "pmndrs": {"knee"},
                 "babylon": {"knee"},
                 "playcanvas": {"knee"},

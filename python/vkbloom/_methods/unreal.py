@@ -37,7 +37,7 @@ class UnrealBloom(Settings):
     size_scale : float
         Factor of all sizes, 0 to 64.
     threshold : float
-        -1, which lets every colour through. Others are not supported.
+        -1, which lets every colour through, of -1 to 65504. Others are not supported.
     composite : {"add"}
     intensity : float
     **settings
@@ -56,7 +56,7 @@ class UnrealBloom(Settings):
     Examples
     --------
     >>> round(sum(vkbloom.UnrealBloom().tints), 4)
-    0.7947
+    0.7951
     """
 
     method: ClassVar[str] = "unreal"

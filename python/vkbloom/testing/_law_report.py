@@ -90,7 +90,7 @@ class LawReport:
     ...     return reference.blur(image, vkbloom.Separable())
     >>> found = testing.report(bloom, size=(64, 64))
     >>> [row.name for row in found.rows if not row.held]
-    ['bounded_fireflies', 'additive', 'energy', 'resolution']
+    ['bounded_fireflies', 'additive', 'energy', 'resolution', 'views']
     >>> found.assert_held("superposition", "gain", "symmetric")
     """
 
