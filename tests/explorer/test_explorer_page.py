@@ -427,7 +427,8 @@ def test_an_image(tab: Page, serve: Any, renderer: Renderer, tmp_path: Path) -> 
         dark = see(page, tmp_path).mean()
         page.get_by_label("view exposure").fill("3")
         deadline = time.monotonic() + PATIENCE
-        while see(page, tmp_path).mean() < 1.2 * dark:
+        # (Colours above 1 keep their hue, so that few pixels become white.)
+        while see(page, tmp_path).mean() < 1.05 * dark:
             assert time.monotonic() < deadline
 
 
