@@ -48,7 +48,7 @@ static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_p
     char name[VKB_NAME_SIZE];
     struct vkb_pass_row row;
 
-    snprintf(name, sizeof name, "%.20s_rows_%u", pass->name, level);
+    snprintf(name, sizeof name, "%.14s_rows_%u", pass->name, level);
     if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, rows, error))
         return false;
     memcpy(&row, pass, sizeof row);
