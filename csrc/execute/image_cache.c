@@ -147,7 +147,7 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
                             "needs",
                             device->adapter.name, pass->name);
         // Plans without a renderer know no limits.
-        if (pass->block == VKB_BLOCK_own && device->handle
+        if (pass->block == VKB_BLOCK_own && device->limits.maxPerStageResources
             && !vkb_limits_check(device, pass, error))
             return false;
     }
