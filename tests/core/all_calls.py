@@ -341,6 +341,8 @@ def play(calls: int) -> Counter[str]:
 
     with ThreadPoolExecutor(THREADS) as pool:
         made = sum(pool.map(work, range(THREADS)), Counter[str]())
+    # At the end of the interpreter it is too late for what they keep.
+    CAPSULES.clear()
     for renderer in renderers:
         renderer.close()
     return made
