@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tests.plugin.faults import every_other_pixel, gaussian
 from vkbloom import Renderer, Separable, reference, testing
 from vkbloom.testing import LawReport, LawRow, Probe
 from vkbloom.testing._law_table import LAWS
@@ -26,10 +27,6 @@ OF_A_BLUR = {"bounded_fireflies", "additive", "resolution", "finite"}
 
 #: And what a bloom does besides that reads other pixels on one side than on the other.
 OF_A_GRID = {"symmetric", "gain", "no_ringing", "colour"}
-
-
-def gaussian(image: Image, sigma: float = 2.0) -> Image:
-    return np.asarray(ndimage.gaussian_filter(image, (sigma, sigma, 0), mode="nearest"))
 
 
 def at_finite(image: Image) -> Image:
@@ -66,12 +63,6 @@ def test_a_gaussian() -> None:
         assert each.held == (each.off <= each.limit)
         assert bool(each.message) == (not each.held)
         assert each.figures[max(each.figures, key=lambda name: each.figures[name] == each.off)] >= 0
-
-
-def every_other_pixel(image: Image) -> Image:
-    kept = np.zeros_like(image)
-    kept[::2, ::2] = 4 * image[::2, ::2]
-    return gaussian(kept, 4.0)
 
 
 def wider_blue(image: Image) -> Image:

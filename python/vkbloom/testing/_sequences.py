@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 __all__ = ["Flash", "Flicker", "flash", "flicker"]
 
@@ -236,8 +237,7 @@ def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[
 def _linear(colours: NDArray[Any]) -> NDArray[np.float64]:
     if colours.dtype.kind == "f":
         return np.clip(np.nan_to_num(colours.astype(np.float64)), 0, 1)
-    share = colours / np.iinfo(colours.dtype).max
-    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return decode_srgb(colours / np.iinfo(colours.dtype).max)
 
 
 def _reduced(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
@@ -302,9 +302,6 @@ def _jod(lights: NDArray[np.float64], fps: float) -> float | None:
         return None
     metric = pycvvdp.cvvdp(display_name="standard_4k", heatmap=None)
     still = np.broadcast_to(lights.mean(axis=0), lights.shape)
-    encoded = [
-        np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
-        for x in (lights, still)
-    ]
+    encoded = [encode_srgb(x).astype(np.float32) for x in (lights, still)]
     jod, _ = metric.predict(*encoded, dim_order="FHWC", frames_per_second=fps)
     return float(jod)

@@ -12,6 +12,7 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
+from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
 
@@ -62,10 +63,7 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
         return {}
     # The core around the peak, since skirts may leave the image on one side.
     core = np.where(plane >= peak * LEVELS[0], plane, 0)
-    y, x = (
-        float(core.sum(axis=axis) @ np.arange(core.shape[1 - axis])) / float(core.sum())
-        for axis in (1, 0)
-    )
+    _, (x, y), _ = moments(core)
     # The nearest border; a contour beyond it is not closed.
     most = min(x, y, plane.shape[1] - 1 - x, plane.shape[0] - 1 - y)
     steps = np.arange(0.0, most, 0.125)
@@ -193,17 +191,13 @@ def _square_figures(
     left, top = at
     image[top : top + _SQUARE, left : left + _SQUARE] = probe.value
     lit = (probe.apply(bloom, image)[0] - probe.apply(bloom, probe.flat(0.0))[0]).mean(axis=2)
-    energy = float(lit.sum())
+    energy, place, variance = moments(lit)
     if not energy > 0:
         fail("assert_sizes", "the bloom of a square is not black", f"its energy is {energy:.3g}")
-    variance, shifts = 0.0, []
-    for axis, first in ((0, left), (1, top)):
-        profile = lit.sum(axis=axis) / energy
-        places = np.arange(len(profile)) - (first + (_SQUARE - 1) / 2)
-        shifts.append(float(profile @ places))
-        variance += float(profile @ (places - shifts[-1]) ** 2) - (_SQUARE**2 - 1) / 12
-    figure("squared_width", variance)
-    return math.sqrt(max(variance, 0.0)), energy, shifts[0], shifts[1]
+    middle = (_SQUARE - 1) / 2
+    squared = variance - 2 * (_SQUARE**2 - 1) / 12
+    figure("squared_width", squared)
+    return math.sqrt(max(squared, 0.0)), energy, place[0] - left - middle, place[1] - top - middle
 
 
 def _bilinear(plane: Image, x: Image, y: Image) -> Image:
