@@ -35,6 +35,26 @@ _PERIOD: Final = 16
 _LARGER: Final = 32
 
 
+@dataclasses.dataclass(frozen=True)
+class _Lights:
+    """The blooms of squares of 3 x 3 pixels, each made once; `dark` is that of a black image."""
+
+    bloom: Bloom
+    probe: Probe
+    dark: Image
+    made: dict[tuple[int, int], tuple[Image, float]] = dataclasses.field(default_factory=dict)
+
+    def spread(self, at: tuple[int, int]) -> tuple[Image, float]:
+        """Return the bloom of a square from a pixel on, less that of black, and its error."""
+        __tracebackhide__ = True
+        if at not in self.made:
+            image = self.probe.flat(0.0)
+            image[at[1] : at[1] + _LIGHT, at[0] : at[0] + _LIGHT] = self.probe.value
+            lit, error = self.probe.apply(self.bloom, image)
+            self.made[at] = lit - self.dark, 2 * error
+        return self.made[at]
+
+
 @checked
 def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
     """Return the energy of a light at the border, divided by that of a light in the middle.
@@ -63,9 +83,9 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
         `bloom` is not such a callable.
     """
     __tracebackhide__ = True
-    dark = probe.apply(bloom, probe.flat(0.0))[0]
+    lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
     shares = {
-        name: float(_spread(bloom, probe, dark, at)[0].sum()) / _expected(bloom, probe, dark, at)[1]
+        name: float(lights.spread(at)[0].sum()) / _expected(lights, at)[1]
         for name, at in _places(probe).items()
     }
     return {"edge": max(shares["left"], shares["top"]), "corner": shares["corner"]}
@@ -103,11 +123,11 @@ def assert_border(
     __tracebackhide__ = True
     allowed = BORDER_LIMITS | dict(limits or {})
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
-    dark = _check_stale(bloom, probe, allowed["stale"])
+    lights = _Lights(bloom, probe, _check_stale(bloom, probe, allowed["stale"]))
     told = []
-    for name, at in _near(bloom, probe, dark).items():
-        found, error = _spread(bloom, probe, dark, at)
-        expected, energy = _expected(bloom, probe, dark, at)
+    for name, at in _near(lights).items():
+        found, error = lights.spread(at)
+        expected, energy = _expected(lights, at)
         excess = np.abs(found - expected)
         excess[excess <= 2 * error] = 0
         across = int(name == "left")
@@ -122,7 +142,7 @@ def assert_border(
             for kind, share in shares.items()
             if not is_within(law, share, allowed[kind], kind)
         ]
-    told += _at_the_border(bloom, probe, dark, allowed, law)
+    told += _at_the_border(lights, allowed, law)
     flat = probe.apply(bloom, probe.flat(probe.value))[0]
     middle = float(flat[probe.centre[1], probe.centre[0]].mean())
     if middle > 0:
@@ -136,14 +156,13 @@ def assert_border(
         fail("assert_border", law, "; ".join(told))
 
 
-def _at_the_border(
-    bloom: Bloom, probe: Probe, dark: Image, allowed: dict[str, float], law: str
-) -> list[str]:
+def _at_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> list[str]:
     """Return what is wrong with lights in the outermost pixels."""
+    __tracebackhide__ = True
     told = []
-    for name, at in _places(probe).items():
-        expected, energy = _expected(bloom, probe, dark, at)
-        share = float(_spread(bloom, probe, dark, at)[0].sum()) / energy
+    for name, at in _places(lights.probe).items():
+        expected, energy = _expected(lights, at)
+        share = float(lights.spread(at)[0].sum()) / energy
         inside = float(expected.sum()) / energy
         kind = "corner" if name == "corner" else "edge"
         figure(f"energy_{name}", share)
@@ -231,15 +250,6 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
             )
 
 
-def _spread(bloom: Bloom, probe: Probe, dark: Image, at: tuple[int, int]) -> tuple[Image, float]:
-    """Return the bloom of a square, less that of black, and the error of its values."""
-    __tracebackhide__ = True
-    image = probe.flat(0.0)
-    image[at[1] : at[1] + _LIGHT, at[0] : at[0] + _LIGHT] = probe.value
-    lit, error = probe.apply(bloom, image)
-    return lit - dark, 2 * error
-
-
 def takes(bloom: object, name: str) -> bool:
     """Return whether a callable takes a keyword of this name."""
     try:
@@ -254,10 +264,11 @@ def _places(probe: Probe) -> dict[str, tuple[int, int]]:
     return {"left": (0, y), "top": (x, 0), "corner": (0, 0)}
 
 
-def _near(bloom: Bloom, probe: Probe, dark: Image) -> dict[str, tuple[int, int]]:
+def _near(lights: _Lights) -> dict[str, tuple[int, int]]:
     """Return places 1.5 standard deviations from an edge, at most a quarter of a side."""
     __tracebackhide__ = True
-    spread, energy = _expected(bloom, probe, dark, probe.centre)
+    probe = lights.probe
+    spread, energy = _expected(lights, probe.centre)
     near = []
     for axis, side in enumerate(probe.size):
         profile = np.abs(spread.mean(axis=2)).sum(axis=axis)
@@ -267,7 +278,7 @@ def _near(bloom: Bloom, probe: Probe, dark: Image) -> dict[str, tuple[int, int]]
     return {"left": (near[0], probe.centre[1]), "top": (probe.centre[0], near[1])}
 
 
-def _expected(bloom: Bloom, probe: Probe, dark: Image, at: tuple[int, int]) -> tuple[Image, float]:
+def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     """Return the bloom of a light near the middle, moved to another place, and its energy.
 
     The light is a multiple of 16 pixels away, since a chain of halved images spreads each position
@@ -276,9 +287,9 @@ def _expected(bloom: Bloom, probe: Probe, dark: Image, at: tuple[int, int]) -> t
     __tracebackhide__ = True
     x, y = (
         place + _PERIOD * round((middle - place) / _PERIOD)
-        for place, middle in zip(at, probe.centre, strict=True)
+        for place, middle in zip(at, lights.probe.centre, strict=True)
     )
-    spread = _spread(bloom, probe, dark, (x, y))[0]
+    spread = lights.spread((x, y))[0]
     energy = float(spread.sum())
     _check_lit("assert_border", energy)
     return _moved(spread, (x, y), at), energy
