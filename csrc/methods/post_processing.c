@@ -27,8 +27,6 @@ static bool add_first(struct vkb_levels *levels, struct vkb_error *error)
         return false;
     struct vkb_pass_row row =
         vkb_groups_row(levels, GROUPS_POST_PROCESSING, step, levels->downs[0]);
-    // Not by bands of rows.
-    row.reach = INFINITY;
     vkb_set_tint(&row, levels->settings->tint);
     vkb_mask_prefilter(levels, &row);
     return vkb_graph_add_pass(levels->graph, &row, error);
