@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -110,8 +111,14 @@ def of_program(
     if program.bits is not None:
         probe = Probe(size=size, atol=COARSE_ERROR)
 
-    def difference(image: NDArray[Any]) -> NDArray[Any]:
-        return np.asarray(program(image)[..., :3] - image)
+    @functools.wraps(program)
+    def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
+        found = program(image, **options)[..., :3]
+        x, y, *_ = options.get("region") or (0, 0)
+        if found.shape[:2] == image.shape[:2]:
+            x, y = 0, 0
+        height, width = found.shape[:2]
+        return np.asarray(found - image[y : y + height, x : x + width, :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(

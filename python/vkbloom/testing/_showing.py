@@ -109,6 +109,20 @@ def as_values(found: Measured) -> dict[str, Any]:
     return value
 
 
+def as_markdown(found: Measured) -> str:
+    """Return the laws and the figures as tables for a pull request."""
+    laws = [
+        f"| {row.name} | {row.words} | {cells[0]} | {cells[1]} |"
+        for row in found.report.rows
+        for cells in [("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")]
+    ]
+    times = {"passes together": f"{1000 * sum(found.passes.values()):.3f} ms"}
+    shown = [f"| {name} | {text} |" for name, text in (figures(found) | times).items()]
+    head = f"### `{found.name.replace('`', chr(39))}`\n\nOn {found.device}.\n"
+    tables = ("| law | held | off by | allowed |\n|---|---|---|---|", *laws, "")
+    return "\n".join((head, *tables, "| figure | |\n|---|---|", *shown, ""))
+
+
 def broken(report: LawReport) -> list[LawRow]:
     """Return the required laws that are not held."""
     return [row for row in report.rows if row.name in report.required and not row.held]
