@@ -95,6 +95,7 @@ def of_settings(
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=lambda: differences(renderer, used),
+        frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
         own = isinstance(used, CustomMethod) and used.file.saves_bloom
