@@ -282,8 +282,8 @@ def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatc
             strips = ["strip_mixed_words_rgba32float", "adjoint_strip_words_rgba32float"]
             assert shaders == strips[2 - passes :]
         for levels, ends in ((Pyramid, "double_final"), (DualKawase, "filter_final")):
-            settings = levels(levels=1, threshold=0.5, tonemap="aces")
-            shaders = shaders_of_transpose(renderer, settings, (8, 32, 3), random)
+            curved = levels(levels=1, threshold=0.5, tonemap="aces")
+            shaders = shaders_of_transpose(renderer, curved, (8, 32, 3), random)
             assert f"{ends}_mixed_words_rgba32float" in shaders
 
 
