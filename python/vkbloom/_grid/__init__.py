@@ -15,7 +15,6 @@ identity                   what determines the contents of a stored grid
 checking                   check a store for missing and damaged data
 rendering                  render a grid into a store
 running, cluster           render blocks in this process, or on the workers of a Dask cluster
-sheet, curves, selection   contact sheets and curves of a Dataset
 progress                   the progress bar
 ========================== ========================================================================
 """

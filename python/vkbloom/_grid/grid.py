@@ -155,7 +155,6 @@ def grid(
     See Also
     --------
     check_grid : Reads a store, and names missing and damaged data.
-    contact_sheet, response_curves : Pictures and plots of the result.
 
     Notes
     -----
