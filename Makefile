@@ -144,6 +144,8 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
+	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
 	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so

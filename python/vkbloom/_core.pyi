@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ MAX_LAYERS: int
 MAX_STAGES: int
 MAX_GHOSTS: int
 
-AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
+_AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
 _Array = NDArray[Any]
 _ExportedImage = (
     tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str]
@@ -46,7 +46,7 @@ class OutOfMemoryError(Error, MemoryError): ...
 class ValidationError(Error): ...
 class ShaderError(Error): ...
 
-def adapters(driver: str, /) -> list[AdapterTuple]: ...
+def adapters(driver: str, /) -> list[_AdapterTuple]: ...
 def image_source(
     image: _Array | _ExportedImage,
     emission: _Array | _ExportedImage | None = None,
@@ -83,6 +83,7 @@ def read_dlpack(
 ) -> tuple[int, tuple[int, int], tuple[int, int, int], tuple[int, ...], tuple[int, ...] | None]: ...
 def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 
+@final
 class Renderer:
     def __new__(
         cls,
@@ -99,7 +100,7 @@ class Renderer:
     @property
     def lost(self) -> bool: ...
     @property
-    def info(self) -> AdapterTuple: ...
+    def info(self) -> _AdapterTuple: ...
     @property
     def pipeline_count(self) -> int: ...
     @property
@@ -157,6 +158,7 @@ class Renderer:
         self, what: str, address: int, size: int, stream: int, waits: bool, /
     ) -> Exported: ...
 
+@final
 class Source:
     @property
     def kind(self) -> tuple[tuple[int, int, int], str]: ...
@@ -165,6 +167,7 @@ class Source:
     @property
     def exported(self) -> bool: ...
 
+@final
 class Plan:
     @property
     def outputs(self) -> tuple[tuple[str, tuple[int, ...], str], ...]: ...
@@ -179,19 +182,23 @@ class Plan:
     def shares_images(self, other: Plan, /) -> bool: ...
     def is_of_image(self, source: Source, /) -> bool: ...
 
+@final
 class Resource: ...
 
+@final
 class Shader:
     @property
     def name(self) -> str: ...
     @property
     def hash(self) -> str: ...
 
+@final
 class Submission:
     @property
     def ordered(self) -> bool: ...
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, ...]]: ...
 
+@final
 class Exported:
     @property
     def address(self) -> int: ...
@@ -213,6 +220,7 @@ class Exported:
     def write(self, array: _Array, /) -> None: ...
     def copy_to(self, address: int, size: int, stream: int, offset: int = 0, /) -> None: ...
 
+@final
 class Pages:
     def __len__(self) -> int: ...
     def __buffer__(self, flags: int, /) -> memoryview: ...
