@@ -37,18 +37,13 @@
     SETTING(reference_white, 203.0, 1.0, 10000.0)
 
 // For a pass that reads an image of another size: the size of its target, and the largest value of
-// the target's format. If the images are bands of rows, target_height and source_height are those
-// of the complete images, and row_offset is the distance of the first rows: twice the first row of
-// the target times source_height, less twice the first row of the source times target_height.
-// Otherwise source_height and row_offset are 0.
+// the target's format.
 #define SAMPLING_ROWS(B, INPUT) \
     PLACE_ROWS(B, INPUT) \
     INPUT(B, float, limit)
 #define PLACE_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
-    INPUT(B, int, target_height) \
-    INPUT(B, int, source_height) \
-    INPUT(B, int, row_offset)
+    INPUT(B, int, target_height)
 
 // For passes with a threshold, and for passes that write the finished picture.
 #define THRESHOLD_ROWS(B, READS) \

@@ -43,7 +43,6 @@ static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
         row.block_width = pass->block_width;
         row.block_height = pass->block_height;
     }
-    row.reach = INFINITY;
     row.block = VKB_BLOCK_own;
     row.params.own = pass->params;
     row.resources = pass->resources;

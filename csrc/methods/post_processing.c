@@ -27,8 +27,6 @@ static bool add_first(struct vkb_levels *levels, struct vkb_error *error)
         return false;
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, step, levels->downs[0]);
     row.constants.node = true;
-    // Not by bands of rows.
-    row.reach = INFINITY;
     for (int channel = 0; channel < 3; ++channel)
         row.params.prefilter.tint[0][channel] = levels->settings->tint[channel];
     vkb_mask_prefilter(levels, &row);

@@ -122,7 +122,6 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
-    vkb_reach_nine(&row);
     vkb_drop_reads(&row, 1);
     row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;

@@ -63,8 +63,6 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     for (uint32_t i = 0; blur->offsets && i < moved.count; ++i)
         params->offsets[i / 4][i % 4] = (float)blur->offsets[i];
     row.constants.taps = blur->offsets ? (int32_t)moved.count : 0;
-    // Offsets of merged taps are up to twice their number.
-    row.reach += (blur->offsets ? 2 : 1) * (moved.count - 1) * fabsf(params->step_y);
     row.constants.direction = blur->direction;
     row.constants.radius = (int32_t)moved.count - 1;
     row.constants.sampling =

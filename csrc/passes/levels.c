@@ -91,13 +91,6 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
     row->params.prefilter.step_x = (float)step_x;
     row->params.prefilter.step_y = (float)step_y;
-    row->reach = (float)(VKB_FILTER_REACH + 2.0 * fabs(step_y));
-}
-
-void vkb_reach_nine(struct vkb_pass_row *row)
-{
-    row->reach = VKB_FILTER_REACH + 2 * 4;
-    row->band_rows = VKB_BAND_EVEN_ROW;
 }
 
 static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
@@ -324,7 +317,6 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
         row.reads[level] = levels->downs[level < levels->count ? level : 0];
     row.block = VKB_BLOCK_gather;
-    row.band_rows = VKB_BAND_SAME_PLACE;
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
     VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);
