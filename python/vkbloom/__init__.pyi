@@ -16,7 +16,6 @@ from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
 from ._gradients import vjp
-from ._grid import reductions
 from ._grid.checking import GridReport, check_grid
 from ._grid.grid import grid
 from ._io.array_files import read, write
@@ -103,7 +102,6 @@ __all__ = [
     "presets",
     "psf",
     "read",
-    "reductions",
     "reference",
     "render",
     "testing",

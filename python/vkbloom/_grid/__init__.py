@@ -7,7 +7,7 @@ axes, sources              the axes, and the scene or images
 order, parts               the order of the points, and blocks of points
 passes                     the number of passes of a step, and of a point rendered alone
 layout                     the requested grid, and its layout: variables, shapes, dtypes
-filling, reductions        render blocks of points into arrays; figures of frames
+filling                    render blocks of points into arrays
 memory                     the grid as one Dataset
 grid                       `vkbloom.grid`: in memory, or as a Zarr store
 store, chunks, keys        the store's metadata, its chunks, and its keys as bytes
@@ -18,5 +18,3 @@ running, cluster           render blocks in this process, or on the workers of a
 progress                   the progress bar
 ========================== ========================================================================
 """
-
-from vkbloom._grid import reductions as reductions
