@@ -20,7 +20,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
 ]
-exclude_patterns = ["README.md", "*_table.md"]
+exclude_patterns = ["README.md", "evidence/*_table.md"]
 
 # Sphinx reads what is in this folder alone. The notebooks are shown with the outputs that they are
 # stored with (tools/run_notebooks.py).

@@ -496,13 +496,38 @@ def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     assert "Missing option" in one_line(misused.stderr)
 
 
-@pytest.mark.parametrize("missing", ["click", "rich", "tqdm"])
-def test_a_missing_extra_is_one_line(missing: str) -> None:
-    # None in sys.modules makes an import fail as if nothing were installed.
-    hide = f"import sys; sys.modules[{missing!r}] = None; from vkbloom._cli import main; main()"
-    ended = python("-c", hide, "render", "-o", "x.png")
+# None in sys.modules makes an import fail as if nothing were installed.
+EXTRAS = ("click", "rich", "tqdm", "OpenImageIO", "scipy", "skimage", "xarray")
+BARE = """import sys
+for name in {missing!r}: sys.modules[name] = None
+from vkbloom._cli import main
+main()"""
+
+
+@pytest.mark.parametrize("missing", [*((one,) for one in EXTRAS[:3]), EXTRAS])
+@pytest.mark.parametrize("words", [(), ("render", "-o", "x.png"), ("doctor", "--self-test")])
+def test_a_missing_extra_is_one_line(missing: tuple[str, ...], words: tuple[str, ...]) -> None:
+    ended = python("-c", BARE.format(missing=missing), *words)
     assert (ended.returncode, ended.stdout) == (1, "")
-    assert "pip install vkbloom[cli]" in one_line(ended.stderr)
+    line = one_line(ended.stderr)
+    assert "pip install 'vkbloom[cli]'" in line
+    assert "uvx 'vkbloom[all]' apply" in line
+
+
+@pytest.mark.parametrize(
+    "words", [("--version",), ("adapters",), ("adapters", "--json"), ("doctor",)], ids=" ".join
+)
+def test_without_extras_the_first_commands_work(words: tuple[str, ...]) -> None:
+    ended = python("-c", BARE.format(missing=EXTRAS), *words)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    if words[0] == "--version":
+        assert ended.stdout == f"vkbloom {vkbloom.__version__}\n"
+    elif words == ("adapters",):
+        assert ended.stdout.splitlines() == [one.summary for one in vkbloom.adapters()]
+    elif words == ("doctor",):
+        assert "This machine can render." in ended.stdout
+    else:
+        assert len(json.loads(ended.stdout)) == len(vkbloom.adapters())
 
 
 def test_importing_the_entry_point_is_quick() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -483,13 +484,28 @@ def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> Non
     assert findings.keys() == of_users
     assert all(finding.found for finding in findings.values())
 
+
+@pytest.mark.parametrize(
+    ("extra", "absent", "advice"),
+    [
+        ("images", "OpenImageIO", "pip install 'vkbloom[images]'"),
+        # These two are in no registry.
+        ("software", "vkbloom-lavapipe", "pip install vkbloom_lavapipe-*_x86_64.whl, which make"),
+        ("shaders", "vkbloom-glslang", "pip install vkbloom_glslang-*_x86_64.whl, which make"),
+    ],
+)
+def test_a_missing_extra_says_what_can_be_installed(
+    monkeypatch: pytest.MonkeyPatch, extra: str, absent: str, advice: str
+) -> None:
     present = metadata.distributions
     monkeypatch.setattr(
-        metadata, "distributions", lambda name: [] if name == "OpenImageIO" else present(name=name)
+        metadata, "distributions", lambda name: [] if name == absent else present(name=name)
     )
-    finding = by_topic(installation.extras(), "extra images")
-    assert (finding.status, finding.found) == ("note", "missing: OpenImageIO")
-    assert "pip install vkbloom[images]" in finding.advice
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    finding = by_topic(installation.extras(), f"extra {extra}")
+    assert (finding.status, finding.found) == ("note", f"missing: {absent}")
+    assert advice in finding.advice
+    assert f"vkbloom[{extra}]" not in finding.advice or extra == "images"
 
 
 @linux_only

@@ -35,8 +35,9 @@ def _run() -> None:
 
     missing = [name for name in ("click", "rich", "tqdm") if find_spec(name) is None]
     if missing:
-        needed = " and ".join(missing)
-        sys.exit(f"vkbloom: the command line needs {needed}: pip install vkbloom[cli]")
+        from vkbloom._cli import bare  # noqa: PLC0415
+
+        sys.exit(bare.run(sys.argv[1:], missing))
     from vkbloom._cli.program import program  # noqa: PLC0415
 
     # File names may hold characters that the terminal's encoding cannot represent.

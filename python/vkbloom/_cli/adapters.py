@@ -10,6 +10,7 @@ from rich import box
 from rich.table import Table
 
 import vkbloom
+from vkbloom._cli.bare import NO_ADAPTER
 from vkbloom._cli.terminal import show
 
 
@@ -21,7 +22,7 @@ def command(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps([dataclasses.asdict(adapter) for adapter in found], indent=2))
     if not found:
-        raise click.ClickException("no Vulkan adapter was found; run vkbloom doctor for the reason")
+        raise click.ClickException(NO_ADAPTER)
     if as_json:
         return
     table = Table(box=box.SIMPLE_HEAD)

@@ -11,9 +11,10 @@ import click
 from tqdm import tqdm
 
 import vkbloom
+from vkbloom._cli import bare
 from vkbloom._cli.device_options import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
-from vkbloom._doctor import examine, self_test
+from vkbloom._doctor import self_test
 
 _COLOURS: Final = {"ok": "green", "note": "yellow", "problem": "red"}
 
@@ -45,7 +46,7 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     With --self-test, it renders with every method, format and kind of derivative on one adapter.
     The exit status is 1 if a value is farther from the reference than the documentation allows.
     """
-    found = _compared(adapter) if compares else _examined()
+    found = _compared(adapter) if compares else bare.examined()
     text = json.dumps(found, indent=2)
     if as_json == "-":
         click.echo(text)
@@ -57,21 +58,9 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     return 0 if found["passed" if compares else "can_render"] else 1
 
 
-def _examined() -> dict[str, Any]:
-    findings, can_render = examine()
-    entries = [finding._asdict() for finding in findings]
-    return {"version": vkbloom.__version__, "can_render": can_render, "findings": entries}
-
-
 def _show_findings(found: dict[str, Any]) -> None:
-    for finding in found["findings"]:
-        status = click.style(f"{finding['status']:9}", _COLOURS[finding["status"]])
-        click.echo(f"{status}{finding['topic']:30}  {finding['found']}")
-        if finding["advice"]:
-            click.echo(f"{'':41}-> {finding['advice']}")
-    able = "can render" if found["can_render"] else "cannot render"
-    problems = sum(finding["status"] == "problem" for finding in found["findings"])
-    click.echo(f"\nThis machine {able}. Problems found: {problems}.")
+    for line in bare.lines_of(found, lambda text, status: click.style(text, _COLOURS[status])):
+        click.echo(line)
 
 
 def _compared(adapter: str) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def _software(adapters: list[Mapping[str, Any]]) -> Finding:
     # As the choice of "software" has it.
     found.sort(key=lambda adapter: not adapter["bundled"])
     if not found:
-        advice = "To use it: install the package vkbloom-lavapipe, or mesa-vulkan-drivers."
+        advice = f"To use it: {installation.install_wheel('vkbloom-lavapipe')}, or install Mesa's."
         return Finding(topic, "note", 'there is none; adapter="software" fails', advice)
     described = found[0]["driver_info"]
     tested = " and ".join(TESTED_MESA)

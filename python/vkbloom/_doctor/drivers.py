@@ -19,8 +19,9 @@ from vkbloom._doctor.finding import Finding
 #: The environment in which the loader writes its log to standard error.
 LOG: Final = {"VK_LOADER_DEBUG": "all"}
 INSTALL_DRIVER: Final = (
-    "Install lavapipe, which runs on any CPU (the package vkbloom-lavapipe, or apt install "
-    "mesa-vulkan-drivers, or Arch's vulkan-swrast), or the Vulkan driver of the GPU's vendor."
+    "Install lavapipe, which runs on any CPU (apt install mesa-vulkan-drivers, or Arch's "
+    f"vulkan-swrast, or {installation.install_wheel('vkbloom-lavapipe')}), or the Vulkan driver "
+    "of the GPU's vendor."
 )
 # Either replaces the standard folders; older loaders know only the second one.
 _REPLACING: Final = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")

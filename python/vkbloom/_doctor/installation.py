@@ -18,6 +18,8 @@ from vkbloom._io import disk_cache
 
 # Address space of a render of a small image on lavapipe, with the interpreter.
 _AMPLE: Final = 1 << 30
+# Of the project, and in no registry yet.
+_UNPUBLISHED: Final = ("vkbloom-lavapipe", "vkbloom-glslang")
 # Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
 _VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|EN)ABLE_LAYER)_\w+")
 
@@ -65,9 +67,17 @@ def extras() -> list[Finding]:
 def _extra(name: str, distributions: list[str]) -> Finding:
     missing = [one for one in distributions if not any(metadata.distributions(name=one))]
     if missing:
-        advice = f"To use it: pip install vkbloom[{name}]"
+        advice = f"To use it: pip install 'vkbloom[{name}]'"
+        if missing[0] in _UNPUBLISHED:
+            advice = f"To use it: {install_wheel(missing[0])}."
         return Finding(f"extra {name}", "note", f"missing: {', '.join(missing)}", advice)
     return Finding(f"extra {name}", "ok", ", ".join(distributions))
+
+
+def install_wheel(distribution: str) -> str:
+    """Return how to install a package of the project that no registry has."""
+    wheel = f"{distribution.replace('-', '_')}-*_{platform.machine()}.whl"
+    return f"pip install {wheel}, which make wheels in a checkout of vkbloom puts into dist/"
 
 
 def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:

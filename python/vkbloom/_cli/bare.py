@@ -1,0 +1,63 @@
+"""What runs without the extra `cli`: ``--version``, ``doctor`` and ``adapters``, as plain text."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import vkbloom
+
+INSTALL = (
+    "install it: pip install 'vkbloom[cli]', or run it without: "
+    "uvx 'vkbloom[all]' apply photo.jpg bloom.jpg"
+)
+NO_ADAPTER = "no Vulkan adapter was found; run vkbloom doctor for the reason"
+
+
+def run(words: Sequence[str], missing: Sequence[str]) -> int:
+    """Run a command that needs no other package and return its status, or say what to install."""
+    first, *options = words or [""]
+    as_json = options == ["--json"]
+    if words in (["--version"], ["-V"]):
+        print(f"vkbloom {vkbloom.__version__}")
+        return 0
+    if first == "doctor" and (as_json or not options):
+        found = examined()
+        print(json.dumps(found, indent=2) if as_json else "\n".join(lines_of(found)))
+        return int(not found["can_render"])
+    if first == "adapters" and (as_json or not options):
+        adapters = vkbloom.adapters()
+        rows = [dataclasses.asdict(adapter) for adapter in adapters]
+        listed = json.dumps(rows, indent=2) if as_json else "\n".join(a.summary for a in adapters)
+        print(listed, end="\n" if listed else "")
+        if not adapters:
+            print(f"vkbloom: {NO_ADAPTER}", file=sys.stderr)
+        return int(not adapters)
+    print(f"vkbloom: the command line needs {' and '.join(missing)}; {INSTALL}", file=sys.stderr)
+    return 1
+
+
+def examined() -> dict[str, Any]:
+    """Return the doctor's findings as one object."""
+    from vkbloom._doctor import examine  # noqa: PLC0415  costs start-up time
+
+    findings, can_render = examine()
+    entries = [finding._asdict() for finding in findings]
+    return {"version": vkbloom.__version__, "can_render": can_render, "findings": entries}
+
+
+def lines_of(
+    found: Mapping[str, Any], styled: Callable[[str, str], str] = lambda text, status: text
+) -> Iterator[str]:
+    """Yield the findings as lines; `styled` colours a text by a status."""
+    for finding in found["findings"]:
+        status = styled(f"{finding['status']:9}", finding["status"])
+        yield f"{status}{finding['topic']:30}  {finding['found']}"
+        if finding["advice"]:
+            yield f"{'':41}-> {finding['advice']}"
+    able = "can render" if found["can_render"] else "cannot render"
+    problems = sum(finding["status"] == "problem" for finding in found["findings"])
+    yield f"\nThis machine {able}. Problems found: {problems}."
