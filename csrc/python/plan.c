@@ -3,6 +3,7 @@
 #include "python/module.h"
 #include "python/values.h"
 
+#include "execute/limits.h"
 #include "graph/dry_run.h"
 #include "methods/adjoint.h"
 
@@ -188,7 +189,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
         && vkb_graph_check(graph, device->max_side, error)
-        && vkb_image_cache_check(device, graph, error)
+        && vkb_limits_check_graph(device, graph, error)
         && (!graph->layers || layer_graph(device, graph, error));
 }
 

@@ -29,13 +29,14 @@ vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles, vkb_add_bloom_til
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // The first of these with taps that are weighted by brightness.
-vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
-// First passes of published methods, with taps among 4 x 4 texels of an image of twice the size.
-vkb_variant_add vkb_add_reduced;
+vkb_variant_add vkb_add_halved_taps;
+// First passes of published methods, with taps among 4 x 4 texels of an image of twice the size, or
+// of the same size.
+vkb_variant_add vkb_add_prefiltered;
 // The same of an image of any larger size.
 vkb_variant_add vkb_add_shrunk;
-// HDRP's blurs, of images of the same size and of twice the size along the line.
-vkb_variant_add vkb_add_hdrp_line;
+// Blurs of nine taps, of images of the same size and of twice the size.
+vkb_variant_add vkb_add_nine;
 // Filters in strips, also fused with the composite; the sum of several levels that are filtered.
 vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
 // Iterations of streaks.
