@@ -353,7 +353,9 @@
     COUNT(karis_average, 0, 0, 1) \
     COUNT(streaks, 4, 1, 16) \
     COUNT(diagonal, 1, 0, 1) \
-    COUNT(fast, 0, 0, 1)
+    COUNT(fast, 0, 0, 1) \
+    COUNT(quarter, 0, 0, 1) \
+    COUNT(urp_12, 0, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
@@ -710,7 +712,7 @@
     NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \
-    NAME(GROUPS_POST, 16, post) \
+    NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \
@@ -719,6 +721,7 @@
     NAME(BY_MASK, 2, by_mask) \
     NAME(BY_VALUES, 3, by_values) \
     NAME(BY_SQUARES, 4, by_squares) \
+    NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

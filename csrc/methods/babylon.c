@@ -21,5 +21,5 @@ bool vkb_add_babylon(const struct vkb_settings *settings, const struct vkb_bloom
     vkb_mask_prefilter(&levels, &row);
     return vkb_graph_add_pass(graph, &row, error)
         && vkb_levels_blur(&levels, 0, bright, &kernel, error)
-        && vkb_levels_enlarge(&levels, levels.downs[0], 1.0, bloom, error);
+        && vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, levels.downs[0], 1.0, bloom, error);
 }

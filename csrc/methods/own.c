@@ -67,7 +67,8 @@ bool vkb_add_own(const struct vkb_settings *settings, const struct vkb_bloom_sou
         const bool enlarged = strcmp(pass->name, BLOOM) == 0 && !has_size(pass, source->final);
         uint32_t image;
         if (!add_pass(pass, enlarged ? "bloom_own" : pass->name, source, graph, &image, error)
-            || (enlarged && !vkb_levels_enlarge(&levels, image, 1.0, &image, error)))
+            || (enlarged
+                && !vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, image, 1.0, &image, error)))
             return false;
         if (strcmp(pass->name, BLOOM) == 0)
             *bloom = image;

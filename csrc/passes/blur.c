@@ -43,7 +43,8 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     struct vkb_blur_params *params = &row.params.blur;
     struct vkb_blur moved = *blur;
 
-    if (!blur->offsets && blur->direction != DIRECTION_BOTH && (same_size || is_integer(step))
+    if (!blur->offsets && !blur->inset && blur->direction != DIRECTION_BOTH
+        && (same_size || is_integer(step))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;
     row.reads[0] = from;
@@ -62,12 +63,14 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
         params->offsets[i / 4][i % 4] = (float)blur->offsets[i];
     row.constants.taps = blur->offsets ? (int32_t)moved.count : 0;
     row.constants.direction = blur->direction;
+    if (blur->inset)
+        row.constants.upsample = UPSAMPLE_INSET_LINEAR;
     row.constants.radius = (int32_t)moved.count - 1;
-    row.constants.sampling =
-        !blur->offsets && same_size && is_integer(params->step_x) && is_integer(params->step_y)
-            ? SAMPLING_TEXEL
-        : blur->filter ? SAMPLING_FILTER
-                       : SAMPLING_FETCH;
+    row.constants.sampling = !blur->offsets && !blur->inset && same_size
+                                  && is_integer(params->step_x) && is_integer(params->step_y)
+                               ? SAMPLING_TEXEL
+                           : blur->filter ? SAMPLING_FILTER
+                                          : SAMPLING_FETCH;
     return row;
 }
 
@@ -78,5 +81,6 @@ bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int l
 
     return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
         && pass->constants.direction == direction && !pass->constants.taps
-        && (vertical ? params->step_y : params->step_x) == 1.0f && pass->constants.radius <= limit;
+        && !pass->constants.upsample && (vertical ? params->step_y : params->step_x) == 1.0f
+        && pass->constants.radius <= limit;
 }

@@ -92,28 +92,26 @@ vec4 hdrp_prefiltered(vec4 taps[5])
     return sum / shares;
 }
 
-// URP's: a clamp, the soft threshold (Unity-Technologies/Graphics,
-// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509). Post Processing v2 has another
-// width, keeps negative colours, and has a tint (Unity-Technologies/PostProcessing @ 32c3155207d3,
+// Unity's: a clamp, the soft threshold, a tint. URP has no negative colours
+// (Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509);
+// Post Processing v2 has another width (Unity-Technologies/PostProcessing @ 32c3155207d3,
 // Bloom.shader).
-const bool IS_POST = GROUPS == GROUPS_POST;
-
-float urp_width()
+float unity_width()
 {
-    return params.threshold * params.knee + (IS_POST ? 1e-5 : 0.0);
+    return params.threshold * params.knee + (GROUPS == GROUPS_URP ? 0.0 : 1e-5);
 }
 
-float urp_divisor()
+float unity_divisor()
 {
-    return 4.0 * urp_width() + (IS_POST ? 0.0 : 1e-4);
+    return 4.0 * unity_width() + (GROUPS == GROUPS_URP ? 1e-4 : 0.0);
 }
 
-vec4 urp_prefiltered(vec4 value)
+vec4 unity_prefiltered(vec4 value)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
     if (THRESHOLDED != 0)
-        kept = soft_threshold(kept, params.threshold, urp_width(), urp_divisor(), 1e-4);
-    return IS_POST ? params.tint[0] * kept : max(kept, vec4(0.0));
+        kept = soft_threshold(kept, params.threshold, unity_width(), unity_divisor(), 1e-4);
+    return params.tint[0] * (GROUPS == GROUPS_URP ? max(kept, vec4(0.0)) : kept);
 }
 
 // Babylon's: a step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js,
@@ -145,7 +143,7 @@ int group_count()
         return 4;
     if (GROUPS == GROUPS_URP)
         return 1;
-    if (GROUPS == GROUPS_POST)
+    if (GROUPS == GROUPS_POST_PROCESSING)
         return 1;
     if (GROUPS == GROUPS_THREE)
         return 1;
@@ -208,5 +206,5 @@ vec4 made(vec4 found[5], vec4 shares)
         return babylon_factor(found[0]) * found[0];
     if (GROUPS == GROUPS_THREE)
         return three_prefiltered(found[0]);
-    return urp_prefiltered(found[0]);
+    return unity_prefiltered(found[0]);
 }
