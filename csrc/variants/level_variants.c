@@ -80,7 +80,7 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     vkb_drop_reads(&row, 1);
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_thresholded(choice, pass, &row, error);
+        && vkb_add_from_image(choice, pass, &row, error);
 }
 
 // What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
@@ -243,41 +243,20 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
 bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up = NULL;
-    struct vkb_pass_row row;
-    struct vkb_filter_final_params *params = &row.params.filter_final;
-    const enum vkb_format format = plain->images[pass->targets[0]].format;
+    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     const bool mixed = pass->transposed;
 
-    if (vkb_ends_bloom(pass))
-        up = vkb_writer_of(plain, pass->reads[1]);
-    // The shader is compiled for one format. The levels of a published method may have their own.
-    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && !up->constants.add_own
-         && !pass->constants.masked && plain->images[pass->reads[0]].format == format
-         && plain->images[pass->reads[1]].format == format
-         && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
-         && loads_to_double(choice, pass)
+    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && loads_to_double(choice, pass)
          && (!mixed || choice->variants != VKB_VARIANTS_CPU || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
-    memcpy(&row, pass, sizeof row);
-    memset(&row.params, 0, sizeof row.params);
+    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
     make_doubling(choice, &row,
                   mixed ? &vkb_shader_double_tile_final_mixed_comp
                         : &vkb_shader_double_tile_final_comp,
                   mixed ? double_mixed_words : double_final_words,
                   DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
-    row.fused = true;
-    row.reads[0] = up->reads[0];
-    row.reads[1] = pass->reads[0];
-    row.reads[2] = pass->reads[3];
-    vkb_drop_reads(&row, mixed ? 3 : 2);
-    row.block = VKB_BLOCK_filter_final;
-    params->coarse = up->params.filter.coarse;
-    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
-    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
-    memcpy(params->taps, up->params.filter.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
