@@ -93,16 +93,6 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     }
 }
 
-static VkImageUsageFlags image_usage(const struct vkb_device *device, enum vkb_format format)
-{
-    // No pass reads depth.
-    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-         | (format == VKB_FORMAT_DEPTH32_FLOAT
-                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
-                      | (device->dispatch ? VK_IMAGE_USAGE_STORAGE_BIT : 0));
-}
-
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
                           struct vkb_image *image, struct vkb_error *error)
 {
@@ -114,7 +104,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .layers = row->layers ? row->layers : 1,
                                 .levels = 1,
                                 .array = row->layers > 0,
-                                .usage = image_usage(device, row->format),
+                                .usage = row->usage,
                                 .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);
@@ -143,11 +133,16 @@ static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache,
     return cached;
 }
 
-bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+static bool is_alike(const struct vkb_image *image, const struct vkb_image_row *row)
 {
     return image->handle && image->format == row->format && image->width == row->width
         && image->height == row->height && image->layers == (row->layers ? row->layers : 1)
         && image->array == (row->layers > 0);
+}
+
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+{
+    return is_alike(image, row) && (row->usage & ~image->usage) == 0;
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
@@ -177,9 +172,12 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
     cached->used = cache->now;
     if (vkb_image_fits(&cached->image, row))
         return true;
+    // Also for the plans that it has been for: they may come by turns.
+    struct vkb_image_row both = *row;
+    both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
     destroy_image(device, cache, cached);
     cached->image_id = ++cache->clock;
-    if (!vkb_image_create_row(device, row, &cached->image, error))
+    if (!vkb_image_create_row(device, &both, &cached->image, error))
         return false;
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)

@@ -142,15 +142,23 @@ static bool check_pass(const struct vkb_device *device, const struct vkb_pass_ro
 bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,
                             struct vkb_error *error)
 {
-    const enum vkb_format format = row->format;
-    const VkFormatFeatureFlags features =
-        format == VKB_FORMAT_DEPTH32_FLOAT
-            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
+    static const struct {
+        VkImageUsageFlags usage;
+        VkFormatFeatureFlags feature;
+        const char *words;
+    } rows[] = {
+        {VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT,
+         VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_SAMPLED_BIT, VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT, "sample"},
+        {VK_IMAGE_USAGE_STORAGE_BIT, VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT, "store"},
+    };
 
-    if (!vkb_device_supports(device, format, features))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
-                        device->adapter.name, vkb_formats[format].name);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
+        if ((row->usage & rows[i].usage)
+            && !vkb_device_supports(device, row->format, rows[i].feature))
+            return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot %s %s images",
+                            device->adapter.name, rows[i].words, vkb_formats[row->format].name);
     return true;
 }
 
