@@ -77,7 +77,7 @@ bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vk
 bool vkb_add_thresholded(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                          const struct vkb_pass_row *filtering, struct vkb_error *error);
 
-// Whether a pass brings a factor of the cotangents of its composite to the bloom.
+// Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
 
 // Whether the images that a pass reads are words of single floats.
