@@ -15,7 +15,7 @@ from ._fit import FitResult, fit, fit_pyramid, translate
 from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
-from ._gradients import vjp
+from ._gradients import deglare, vjp
 from ._grid import reductions
 from ._grid.checking import GridReport, check_grid
 from ._grid.curves import response_curves
@@ -96,6 +96,7 @@ __all__ = [
     "check_grid",
     "contact_sheet",
     "default_renderer",
+    "deglare",
     "explore",
     "fit",
     "fit_pyramid",
