@@ -13,6 +13,7 @@
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
 # make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
 #   tries it in a fresh environment.
+# make test-pure: runs the tests that need no device with the wheel for all systems, which has no core.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
 # make test-aarch64: runs the fast part of the tests with the aarch64 wheels of dist/ under QEMU; as root.
@@ -50,7 +51,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
 .PHONY: demo test test-devices exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
-	freethreaded try-core try-wheels test-aarch64 format sanitize clean
+	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -95,6 +96,16 @@ freethreaded: build/stamp/core build/stamp/test
 
 try-core: build/stamp/core
 	packaging/try_core.sh $(PYTHON)
+
+# The wheel's files are found before those of the checkout.
+PURE := build/pure
+test-pure: build/stamp/core build/stamp/test
+	rm -rf $(PURE) && mkdir -p $(PURE)/site
+	VKBLOOM_PURE=1 $(PYTHON) setup.py --quiet egg_info --egg-base $(PURE) build --build-base \
+	    $(PURE)/build bdist_wheel --dist-dir $(PURE) 2>$(PURE)/log || { cat $(PURE)/log; exit 1; }
+	$(PYTHON) -m zipfile -e $(PURE)/*.whl $(PURE)/site
+	PYTHONPATH=$(PURE)/site $(PYTHON) -m pytest -q -p tests.no_core tests/core/test_settings.py \
+	    tests/psf tests/plugin/test_comparison.py tests/plugin/test_diagnosis.py tests/plugin/test_laws.py
 
 try-wheels:
 	packaging/try_bare.sh $(ROOTS)

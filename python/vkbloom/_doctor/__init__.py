@@ -24,6 +24,8 @@ def examine() -> Report:
 
     Takes some seconds. The test render adds to the pipeline cache, as every render does.
     """
+    if core := installation.core():
+        return Report((installation.package(), *core, *installation.extras()), False)
     listed = child.ask("adapters", "all", environment=drivers.LOG)
     adapters: list[Mapping[str, Any]] = listed.value["adapters"] if listed.value else []
     chosen = child.ask("render", "auto", "plain")
