@@ -7,6 +7,7 @@
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
+# make tables: measures again, and writes the tables of docs/evidence, in more than an hour.
 # make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for
 #   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
@@ -50,7 +51,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
 
-.PHONY: demo test test-devices exhaustive check docs bench engines engine-laws libplacebo cluster wheels lint \
+.PHONY: demo test test-devices exhaustive check docs tables bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
@@ -85,6 +86,11 @@ docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
 
+tables: build/stamp/core build/stamp/test build/stamp/peers
+	$(PYTHON) tools/tables/write.py
+	$(PYTHON) tools/where_it_has_run.py
+	$(PYTHON) -m tools.laws
+
 # The build root and Mesa are built once, in build/wheels.
 wheels:
 	packaging/wheels.sh
@@ -117,7 +123,7 @@ test-aarch64:
 bench: build/stamp/core build/stamp/peers
 	$(PYTHON) -m benchmarks --out out/bench.md $(BENCH)
 
-# Installs engines, each into an environment of its own, and compares with them (docs/engines.md).
+# Installs engines, each into an environment of its own, and compares with them (docs/evidence/engines.md).
 engines: build/stamp/core build/engines/blender/done build/engines/pygfx/done
 	$(PYTHON) tools/engines/compare.py blender=build/engines/blender/bin/python \
 	    pygfx=build/engines/pygfx/bin/python $(ENGINES)
@@ -135,7 +141,7 @@ build/engines/%/done:
 	$(@D)/bin/pip install --quiet $(PACKAGES)
 	touch $@
 
-# Compares custom methods with libplacebo (docs/libplacebo.md).
+# Compares custom methods with libplacebo (docs/evidence/libplacebo.md).
 libplacebo: build/stamp/core build/libplacebo/apply_hook
 	test -n "$(HOOKS)" || { echo "give a folder of user shaders: make libplacebo HOOKS=..."; exit 2; }
 	$(PYTHON) tools/libplacebo/compare.py build/libplacebo/apply_hook "$(HOOKS)" $(LIBPLACEBO)

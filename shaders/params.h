@@ -37,18 +37,13 @@
     SETTING(reference_white, 203.0, 1.0, 10000.0)
 
 // For a pass that reads an image of another size: the size of its target, and the largest value of
-// the target's format. If the images are bands of rows, target_height and source_height are those
-// of the complete images, and row_offset is the distance of the first rows: twice the first row of
-// the target times source_height, less twice the first row of the source times target_height.
-// Otherwise source_height and row_offset are 0.
+// the target's format.
 #define SAMPLING_ROWS(B, INPUT) \
     PLACE_ROWS(B, INPUT) \
     INPUT(B, float, limit)
 #define PLACE_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
-    INPUT(B, int, target_height) \
-    INPUT(B, int, source_height) \
-    INPUT(B, int, row_offset)
+    INPUT(B, int, target_height)
 
 // For passes with a threshold, and for passes that write the finished picture.
 #define THRESHOLD_ROWS(B, READS) \
@@ -358,7 +353,9 @@
     COUNT(karis_average, 0, 0, 1) \
     COUNT(streaks, 4, 1, 16) \
     COUNT(diagonal, 1, 0, 1) \
-    COUNT(fast, 0, 0, 1)
+    COUNT(fast, 0, 0, 1) \
+    COUNT(quarter, 0, 0, 1) \
+    COUNT(urp_12, 0, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
@@ -716,6 +713,7 @@
     NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \
+    NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \

@@ -1,13 +1,14 @@
 """Test blurs and blooms of other packages against the laws of `vkbloom.testing`.
 
-``python -m tools.laws`` writes docs/laws.md. It needs the packages of benchmarks/peers.txt and a
-Vulkan driver, as pygfx's bloom runs through wgpu.
+``python -m tools.laws`` writes docs/evidence/laws_table.md. It needs the packages of
+benchmarks/peers.txt and a Vulkan driver, as pygfx's bloom runs through wgpu.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import re
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +22,7 @@ from vkbloom import testing
 from vkbloom.testing import Probe
 from vkbloom.testing._probe import Bloom
 
-TARGET = Path(__file__).parents[1] / "docs" / "laws.md"
+TARGET = Path(__file__).parents[1] / "docs" / "evidence" / "laws_table.md"
 SIGMA = 2.0
 
 # Small kernels end far from the border; the widest level of a chain does not.
@@ -204,89 +205,36 @@ def measured(subject: Subject) -> str:
     return f"gain {found.gain[0]:.4g}, sigma {sigma_x:.3g} and {sigma_y:.3g} pixels{border}"
 
 
-def page(subjects: list[Subject], device: str) -> str:
-    """Return the page."""
+def table(subjects: list[Subject], device: str) -> str:
+    """Return the table: what each blur breaks, and by how much."""
     columns = laws()
-    rows, notes = [], []
+    rows = []
     for subject in subjects:
-        cells, broken = [], []
+        broken, untested = [], []
         for name, law in columns.items():
             try:
                 law(subject)
             except LookupError:
-                cells.append("")
+                untested.append(name)
             except AssertionError as error:
-                cells.append("**no**")
-                figure, promise = str(error).split("\n  law: ")
-                broken.append(f"  - {name}: {figure.partition(': ')[2]} ({promise})")
+                figure = str(error).split("\n  law: ")[0].partition(": ")[2]
+                broken.append(f"{name}: {re.split(' at x|, channel', figure)[0]}")
             except ValueError as error:
-                cells.append("?")
-                broken.append(f"  - {name}: {error}")
-            else:
-                cells.append("yes")
-        rows.append(f"| {subject.name} | {' | '.join(cells)} |")
-        head = f"- {subject.name}"
-        if not subject.picture:
-            head += f" ({measured(subject)})"
-        notes += [head, *broken]
-    heads = " | ".join(columns)
-    return TEXT.format(
-        device=device,
-        table="\n".join([f"| | {heads} |", "|---" * (len(columns) + 1) + "|", *rows]),
-        notes="\n".join(notes),
-        sigma=SIGMA,
-    )
-
-
-TEXT = """# Which laws blurs and blooms keep
-
-Written by `tools/laws.py`. It tests blurs and blooms of other packages against
-the assertions of `vkbloom.testing` (see [testing.md](testing.md)). The adapter, where one is used:
-{device}.
-
-Gaussians have a sigma of {sigma:g} pixels. Images are float32 of 65 x 65 pixels with values up to
-1. Chains of halved images have 256 x 256 pixels. Tolerances are the defaults. The presets of this
-package are tested by [`vkbloom check`](check.md).
-An empty cell means that the law does not apply. A question mark means that the premise of the law
-does not hold. "Mirrored" is `assert_symmetric` for left and right and for top and bottom;
-"transposed" is `assert_symmetric` for rows and columns. The limit for fireflies is 1: a bright
-pixel may raise its neighbours by at most 1.
-
-A broken law is a fault only if the method promises this law. A median is not linear. A threshold
-breaks superposition on purpose. A linear blur spreads fireflies. A chain that halves by 2 x 2
-pixels moves the light of a pixel to the centre of its square.
-
-{table}
-
-## Deviations
-
-Each blur has the gain and the standard deviation of its point spread, and the largest deviation
-from each broken law, with its position.
-
-{notes}
-
-## Notes
-
-- pygfx's bloom is the sum of its levels. So its gain is the number of levels, and the bloom makes
-  the picture brighter everywhere. Its `use_karis_average` has no effect in this version: one
-  uniform buffer holds the switch for all levels, all writes to it come before the first pass
-  runs, and the last write turns it off.
-- `unsharp_mask` of this scikit-image is called with `channel_axis=2` here. With -1 it filters
-  three rows and leaves the rest of its result uninitialized. These assertions found that.
-- A `uniform_filter` of even size shifts the image by half a pixel, as an even number of taps has
-  no middle tap.
-- PyTorch is not tested here: its wheel for Linux has 539 MB.
-"""
+                untested.append(f"{name} ({error})")
+        point = "" if subject.picture else measured(subject)
+        rows.append(f"| {subject.name} | {point} | {'; '.join(broken)} | {', '.join(untested)} |")
+    heads = ["| blur | one lit pixel | breaks | not tested |", "|---|---|---|---|"]
+    return "\n".join([f"The adapter, where one is used: {device}.", "", *heads, *rows, ""])
 
 
 def main() -> None:
-    """Write the page."""
+    """Write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=TARGET)
     target = parser.parse_args().out
     with vkbloom.Renderer("software") as renderer:
         subjects = [*opencv(), *scipy(), *skimage(), *pygfx(renderer.info.name)]
-        target.write_text(page(subjects, renderer.info.summary), encoding="utf-8")
+        target.write_text(table(subjects, renderer.info.summary), encoding="utf-8")
     print(target)
 
 

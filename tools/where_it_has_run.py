@@ -1,6 +1,6 @@
-"""Write docs/drivers_table.md, where vkbloom has run, from the kept reports of docs/devices.
+"""Write drivers_table.md, where vkbloom has run, from the kept reports of docs/evidence/devices.
 
-``python tools/where_it_has_run.py [--out docs]``. Two programs write the reports:
+``python tools/where_it_has_run.py [--out docs/evidence]``. Two programs write the reports:
 ``vkbloom doctor --self-test --json FILE`` and ``python -m tests.device.amd_families --json FILE``.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-ROOT: Final = Path(__file__).parents[1]
+EVIDENCE: Final = Path(__file__).parents[1] / "docs" / "evidence"
 
 #: Of the systems that users have, those of which there is no report.
 NOT_TRIED: Final = (
@@ -53,11 +53,9 @@ def _share(error: float | None, allowed: float | None) -> float:
 def main() -> None:
     """Write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs")
+    parser.add_argument("--out", type=Path, default=EVIDENCE)
     arguments = parser.parse_args()
-    table = [
-        row for file in sorted((ROOT / "docs" / "devices").glob("*.json")) for row in rows(file)
-    ]
+    table = [row for file in sorted((EVIDENCE / "devices").glob("*.json")) for row in rows(file)]
     table.sort(key=lambda row: row[2] != "drawn")
     table += [(name, "", "not tried", "", "") for name in NOT_TRIED]
     lines = ["| device | driver | | result | figures |", "|---|---|---|---|---|"]

@@ -3,6 +3,7 @@
 #include "execute/limits.h"
 #include "vulkan/labels.h"
 
+#include <math.h>
 #include <string.h>
 
 // Keys are compared byte by byte. All members have 64 bits, so there is no padding.
@@ -154,8 +155,8 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
     return true;
 }
 
-// The images of a convolution, which are many times larger than the frame, must fit the largest
-// heap of the device together.
+// All images must fit the largest heap of the device together. Those of a convolution are many
+// times larger than the frame.
 static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
                          struct vkb_error *error)
 {
@@ -169,13 +170,20 @@ static bool check_memory(const struct vkb_device *device, const struct vkb_graph
         if (device->memory.memoryHeaps[i].size > largest)
             largest = device->memory.memoryHeaps[i].size;
     // Plans without a renderer know no heaps.
-    if (convolves && largest && needed > largest)
-        return vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
-                        "memory is short: %llu MiB of images are needed, and the adapter %s has "
-                        "%llu; use a smaller bloom_scale or kernel_size",
-                        (unsigned long long)(needed >> 20), device->adapter.name,
-                        (unsigned long long)(largest >> 20));
-    return true;
+    if (!largest || needed <= largest)
+        return true;
+    vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+             "memory is short: %llu MiB of images are needed, and the adapter %s has %llu",
+             (unsigned long long)(needed >> 20), device->adapter.name,
+             (unsigned long long)(largest >> 20));
+    const struct vkb_image_row *image = &graph->images[0];
+    const double share = sqrt((double)largest / (double)needed);
+    if (convolves)
+        vkb_add_words(error, "; use a smaller bloom_scale or kernel_size");
+    else
+        vkb_add_words(error, "; an image of %u x %u fits, or use a smaller bloom_scale",
+                      (uint32_t)(share * image->width), (uint32_t)(share * image->height));
+    return false;
 }
 
 bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,

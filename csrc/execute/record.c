@@ -266,7 +266,7 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
     for (uint32_t i = 0; i < plan->output_count; ++i) {
         struct vkb_output *output = &run->request->outputs[i];
         if (plan->outputs[i] == image && (vkb_readback_is_complete(output) || pass->shader->packed)
-            && vkb_readback_takes_words(run->device, output, run->graph->images[image].height))
+            && vkb_readback_takes_words(run->device, output))
             return output;
     }
     return NULL;

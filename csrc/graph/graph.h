@@ -24,6 +24,8 @@ enum {
 
 #define VKB_NO_IMAGE UINT32_MAX
 
+typedef char vkb_image_name[VKB_NAME_SIZE];
+
 // Which of its data the host writes to an image: the image of a source, its emission, its mask, or
 // an image that another part of the graph has made.
 enum vkb_input_kind {
@@ -86,13 +88,6 @@ enum vkb_reading {
     VKB_READING_WORDS,   // as buffers of 16-byte words, on devices that share images with the host
 };
 
-// Where the rows of a band may begin in the images of a pass (bands.h).
-enum vkb_band_rows {
-    VKB_BAND_SAME_PLACE,  // at the same position in all: at any row if they have the same height
-    VKB_BAND_ANY_ROW,  // at any row: the pass computes its position from row_offset (SAMPLING_ROWS)
-    VKB_BAND_EVEN_ROW,  // at the same position in all, at an even row
-};
-
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend {
     VKB_BLEND_NONE,
@@ -124,9 +119,6 @@ struct vkb_pass_row {
     uint32_t depth;  // VKB_NO_IMAGE: none
     enum vkb_load load;
     enum vkb_blend blend;
-    // Largest distance of a read from the target's position, in source rows; INFINITY: anywhere.
-    float reach;
-    enum vkb_band_rows band_rows;
     // Bound after the images read. Their owner outlives the row.
     const struct vkb_resource *const *resources;
     uint32_t resource_count;

@@ -60,28 +60,6 @@ size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, uns
     return size;
 }
 
-#define SET_ROWS(block) \
-    case VKB_BLOCK_##block: \
-        params->block.target_height = rows->target_height; \
-        params->block.source_height = rows->source_height; \
-        params->block.row_offset = rows->row_offset; \
-        break;
-
-void vkb_params_set_rows(enum vkb_block block, const struct vkb_params_rows *rows,
-                         union vkb_params *params)
-{
-    switch (block) {
-        SET_ROWS(blur)
-        SET_ROWS(threshold)
-        SET_ROWS(filter)
-        SET_ROWS(prefilter)
-        SET_ROWS(gather)
-        SET_ROWS(blender_end)
-    default:
-        break;
-    }
-}
-
 #define READ(block, name) params->block.name = values->name;
 #define READ_BLOCK(block, ROWS) \
     case VKB_BLOCK_##block: \

@@ -44,15 +44,6 @@ extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 // `bytes` has space for vkb_block_sizes[block]. Returns the number of bytes.
 size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes);
 
-// The values of SAMPLING_ROWS for images that are bands of rows.
-struct vkb_params_rows {
-    int target_height, source_height, row_offset;
-};
-
-// Sets them in blocks that have them.
-void vkb_params_set_rows(enum vkb_block block, const struct vkb_params_rows *rows,
-                         union vkb_params *params);
-
 // All settings that are numbers: those that passes read, and those that shape the graph.
 struct vkb_values {
 #define VKB_SETTING_MEMBER(name, initial, low, high) float name;

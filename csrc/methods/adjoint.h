@@ -3,7 +3,7 @@
 #ifndef VKB_METHODS_ADJOINT_H
 #define VKB_METHODS_ADJOINT_H
 
-#include "graph/bands.h"
+#include "graph/graph.h"
 #include "methods/source.h"
 
 // The framebuffers with cotangents, which the source brings as its levels.

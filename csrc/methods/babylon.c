@@ -25,10 +25,8 @@ bool vkb_add_babylon(const struct vkb_settings *settings, const struct vkb_bloom
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &bright, error))
         return false;
     struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_BABYLON, source->glow, bright);
-    // Not by bands of rows.
-    row.reach = INFINITY;
     vkb_mask_prefilter(&levels, &row);
     return vkb_graph_add_pass(graph, &row, error)
         && vkb_levels_blur(&levels, 0, bright, &kernel, error)
-        && vkb_levels_enlarge(&levels, levels.downs[0], 1.0, bloom, error);
+        && vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, levels.downs[0], 1.0, bloom, error);
 }

@@ -217,7 +217,6 @@ static bool add_line(const struct glare *glare, int direction, int step_x, int s
         row.geometry = VKB_GEOMETRY_DISPATCH;
         row.vertex = NULL;
         row.variant = "dispatch";
-        row.reach = INFINITY;
         row.block_width = row.block_height = 1;
         row.groups_width = (lines + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
         row.groups_height = 1;
@@ -261,7 +260,6 @@ static bool add_sun_beams(struct glare *glare, uint32_t *light, struct vkb_error
         return false;
     struct vkb_pass_row row = vkb_fetching_row(&glare->levels, &vkb_shader_sun_beams_frag,
                                                glare->levels.downs[0], *light);
-    row.reach = INFINITY;
     row.block = VKB_BLOCK_sun_beams;
     row.params.sun_beams = (struct vkb_sun_beams_params){
         .most = most,
@@ -307,7 +305,6 @@ static bool add_highlights(struct glare *glare, struct vkb_error *error)
         vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
     if (factor > 1) {
         row.constants.radius = (int32_t)factor;
-        row.reach = INFINITY;
     }
     vkb_mask_prefilter(levels, &row);
     return vkb_graph_add_pass(levels->graph, &row, error)

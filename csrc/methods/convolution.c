@@ -299,7 +299,7 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
     const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
 
     return vkb_convolve(settings, source, same ? &whole : &part, "", graph, bloom, error)
-        && (same || vkb_levels_enlarge(&levels, *bloom, 1.0, bloom, error));
+        && (same || vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, *bloom, 1.0, bloom, error));
 }
 
 // Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.

@@ -45,7 +45,6 @@ static struct vkb_pass_row glare_row(const struct vkb_levels *levels,
 {
     struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
 
-    row.reach = INFINITY;
     return row;
 }
 
@@ -292,7 +291,6 @@ static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_gl
         || !vkb_levels_step(levels, "dirty_light", 0, levels->source->final, &dirty, error))
         return false;
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, *light, dirty);
-    row.reach = INFINITY;  // the picture has no bands of rows
     row.reads[1] = dirt;
     row.read_count = 2;
     row.block = VKB_BLOCK_dirt;

@@ -13,7 +13,6 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_godot_blur_frag, from, to);
 
-    vkb_reach_nine(&row);
     row.constants.groups = GROUPS_GODOT_BLUR;
     row.constants.direction = direction;
     row.constants.first = first;

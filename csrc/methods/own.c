@@ -43,7 +43,6 @@ static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
         row.block_width = pass->block_width;
         row.block_height = pass->block_height;
     }
-    row.reach = INFINITY;
     row.block = VKB_BLOCK_own;
     row.params.own = pass->params;
     row.resources = pass->resources;
@@ -68,7 +67,8 @@ bool vkb_add_own(const struct vkb_settings *settings, const struct vkb_bloom_sou
         const bool enlarged = strcmp(pass->name, BLOOM) == 0 && !has_size(pass, source->final);
         uint32_t image;
         if (!add_pass(pass, enlarged ? "bloom_own" : pass->name, source, graph, &image, error)
-            || (enlarged && !vkb_levels_enlarge(&levels, image, 1.0, &image, error)))
+            || (enlarged
+                && !vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, image, 1.0, &image, error)))
             return false;
         if (strcmp(pass->name, BLOOM) == 0)
             *bloom = image;

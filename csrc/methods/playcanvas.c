@@ -16,8 +16,6 @@ static bool add_first(struct vkb_levels *levels, struct vkb_error *error)
         return false;
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, levels->source->glow, half);
     row.constants.thresholded = false;
-    // Not by bands of rows.
-    row.reach = INFINITY;
     if (!vkb_graph_add_pass(levels->graph, &row, error)
         || !vkb_levels_step(levels, "reduced", 0, levels->sizes[0], &step, error)
         || !vkb_levels_reduce(levels, 1.0, 1.0, half, step, error)

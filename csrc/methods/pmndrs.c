@@ -38,8 +38,6 @@ bool vkb_add_pmndrs(const struct vkb_settings *settings, const struct vkb_bloom_
         return false;
     struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, from);
     row.constants.node = true;
-    // Not by bands of rows.
-    row.reach = INFINITY;
     vkb_mask_prefilter(&levels, &row);
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;

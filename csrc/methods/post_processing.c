@@ -25,12 +25,9 @@ static bool add_first(struct vkb_levels *levels, struct vkb_error *error)
     if (!vkb_levels_step(levels, "reduced", 0, levels->sizes[0], &step, error)
         || !reduce(levels, levels->source->glow, step, error) || !vkb_levels_down(levels, 0, error))
         return false;
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, step, levels->downs[0]);
-    row.constants.node = true;
-    // Not by bands of rows.
-    row.reach = INFINITY;
-    for (int channel = 0; channel < 3; ++channel)
-        row.params.prefilter.tint[0][channel] = levels->settings->tint[channel];
+    struct vkb_pass_row row =
+        vkb_groups_row(levels, GROUPS_POST_PROCESSING, step, levels->downs[0]);
+    vkb_set_tint(&row, levels->settings->tint);
     vkb_mask_prefilter(levels, &row);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }

@@ -67,6 +67,28 @@ static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
     return vkb_levels_blur(levels, level, from, &kernel, error);
 }
 
+// Multiplies the levels by the tints, three factors for each level.
+static bool add_tints(struct vkb_levels *levels, const float *tints, struct vkb_error *error)
+{
+    for (uint32_t level = 0; level < levels->count; ++level, tints += 3) {
+        uint32_t tinted;
+
+        if (tints[0] == 1.0f && tints[1] == 1.0f && tints[2] == 1.0f)
+            continue;
+        if (!vkb_levels_step(levels, "tinted_%u", level, levels->sizes[level], &tinted, error))
+            return false;
+        struct vkb_pass_row row =
+            vkb_groups_row(levels, GROUPS_POST_PROCESSING, levels->downs[level], tinted);
+        row.constants.thresholded = false;
+        row.params.prefilter.clamp_max = (float)SINGLE_LIMIT;
+        vkb_set_tint(&row, tints);
+        levels->downs[level] = tinted;
+        if (!vkb_graph_add_pass(levels->graph, &row, error))
+            return false;
+    }
+    return true;
+}
+
 bool vkb_add_three(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -100,7 +122,8 @@ bool vkb_add_three(const struct vkb_settings *settings, const struct vkb_bloom_s
     for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
         if (!add_level(&levels, level, from, error))
             return false;
-    return vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
+    return add_tints(&levels, settings->level_weights, error)
+        && vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
         && vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, sum, error)
-        && vkb_levels_enlarge(&levels, sum, total, bloom, error);
+        && vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, sum, total, bloom, error);
 }

@@ -30,13 +30,22 @@ static uint32_t level_count(uint32_t width, uint32_t height, double spared, int 
     return (uint32_t)fmin(fmax(count, 1.0), most);
 }
 
+// How URP enlarges levels; its two newer filters the last one alone.
+static enum vkb_mode urp_kernel(const struct vkb_levels *levels)
+{
+    return levels->settings->values.high_quality_filtering ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;
+}
+
 // The levels below the first one, which is prefiltered, and the bloom from them.
 typedef bool add_urp(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
 
 static bool add_gaussian(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
 {
-    const struct vkb_combination combination = scattered(levels->settings, UPSAMPLE_LINEAR);
-    const struct vkb_kernel kernel = {.weights = urp_weights, .count = WEIGHT_COUNT, .step_x = 2.0};
+    const struct vkb_combination combination = scattered(levels->settings, urp_kernel(levels));
+    const struct vkb_kernel kernel = {.weights = urp_weights,
+                                      .count = WEIGHT_COUNT,
+                                      .step_x = 2.0,
+                                      .inset = !levels->settings->values.urp_12};
 
     for (uint32_t level = 1; level < levels->count; ++level)
         if (!vkb_levels_blur(levels, level, levels->downs[level - 1], &kernel, error))
@@ -64,7 +73,7 @@ static bool add_kawase(struct vkb_levels *levels, uint32_t *bloom, struct vkb_er
         if (!vkb_filter_end(levels, &row, error))
             return false;
     }
-    return vkb_levels_enlarge(levels, from, 1.0, bloom, error);
+    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0, bloom, error);
 }
 
 // URP 17: dual Kawase, whose way up begins with the last level and adds no other.
@@ -82,7 +91,7 @@ static bool add_dual(struct vkb_levels *levels, uint32_t *bloom, struct vkb_erro
         if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &to, error)
             || !vkb_kawase_up(levels, offset, from, to, error))
             return false;
-    return vkb_levels_enlarge(levels, from, 1.0, bloom, error);
+    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0, bloom, error);
 }
 
 static add_urp *const urp_filters[] = {
@@ -91,20 +100,39 @@ static add_urp *const urp_filters[] = {
     [FILTER_DUAL] = add_dual,
 };
 
+// The first level: one sample, in high quality 13 taps half a texel apart. URP 12 takes a texel's
+// width for its height.
+static bool add_urp_first(struct vkb_levels *levels, struct vkb_error *error)
+{
+    const struct vkb_bloom_source *source = levels->source;
+    const struct vkb_size frame = source->buffers;
+    const double aspect = (double)frame.height / frame.width;
+    const double step_y = levels->settings->values.urp_12 ? 0.5 * aspect : 0.5;
+    uint32_t from = source->glow;
+
+    if (levels->settings->values.high_quality_filtering
+        && (!vkb_levels_step(levels, "reduced", 0, levels->sizes[0], &from, error)
+            || !vkb_levels_reduce(levels, 0.5, step_y, source->glow, from, error)))
+        return false;
+    if (!vkb_levels_down(levels, 0, error))
+        return false;
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, levels->downs[0]);
+    vkb_set_tint(&row, levels->settings->tint);
+    vkb_mask_prefilter(levels, &row);
+    return vkb_graph_add_pass(levels->graph, &row, error);
+}
+
 bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    struct vkb_size size = vkb_halved(source->buffers);
+    const struct vkb_size half = vkb_halved(source->buffers);
+    struct vkb_size size = settings->values.quarter ? vkb_halved(half) : half;
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 
     for (; levels.count < count; size = vkb_halved(size))
         levels.sizes[levels.count++] = size;
-    if (!vkb_levels_down(&levels, 0, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_URP, source->glow, levels.downs[0]);
-    vkb_mask_prefilter(&levels, &row);
-    return vkb_graph_add_pass(graph, &row, error)
+    return add_urp_first(&levels, error)
         && urp_filters[settings->choices[VKB_CHOICE_filter]](&levels, bloom, error);
 }
 
@@ -122,7 +150,6 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
-    vkb_reach_nine(&row);
     vkb_drop_reads(&row, 1);
     row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;

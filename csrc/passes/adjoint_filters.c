@@ -34,6 +34,8 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
         set_line(params, radius, params->step_x, pass->constants.taps, &filter.x);
     if (direction != DIRECTION_HORIZONTAL)
         set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
+    if (pass->constants.upsample)
+        filter.x.kind = VKB_KIND_INSET_LINEAR;
     return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
 }
 

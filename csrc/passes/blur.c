@@ -44,7 +44,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     struct vkb_blur moved = *blur;
 
     // With a step of 0 all taps are at the same place, so all sizes fit.
-    if (!blur->offsets && blur->direction != DIRECTION_BOTH
+    if (!blur->offsets && !blur->inset && blur->direction != DIRECTION_BOTH
         && (step == 0.0 || (same_size && !is_integer(step)))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;
@@ -63,15 +63,15 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     for (uint32_t i = 0; blur->offsets && i < moved.count; ++i)
         params->offsets[i / 4][i % 4] = (float)blur->offsets[i];
     row.constants.taps = blur->offsets ? (int32_t)moved.count : 0;
-    // Offsets of merged taps are up to twice their number.
-    row.reach += (blur->offsets ? 2 : 1) * (moved.count - 1) * fabsf(params->step_y);
     row.constants.direction = blur->direction;
+    if (blur->inset)
+        row.constants.upsample = UPSAMPLE_INSET_LINEAR;
     row.constants.radius = (int32_t)moved.count - 1;
-    row.constants.sampling =
-        !blur->offsets && same_size && is_integer(params->step_x) && is_integer(params->step_y)
-            ? SAMPLING_TEXEL
-        : blur->filter ? SAMPLING_FILTER
-                       : SAMPLING_FETCH;
+    row.constants.sampling = !blur->offsets && !blur->inset && same_size
+                                  && is_integer(params->step_x) && is_integer(params->step_y)
+                               ? SAMPLING_TEXEL
+                           : blur->filter ? SAMPLING_FILTER
+                                          : SAMPLING_FETCH;
     return row;
 }
 
@@ -93,7 +93,8 @@ bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texe
     const double step = vertical ? params->step_y : params->step_x;
     const int taps = pass->constants.radius;
 
-    if (pass->constants.taps || !is_integer(step) || step < 0.0 || taps * step > limit)
+    if (pass->constants.taps || pass->constants.upsample || !is_integer(step) || step < 0.0
+        || taps * step > limit)
         return false;
     memset(kernel, 0, sizeof *kernel);
     kernel->radius = taps * (int)step;

@@ -17,6 +17,7 @@ struct vkb_blur {
     double gain;            // factor of the sum
     const double *offsets;  // of these taps in steps; NULL: 0, 1, ...
     double step_x, step_y;  // the distance of two taps in a row and in a column, in source texels
+    bool inset;             // no tap is beyond the middle of the last two columns
     bool filter;            // the sampler filters taps between texels; otherwise the shader does
 };
 

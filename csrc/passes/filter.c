@@ -12,7 +12,6 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
     // Filtered in the shader: lavapipe's sampler keeps 8 bits of the position, and the errors of a
     // chain add up.
     row.constants.sampling = SAMPLING_FETCH;
-    row.band_rows = VKB_BAND_ANY_ROW;
     return row;
 }
 
@@ -103,7 +102,6 @@ bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
     row->constants.window = row->constants.upsample == UPSAMPLE_CUBIC ? 4
                           : window <= MAX_WINDOW                      ? window
                                                                       : 0;
-    row->reach = (float)(VKB_FILTER_REACH + rows);
     return vkb_graph_add_pass(levels->graph, row, error);
 }
 

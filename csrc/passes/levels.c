@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
 {
@@ -91,13 +92,6 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
     row->params.prefilter.step_x = (float)step_x;
     row->params.prefilter.step_y = (float)step_y;
-    row->reach = (float)(VKB_FILTER_REACH + 2.0 * fabs(step_y));
-}
-
-void vkb_reach_nine(struct vkb_pass_row *row)
-{
-    row->reach = VKB_FILTER_REACH + 2 * 4;
-    row->band_rows = VKB_BAND_EVEN_ROW;
 }
 
 static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
@@ -142,6 +136,11 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
     return row;
 }
 
+void vkb_set_tint(struct vkb_pass_row *row, const float *tint)
+{
+    memcpy(row->params.prefilter.tint[0], tint, 3 * sizeof *tint);
+}
+
 struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
                                    uint32_t from, uint32_t to)
 {
@@ -167,6 +166,7 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
         .gain = 1.0,
         .step_x = step,
         .step_y = step,
+        .inset = kernel->inset && direction == DIRECTION_HORIZONTAL,
         // In columns, whose sizes are equal, samples of two taps are equal to these taps.
         .offsets = kernel->offsets,
     };
@@ -302,11 +302,13 @@ bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double ga
     return add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain, error);
 }
 
-bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
-                        uint32_t *bloom, struct vkb_error *error)
+bool vkb_levels_enlarge(const struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
+                        double gain, uint32_t *bloom, struct vkb_error *error)
 {
+    static const struct vkb_combination enlarging = {0};
+
     return vkb_levels_bloom(levels, bloom, error)
-        && vkb_levels_resize(levels, from, gain, *bloom, error);
+        && add_up(levels, &enlarging, kernel, from, *bloom, VKB_NO_IMAGE, 0.0, gain, error);
 }
 
 bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
@@ -324,7 +326,6 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
         row.reads[level] = levels->downs[level < levels->count ? level : 0];
     row.block = VKB_BLOCK_gather;
-    row.band_rows = VKB_BAND_SAME_PLACE;
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
     VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);

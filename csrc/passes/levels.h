@@ -62,6 +62,9 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
 // The outer ones are two steps away.
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
 
+// Sets the factors of the colours. That of alpha is 1.
+void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
+
 // For a blur of nine taps, a pixel of the target apart, whose source may be twice as large. Borders
 // and pairs of samples are counted from the first row.
 void vkb_reach_nine(struct vkb_pass_row *row);
@@ -84,8 +87,9 @@ struct vkb_kernel {
     const float *weights;   // w0..
     const double *offsets;  // of these in pixels of the level; NULL: 0, 1, ...
     uint32_t count;
-    double step_x;  // distance of the horizontal pass's taps in texels of its source; // 0: one
-                    // pixel of the level
+    double step_x;  // distance of the horizontal pass's taps in texels of its source; 0: one pixel
+                    // of the level
+    bool inset;     // the horizontal pass is that of URP 17
 };
 
 // Adds the image down_`level` and the two passes that blur `from` into it.
@@ -104,9 +108,9 @@ bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct v
 bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double gain, uint32_t to,
                        struct vkb_error *error);
 
-// The pass "bloom": enlarges the image bilinearly and multiplies it by a gain.
-bool vkb_levels_enlarge(const struct vkb_levels *levels, uint32_t from, double gain,
-                        uint32_t *bloom, struct vkb_error *error);
+// The pass "bloom": enlarges the image by a kernel of UPSAMPLE_* and multiplies it by a gain.
+bool vkb_levels_enlarge(const struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
+                        double gain, uint32_t *bloom, struct vkb_error *error);
 
 // The passes up_N-2 ... up_0, the last of which is *top, without `last_kernel` and `gain`.
 bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,

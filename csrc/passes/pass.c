@@ -17,7 +17,6 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader
     row.targets[0] = target;
     row.target_count = 1;
     row.depth = VKB_NO_IMAGE;
-    row.reach = VKB_FILTER_REACH;
     return row;
 }
 

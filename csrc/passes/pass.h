@@ -57,9 +57,6 @@ bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
 
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
-// The reach of a bicubic filter, and of the rounding of places. Passes with taps add theirs.
-enum { VKB_FILTER_REACH = 4 };
-
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.
 struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader *fragment,
                                        uint32_t target);

@@ -45,7 +45,6 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
     const bool same_size = vkb_same_size(graph, image, glow)
                         && (mask == VKB_NO_IMAGE || vkb_same_size(graph, mask, glow));
     row.constants.sampling = same_size ? SAMPLING_TEXEL : SAMPLING_FETCH;
-    row.band_rows = VKB_BAND_ANY_ROW;
     row.reads[0] = image;
     vkb_apply_mask(&row, mask);
     row.block = VKB_BLOCK_threshold;

@@ -4,6 +4,27 @@
 #include "python/module.h"
 #include "python/plan.h"
 
+#include <stdio.h>
+
+static bool read_names(PyObject *tuple, struct vkb_cotangents *cotangents)
+{
+    const Py_ssize_t given = PyTuple_Size(tuple);
+
+    if (given > GATHERED_LEVELS) {
+        PyErr_Format(PyExc_ValueError, "names: %zd names are out of range, 0 to %d", given,
+                     GATHERED_LEVELS);
+        return false;
+    }
+    for (cotangents->count = 0; cotangents->count < given; ++cotangents->count) {
+        PyObject *text = PyUnicode_AsUTF8String(PyTuple_GetItem(tuple, cotangents->count));
+        if (!text)
+            return false;
+        snprintf(cotangents->names[cotangents->count], VKB_NAME_SIZE, "%s", PyBytes_AsString(text));
+        Py_DECREF(text);
+    }
+    return true;
+}
+
 PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
 {
     const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
@@ -17,8 +38,7 @@ PyObject *vkb_renderer_adjoint(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "O!OO!p:adjoint", state->source_type, &source,
                           &settings_object, &PyTuple_Type, &names, &sums)
-        || !vkb_read_settings(settings_object, &settings)
-        || !vkb_read_names(names, cotangents.names, &cotangents.count))
+        || !vkb_read_settings(settings_object, &settings) || !read_names(names, &cotangents))
         return NULL;
     cotangents.sums = sums;
     if (!vkb_require_open(renderer, &error))

@@ -37,7 +37,21 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
     return list;
 }
 
+static PyObject *fail_without_adapter(PyObject *module, PyObject *text)
+{
+    struct vkb_error error;
+    const char *message = PyUnicode_AsUTF8AndSize(text, NULL);
+
+    if (!message)
+        return NULL;
+    vkb_fail(&error, VKB_ERROR_ADAPTER_NOT_FOUND, "%s. %s", message, vkb_install_hint);
+    vkb_instance_explain(&error);
+    return vkb_raise(vkb_module_state(module), &error);
+}
+
 static PyMethodDef functions[] = {
+    {"fail_without_adapter", fail_without_adapter, METH_O,
+     "fail_without_adapter(text): raises AdapterNotFoundError, with what to install."},
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
     {"image_source", vkb_image_source, METH_VARARGS,

@@ -19,7 +19,6 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 // Methods of the Renderer.
 PyObject *vkb_renderer_adjoint(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
-PyObject *vkb_renderer_bands(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_show(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_open_screen(PyObject *renderer, PyObject *arguments);
@@ -31,7 +30,6 @@ PyObject *vkb_renderer_cuda(PyObject *renderer, PyObject *unused);
 PyObject *vkb_renderer_dlpack(PyObject *renderer, PyObject *array);
 PyObject *vkb_renderer_cuda_name(PyObject *renderer, PyObject *ordinal);
 PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
-PyObject *vkb_renderer_fill(PyObject *renderer, PyObject *arguments);
 
 #ifdef VKBLOOM_FAULTS
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);

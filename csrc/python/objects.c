@@ -50,14 +50,15 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
     char uuid[VKB_UUID_TEXT_SIZE];
 
     vkb_uuid_text(adapter->uuid, uuid);
-    return Py_BuildValue("(ssssNy#Nss)", adapter->name, vkb_adapter_type(adapter), adapter->driver,
-                         adapter->driver_info,
+    return Py_BuildValue("(ssssNy#NssIN)", adapter->name, vkb_adapter_type(adapter),
+                         adapter->driver, adapter->driver_info,
                          PyUnicode_FromFormat("%u.%u.%u",
                                               VK_API_VERSION_MAJOR(adapter->api_version),
                                               VK_API_VERSION_MINOR(adapter->api_version),
                                               VK_API_VERSION_PATCH(adapter->api_version)),
                          (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE,
-                         PyBool_FromLong(adapter->bundled), uuid, adapter->pci);
+                         PyBool_FromLong(adapter->bundled), uuid, adapter->pci, adapter->vendor,
+                         PyBool_FromLong(!adapter->nonconformant));
 }
 
 void *vkb_new_object(PyObject *type)

@@ -181,11 +181,9 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                         struct vkb_error *error)
 {
     graph->max_width = device->max_side;
-    return (portion && portion->part ? vkb_build_part(source, settings, portion->part, graph, error)
-            : portion && portion->cotangents
-                ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
-                                    &portion->first, &portion->is_possible, error)
-                : vkb_source_build(source, settings, device->max_side, graph, error))
+    return (portion ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side,
+                                        graph, &portion->first, &portion->is_possible, error)
+                    : vkb_source_build(source, settings, device->max_side, graph, error))
         // Variants divide by the sizes of images, and add images of their own.
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
@@ -223,18 +221,6 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     return false;
 }
 
-static bool hold_passes(const struct vkb_module_state *state, const struct vkb_device *device,
-                        PyObject *settings_object, const struct vkb_part *part,
-                        struct vkb_settings *settings, struct vkb_plan_object *self)
-{
-    struct vkb_source complete = self->source;
-
-    if (part)
-        complete.image.size.height = part->height;
-    return vkb_hold_passes(state, settings_object, part ? VKB_MAX_SIDE : device->max_side,
-                           &complete, &self->passes, settings);
-}
-
 PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
                        enum vkb_variants variants, uint64_t renderer, PyObject *source,
                        PyObject *settings_object, struct vkb_settings *settings,
@@ -249,8 +235,8 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
     self->renderer = renderer;
     if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
         || !hold_kernel(state, device, settings_object, settings, self)
-        || !hold_passes(state, device, settings_object, portion ? portion->part : NULL, settings,
-                        self)) {
+        || !vkb_hold_passes(state, settings_object, device->max_side, &self->source, &self->passes,
+                            settings)) {
         Py_DECREF(self);
         return NULL;
     }
@@ -264,8 +250,8 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
         vkb_release_kernel(&self->kernel);
         vkb_release_kernel(&self->dirt);
     }
-    if (!(portion && portion->cotangents ? choose_derivatives(&self->plan, portion->first)
-                                         : choose_outputs(&self->plan, names))
+    if (!(portion ? choose_derivatives(&self->plan, portion->first)
+                  : choose_outputs(&self->plan, names))
         || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;
@@ -277,23 +263,20 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names, *given = NULL;
-    struct vkb_part part;
-    struct vkb_portion portion = {.part = &part};
+    PyObject *source, *settings_object, *names;
     struct vkb_settings settings;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!OO|O:plan", state->source_type, &source, &settings_object,
-                          &names, &given)
-        || !vkb_read_settings(settings_object, &settings)
-        || (given && !vkb_read_part(given, (struct vkb_source_object *)source, names, &part)))
+    if (!PyArg_ParseTuple(arguments, "O!OO:plan", state->source_type, &source, &settings_object,
+                          &names)
+        || !vkb_read_settings(settings_object, &settings))
         return NULL;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
     return vkb_new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                        settings_object, &settings, given ? &portion : NULL, names);
+                        settings_object, &settings, NULL, names);
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)

@@ -5,8 +5,6 @@
 #include "python/arguments.h"
 #include "python/renderer.h"
 
-#include "graph/bands.h"
-
 // An image is the caller's array, or one that stays on the device of a renderer.
 struct vkb_source_object {
     PyObject_HEAD
@@ -36,21 +34,10 @@ size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 // Of a batch: bytes from the output of an image to that of the next.
 size_t vkb_layer_stride(const struct vkb_plan *plan, uint32_t output);
 
-// A tuple of up to GATHERED_LEVELS names of images.
-bool vkb_read_names(PyObject *tuple, vkb_image_name *names, uint32_t *count);
-
-// The part of a graph that makes the names, from (rows of the image, names of the levels that the
-// source brings, whether it is a band of the image).
-bool vkb_read_part(PyObject *tuple, const struct vkb_source_object *source, PyObject *names,
-                   struct vkb_part *part);
-bool vkb_build_part(const struct vkb_source *source, const struct vkb_settings *settings,
-                    const struct vkb_part *part, struct vkb_graph *graph, struct vkb_error *error);
-
 struct vkb_cotangents;
 
-// What a plan is of, if not of all passes.
+// The derivatives that a plan is of.
 struct vkb_portion {
-    const struct vkb_part *part;
     const struct vkb_cotangents *cotangents;
     uint32_t first;    // of the images of derivatives
     bool is_possible;  // whether all passes have adjoints

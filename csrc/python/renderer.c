@@ -1,6 +1,7 @@
 // The Renderer type: a device with everything on it.
 #include "python/renderer.h"
 #include "python/module.h"
+#include "python/values.h"
 
 static struct vkb_module_state *state_of(PyObject *self)
 {
@@ -9,9 +10,8 @@ static struct vkb_module_state *state_of(PyObject *self)
 
 // create(adapter, driver, validation, variants, read_cache): read_cache(driver_uuid) returns the
 // stored pipeline cache as bytes, or None.
-static bool create(struct vkb_renderer *self, const char *adapter, const char *driver,
-                   bool validation, const char *variants, PyObject *read_cache,
-                   struct vkb_error *error)
+static bool create(struct vkb_renderer *self, uint32_t adapter, const char *driver, bool validation,
+                   const char *variants, PyObject *read_cache, struct vkb_error *error)
 {
     bool done;
     char *data = NULL;
@@ -50,7 +50,8 @@ static bool create(struct vkb_renderer *self, const char *adapter, const char *d
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
-    const char *adapter, *driver, *variants;
+    const char *driver, *variants;
+    uint32_t adapter;
     int validation;
     double frame_seconds;
     PyObject *read_cache;
@@ -60,8 +61,8 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
         PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(arguments, "sspsdO:Renderer", &adapter, &driver, &validation, &variants,
-                          &frame_seconds, &read_cache))
+    if (!PyArg_ParseTuple(arguments, "O&spsdO:Renderer", vkb_read_uint32, &adapter, &driver,
+                          &validation, &variants, &frame_seconds, &read_cache))
         return NULL;
     if (!(frame_seconds > 0.0)) {
         PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
@@ -287,29 +288,20 @@ static PyObject *get_cached(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names, part=None) -> Plan. Makes no device call; names None: all "
-     "framebuffers. A part is (rows of the image, names of the levels that the source has, whether "
-     "it is a band of the image): of that part of the graph, and names are any images."},
+     "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
     {"adjoint", vkb_renderer_adjoint, METH_VARARGS,
      "adjoint(source, settings, names, sums) -> Plan, or None: a pass has no adjoint. Of the "
      "derivatives that cotangents of framebuffers, which are the source's levels, give, by images "
      "or by fields: methods/adjoint.h."},
-    {"bands", vkb_renderer_bands, METH_VARARGS,
-     "bands(source, settings, height) -> (head, levels, step, reach) or None. How the final of an "
-     "image of so many rows, of which the source has some, can be made of bands: see "
-     "graph/bands.h."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays, in_place=False[, first, count]) -> Submission. Submits plans "
-     "with the same images; arrays has a tuple for each plan, in the order of its outputs, or of "
-     "rows first to first + count of each. `in_place`: the source does not change before the end "
-     "of the wait, so that the device may read it where it is."},
+     "run(source, plans, arrays, in_place=False) -> Submission. Submits plans with the same "
+     "images; arrays has a tuple for each plan, in the order of its outputs. `in_place`: the "
+     "source does not change before the end of the wait, so that the device may read it where it "
+     "is."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
-     "upload(source, spare, recycled, height=0) -> Source. A copy of an image on the device. "
+     "upload(source, spare, recycled) -> Source. A copy of an image on the device. "
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
-     "`recycled`: it will be one; `height`: rows in all, if `fill` provides more of them."},
-    {"fill", vkb_renderer_fill, METH_VARARGS,
-     "fill(source, rows, first). Copies rows of an image into an uploaded image, from row `first` "
-     "on, before anything uses it."},
+     "`recycled`: it will be one."},
     {"open_screen", vkb_open_screen, METH_VARARGS,
      "open_screen(surface, mailbox) -> screen, a number. Takes over a VkSurfaceKHR; 0: one without "
      "a window."},

@@ -97,11 +97,6 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     return NULL;
 }
 
-// Rows of the outputs to read back.
-struct rows {
-    uint32_t first, count;
-};
-
 static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pending *pending,
                           const struct vkb_plan *plan, uint32_t output, PyObject *array)
 {
@@ -134,10 +129,8 @@ static struct vkb_page_run *find_pages(const struct vkb_renderer *renderer, cons
     return run;
 }
 
-// `rows` may be NULL: all of them.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                       const struct vkb_plan *plan, uint32_t output, const struct rows *rows,
-                       PyObject *array)
+                       const struct vkb_plan *plan, uint32_t output, PyObject *array)
 {
     const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
     Py_buffer *view = &pending->views[pending->view_count];
@@ -156,28 +149,20 @@ static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *
     if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
         return false;
     pending->outputs[pending->view_count++] = (struct vkb_output){
-        .first_row = rows ? rows->first : 0,
-        .row_count = rows ? rows->count : row->height,
+        .row_count = row->height,
         .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
         .memory = view->buf,
         // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
         .pages = view->len >= VKB_IMPORTED_BYTES ? find_pages(renderer, view->buf) : NULL,
     };
-    if (rows
-        && (rows->count == 0 || rows->first >= row->height
-            || rows->count > row->height - rows->first)) {
-        PyErr_Format(PyExc_ValueError, "%s: the rows are not within the framebuffer", row->name);
-        return false;
-    }
-    const size_t size = vkb_output_size(plan, output);
-    if ((size_t)view->len == (rows ? size / row->height * rows->count : size))
+    if ((size_t)view->len == vkb_output_size(plan, output))
         return true;
     PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
     return false;
 }
 
 static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                        const struct rows *rows, PyObject *arrays)
+                        PyObject *arrays)
 {
     size_t passes = 0;
 
@@ -199,7 +184,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             return false;
         }
         for (uint32_t output = 0; output < plan->output_count; ++output)
-            if (!hold_array(renderer, pending, plan, output, rows, PyTuple_GetItem(tuple, output)))
+            if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
                 return false;
         ++pending->count;
     }
@@ -207,7 +192,7 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
 }
 
 static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *source,
-                                         PyObject *plans, const struct rows *rows, PyObject *arrays)
+                                         PyObject *plans, PyObject *arrays)
 {
     struct vkb_module_state *state = state_of((PyObject *)renderer);
     struct submission *self = vkb_new_object(state->submission_type);
@@ -219,7 +204,7 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     self->pending = new_pending(source, plans, &error);
     if (!self->pending)
         vkb_raise(state, &error);
-    else if (hold_arrays(renderer, self->pending, rows, arrays))
+    else if (hold_arrays(renderer, self->pending, arrays))
         return self;
     Py_DECREF(self);
     return NULL;
@@ -252,15 +237,14 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
 }
 
 static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *plans,
-                     const struct rows *rows, PyObject *arrays, bool in_place,
-                     struct vkb_show *show)
+                     PyObject *arrays, bool in_place, struct vkb_show *show)
 {
     struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_error error = {0};
 
     if (!vkb_check_source(renderer, given) || !check_plans(renderer, &given->source, plans, arrays))
         return NULL;
-    struct submission *self = new_submission(renderer, source, plans, rows, arrays);
+    struct submission *self = new_submission(renderer, source, plans, arrays);
     if (self && !submit(renderer, given, self->pending, in_place, show, &error)) {
         // The exception is kept while the arrays are released, which may run Python code.
         vkb_raise(state_of((PyObject *)renderer), &error);
@@ -278,15 +262,12 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
     PyObject *source, *plans, *arrays;
-    struct rows rows = {0};
     int in_place = false;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!|pO&O&:run", state->source_type, &source, &PyTuple_Type,
-                          &plans, &PyTuple_Type, &arrays, &in_place, vkb_read_uint32, &rows.first,
-                          vkb_read_uint32, &rows.count))
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|p:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays, &in_place))
         return NULL;
-    return run(renderer, source, plans, PyTuple_Size(arguments) > 4 ? &rows : NULL, arrays,
-               in_place, NULL);
+    return run(renderer, source, plans, arrays, in_place, NULL);
 }
 
 PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
@@ -307,7 +288,7 @@ PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
     PyObject *plans = PyTuple_Pack(1, plan);
     PyObject *arrays = Py_BuildValue("((O))", Py_None);
     PyObject *submission =
-        plans && arrays ? run(renderer, source, plans, NULL, arrays, false, &show) : NULL;
+        plans && arrays ? run(renderer, source, plans, arrays, false, &show) : NULL;
     Py_XDECREF(plans);
     Py_XDECREF(arrays);
     if (!submission || show.acquired)

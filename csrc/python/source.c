@@ -181,33 +181,24 @@ static bool take_resident(struct vkb_renderer *renderer, PyObject *spare,
     return self->resident;
 }
 
-// Begins images of `height` rows, unless that is 0, and fills them from row `first` on.
 static bool stage_all(struct vkb_renderer *renderer, struct vkb_resident *resident,
-                      const struct vkb_source_object *source, uint32_t height, uint32_t first,
-                      struct vkb_error *error)
+                      const struct vkb_source_object *source, struct vkb_error *error)
 {
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
-        struct vkb_input complete = source->images[kind].input;
-        complete.height = height;
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         if (source->images[kind].held
-            && ((height > 0
-                 && !vkb_resident_begin(&renderer->device, resident, kind, &complete,
-                                        &renderer->frame.cache.clock, error))
-                || !vkb_resident_fill(&renderer->device, resident, kind,
-                                      &source->images[kind].input, first, error)))
+            && !vkb_resident_fill(&renderer->device, resident, kind, &source->images[kind].input,
+                                  &renderer->frame.cache.clock, error))
             return false;
-    }
     return true;
 }
 
 static bool stage(struct vkb_renderer *renderer, struct vkb_resident *resident,
-                  const struct vkb_source_object *source, uint32_t height, uint32_t first,
-                  struct vkb_error *error)
+                  const struct vkb_source_object *source, struct vkb_error *error)
 {
     if (!vkb_renderer_enter(renderer, error))
         return false;
-    const bool done = vkb_require_open(renderer, error)
-                   && stage_all(renderer, resident, source, height, first, error);
+    const bool done =
+        vkb_require_open(renderer, error) && stage_all(renderer, resident, source, error);
     const bool silent = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return silent;
@@ -220,11 +211,9 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     PyTypeObject *type = (PyTypeObject *)state->source_type;
     PyObject *given, *spare;
     int recycled;
-    uint32_t height = 0;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!Op|O&:upload", type, &given, &spare, &recycled,
-                          vkb_read_uint32, &height))
+    if (!PyArg_ParseTuple(arguments, "O!Op:upload", type, &given, &spare, &recycled))
         return NULL;
     const struct vkb_source_object *source = (struct vkb_source_object *)given;
     if (!source->images[VKB_INPUT_IMAGE].held || is_exported(source)
@@ -235,58 +224,16 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     struct vkb_source_object *self = vkb_new_object(state->source_type);
     if (!self)
         return NULL;
-    if (height < source->source.image.size.height)
-        height = source->source.image.size.height;
     self->process = renderer->process;
     if (take_resident(renderer, spare, self, &error)) {
         self->resident->recycled = recycled;
-        if (stage(renderer, self->resident, source, height, 0, &error)) {
+        if (stage(renderer, self->resident, source, &error)) {
             self->source = source->source;
-            self->source.image.size.height = height;
             return (PyObject *)self;
         }
     }
     Py_DECREF(self);
     return vkb_raise(state, &error);
-}
-
-// Whether the rows go into the resident images from row `first` on.
-static bool check_rows(const struct vkb_source_object *source, const struct vkb_source_object *rows,
-                       uint32_t first)
-{
-    const struct vkb_image_source *image = &source->source.image, *part = &rows->source.image;
-
-    VKB_LOCK(vkb_memory);
-    const bool is_idle = source->resident && source->resident->uses == 0;
-    VKB_UNLOCK(vkb_memory);
-    if (is_idle && rows->images[VKB_INPUT_IMAGE].held && !is_exported(rows)
-        && part->format == image->format && part->channels == image->channels
-        && part->has_emission == image->has_emission && part->has_mask == image->has_mask
-        && part->size.width == image->size.width && first <= image->size.height
-        && part->size.height <= image->size.height - first)
-        return true;
-    PyErr_SetString(PyExc_ValueError, "fill: the rows do not fit into the image");
-    return false;
-}
-
-PyObject *vkb_renderer_fill(PyObject *object, PyObject *arguments)
-{
-    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
-    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *given, *rows;
-    uint32_t first;
-    struct vkb_error error = {0};
-
-    if (!PyArg_ParseTuple(arguments, "O!O!O&:fill", state->source_type, &given, state->source_type,
-                          &rows, vkb_read_uint32, &first))
-        return NULL;
-    const struct vkb_source_object *source = (struct vkb_source_object *)given;
-    const struct vkb_source_object *held = (struct vkb_source_object *)rows;
-    if (!vkb_check_source(renderer, source) || !check_rows(source, held, first))
-        return NULL;
-    if (!stage(renderer, source->resident, held, 0, first, &error))
-        return vkb_raise(state, &error);
-    return Py_NewRef(Py_None);
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)

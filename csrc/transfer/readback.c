@@ -98,16 +98,15 @@ static bool plan_output(const struct vkb_device *device, struct vkb_readback *re
     return true;
 }
 
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
-                              uint32_t height)
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output)
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
 
     // A run of three channels is as long as three quarters of one of four, see store.glsl.
     const size_t run = VKB_STORE_SIZE / 4 * output->channels;
 
-    return output->imported && output->channels >= 3 && output->row_count == height
-        && output_row_size(output) % run == 0 && output_row_size(output) % VKB_WORD_SIZE == 0
+    return output->imported && output->channels >= 3 && output_row_size(output) % run == 0
+        && output_row_size(output) % VKB_WORD_SIZE == 0
         && output->imported_offset % VKB_WORD_SIZE == 0 && output->imported_offset % align == 0;
 }
 
@@ -136,7 +135,7 @@ void vkb_readback_copy(const struct vkb_device *device, VkCommandBuffer commands
     VkBufferImageCopy copy = {
         .bufferOffset = offset,
         .imageSubresource = {vkb_formats[image->format].aspect, 0, 0, 1},
-        .imageOffset = {0, (int32_t)output->first_row, 0},
+        .imageOffset = {0, 0, 0},
         .imageExtent = {image->width, output->row_count, 1},
     };
 

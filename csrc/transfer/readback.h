@@ -25,11 +25,11 @@ enum vkb_sink_kind {
 // channels of each pixel.
 struct vkb_output {
     uint32_t channels;
-    uint32_t first_row, row_count;  // of the image
-    void *memory;                   // NULL: it stays on the device
-    struct vkb_export *exported;    // instead of host memory; NULL: none
-    size_t layer_stride;            // there, of a batch
-    struct vkb_page_run *pages;  // the run that contains the memory; NULL: none, or a small array
+    uint32_t row_count;
+    void *memory;                 // NULL: it stays on the device
+    struct vkb_export *exported;  // instead of host memory; NULL: none
+    size_t layer_stride;          // there, of a batch
+    struct vkb_page_run *pages;   // the run that contains the memory; NULL: none, or a small array
     // Set before the recording (vkb_host_sink).
     enum vkb_format format;
     uint32_t width;
@@ -54,10 +54,8 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 
 // Whether the output has all channels of its image.
 bool vkb_readback_is_complete(const struct vkb_output *output);
-// Whether a pass can store words to the output's memory: it must have all `height` rows of the
-// image.
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output,
-                              uint32_t height);
+// Whether a pass can store words to the output's memory.
+bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output);
 // Records the copy of the output's rows of an image to a buffer.
 void vkb_readback_copy(const struct vkb_device *device, VkCommandBuffer commands,
                        struct vkb_image *image, const struct vkb_output *output, VkBuffer to,

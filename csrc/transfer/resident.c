@@ -79,9 +79,9 @@ void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *
     }
 }
 
-bool vkb_resident_begin(struct vkb_device *device, struct vkb_resident *resident,
-                        enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
-                        struct vkb_error *error)
+bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
+                       enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
+                       struct vkb_error *error)
 {
     const struct vkb_image_row row = {
         .name = "image",
@@ -100,20 +100,11 @@ bool vkb_resident_begin(struct vkb_device *device, struct vkb_resident *resident
         if (!vkb_image_create_row(device, &row, &cached->image, error))
             return false;
     }
-    if (!vkb_upload_begin(device, &resident->inputs[kind].upload, input, &cached->image, error))
+    if (!vkb_upload_copy(device, &resident->inputs[kind].upload, input, &cached->image, error))
         return false;
     resident->staged = !cached->image.mapped;
     cached->content.version = ++*clock;
     cached->content.valid = true;
-    return true;
-}
-
-bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
-                       enum vkb_input_kind kind, const struct vkb_input *input, uint32_t first,
-                       struct vkb_error *error)
-{
-    if (!vkb_upload_rows(device, &resident->inputs[kind].upload, input, first, error))
-        return false;
     resident->non_finite = (struct vkb_non_finite){0};
     for (int i = 0; i < VKB_INPUT_COUNT; ++i)
         vkb_add_non_finite(&resident->non_finite, resident->inputs[i].upload.non_finite);

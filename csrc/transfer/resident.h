@@ -37,15 +37,10 @@ void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *
 void vkb_resident_use(struct vkb_resident *resident);
 void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *resident);
 
-// Creates the image of this kind, with the input's size and format. vkb_resident_fill gives it
-// pixels. No submission may use the element.
-bool vkb_resident_begin(struct vkb_device *device, struct vkb_resident *resident,
-                        enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
-                        struct vkb_error *error);
-// Fills rows of the image from row `first` on. They must be inside of the image, and no submission
-// may use it yet. The input is read before this returns.
+// Creates the image of this kind, with the input's size, format and pixels. No submission may use
+// the element. The input is read before this returns.
 bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
-                       enum vkb_input_kind kind, const struct vkb_input *input, uint32_t first,
+                       enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
                        struct vkb_error *error);
 
 #endif

@@ -111,11 +111,9 @@ static unsigned char *kept_row(const struct vkb_upload *upload, uint32_t y)
     return upload->pixels + y * upload->row_pitch;
 }
 
-// Work on rows of an input whose first row is row `offset` of the image.
 struct rows {
     struct vkb_upload *upload;
     const struct vkb_input *input;
-    uint32_t offset;
     uint32_t different[VKB_MAX_PARTS];  // the first such row of each part; the height: none
 };
 
@@ -182,9 +180,9 @@ static bool holds_such(const struct vkb_upload *upload, const struct vkb_input *
 }
 
 // Reserves memory for an image of another size or format than the last.
-bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
-                      const struct vkb_input *input, const struct vkb_image *image,
-                      struct vkb_error *error)
+static bool begin(const struct vkb_device *device, struct vkb_upload *upload,
+                  const struct vkb_input *input, const struct vkb_image *image,
+                  struct vkb_error *error)
 {
     const size_t size = row_size(input);
 
@@ -218,11 +216,11 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
         upload->pixels == upload->staging.mapped && upload->row_pitch * upload->height >= BAND_SIZE;
 
     for (uint32_t y = first; y < end; ++y) {
-        unsigned char *to = kept_row(upload, rows->offset + y);
+        unsigned char *to = kept_row(upload, y);
         const unsigned char *row = streams ? packed_row(rows, part, y) : to;
         if (!streams)
             pack_row(to, rows->input, y);
-        upload->rows[rows->offset + y] = vkb_count_non_finite(
+        upload->rows[y] = vkb_count_non_finite(
             upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
         if (streams)
             vkb_stream(to, row, row_size(rows->input));
@@ -301,11 +299,14 @@ static void send_done(void *context, uint32_t end)
         sending->failed = !send_rows(sending, end);
 }
 
-bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
-                     const struct vkb_input *input, uint32_t first, struct vkb_error *error)
+bool vkb_upload_copy(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, const struct vkb_image *image,
+                     struct vkb_error *error)
 {
-    struct rows rows = {.upload = upload, .input = input, .offset = first};
+    struct rows rows = {.upload = upload, .input = input};
 
+    if (!begin(device, upload, input, image, error))
+        return false;
     vkb_in_parts(device->workers, pack_part, NULL, &rows, 0, input->height,
                  input->height * row_size(input));
     sum_non_finite(upload);
@@ -337,7 +338,7 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     if (!*changed)
         return true;
     if (!vkb_submissions_wait(device, submissions, error)
-        || (fresh && !vkb_upload_begin(device, upload, input, image, error)))
+        || (fresh && !begin(device, upload, input, image, error)))
         return false;
     vkb_in_parts(device->workers, pack_part, image->mapped ? NULL : send_done, &sending, first,
                  input->height, (input->height - first) * size);

@@ -62,14 +62,10 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       const struct vkb_input *input, struct vkb_image *image, bool *changed,
                       struct vkb_error *error);
 
-// The same in steps, without a comparison: vkb_upload_begin reserves memory for an image of the
-// input's size and format; vkb_upload_rows packs the input's rows as rows `first` and following of
-// the image.
-bool vkb_upload_begin(const struct vkb_device *device, struct vkb_upload *upload,
-                      const struct vkb_input *input, const struct vkb_image *image,
-                      struct vkb_error *error);
-bool vkb_upload_rows(const struct vkb_device *device, struct vkb_upload *upload,
-                     const struct vkb_input *input, uint32_t first, struct vkb_error *error);
+// The same without a comparison, and without a copy before vkb_upload_record.
+bool vkb_upload_copy(const struct vkb_device *device, struct vkb_upload *upload,
+                     const struct vkb_input *input, const struct vkb_image *image,
+                     struct vkb_error *error);
 
 // Records the copy of the rows that were not sent yet, from staging memory to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

@@ -101,15 +101,13 @@ static void make_strips(const struct vkb_variant_choice *choice, const struct vk
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const struct vkb_filter_params *params = &pass->params.filter;
-    const int height = params->source_height ? params->source_height : (int)source->height;
 
     row->constants.sampling = 0;
     row->constants.upsample = pass->constants.upsample;
     row->constants.taps = pass->constants.taps;
     row->constants.kernels = pass->constants.kernels;
     row->constants.window = pass->constants.window;
-    row->constants.enlarged = height <= params->target_height;
+    row->constants.enlarged = source->height <= target->height;
     row->constants.exact = source->width == 2 * target->width ? EXACT_HALF
                          : source->width == target->width     ? EXACT_SAME
                          : 2 * source->width == target->width ? EXACT_DOUBLE

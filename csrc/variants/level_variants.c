@@ -175,8 +175,7 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
 
     *fits = (groups == GROUPS_FILAMENT || groups == GROUPS_HDRP || groups == GROUPS_URP
              || groups == GROUPS_THREE)
-         && !pass->constants.masked && is_half(&choice->plain, pass)
-         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
+         && !pass->constants.masked && is_half(&choice->plain, pass) && loads(choice, pass);
     return !*fits
         || add_prefilter(choice, pass, reduce_words[format], REDUCE_COLUMNS, HALVE_WORDS_ROWS,
                          error);
@@ -185,10 +184,8 @@ bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_p
 bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                     bool *fits, struct vkb_error *error)
 {
-    const struct vkb_prefilter_params *params = &pass->params.prefilter;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
-    const uint32_t height =
-        params->source_height ? (uint32_t)params->source_height : source->height;
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const enum vkb_mode groups = groups_of(pass);
     const bool taps = groups == GROUPS_FILAMENT || (groups == GROUPS_BEVY && has_unit_steps(pass));
 
@@ -197,7 +194,7 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
         return true;
     struct vkb_pass_row row;
     memcpy(&row, pass, sizeof row);
-    row.constants.enlarged = height < (uint32_t)params->target_height;
+    row.constants.enlarged = source->height < target->height;
     return add_prefilter(choice, &row, shrink_words[source->format],
                          4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
 }
@@ -211,7 +208,7 @@ bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb
 
     *fits = groups_of(pass) == GROUPS_HDRP_BLUR
          && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-         && pass->params.prefilter.row_offset == 0 && loads(choice, pass);
+         && loads(choice, pass);
     if (!*fits)
         return true;
     return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, GATHER_ROWS, error)

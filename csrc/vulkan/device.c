@@ -359,13 +359,28 @@ static bool stores_all(const struct vkb_device *device)
 // A thread of lavapipe with memory for its allocations, twice.
 enum { DEVICE_MIB = 192 };
 
-static bool create_handle(struct vkb_device *device, const char *adapter_choice, const char *driver,
+static bool open_adapter(struct vkb_device *device, uint32_t number, const char *driver,
+                         bool validation, struct vkb_error *error)
+{
+    struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
+    uint32_t count;
+
+    if (!(device->instance = vkb_instance_open(driver, validation, error))
+        || !vkb_adapters_list(device->instance, adapters, &count, error))
+        return false;
+    if (number >= count)
+        return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                        "no Vulkan adapter %u: there are %u. %s", number, count, vkb_install_hint);
+    device->adapter = adapters[number];
+    return true;
+}
+
+static bool create_handle(struct vkb_device *device, uint32_t adapter, const char *driver,
                           bool validation, struct vkb_error *error)
 {
     if (!(device->workers = vkb_workers_create(error))
         || !(device->allocations = vkb_alloc(error, 1, sizeof *device->allocations))
-        || !vkb_adapter_open(adapter_choice, driver, validation, &device->instance,
-                             &device->adapter, error)
+        || !open_adapter(device, adapter, driver, validation, error)
         || (device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
             && !vkb_instance_require_room(device->instance, error))
         || !vkb_require_room("a device", DEVICE_MIB, error) || !create_logical(device, error))
@@ -378,14 +393,14 @@ static bool create_handle(struct vkb_device *device, const char *adapter_choice,
     return true;
 }
 
-bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, const char *driver,
+bool vkb_device_create(struct vkb_device *device, uint32_t adapter, const char *driver,
                        bool validation, struct vkb_error *error)
 {
     *device = (struct vkb_device){0};
     if (validation)
         vkb_messages_open(&device->messages);
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
-    const bool done = create_handle(device, adapter_choice, driver, validation, error);
+    const bool done = create_handle(device, adapter, driver, validation, error);
     vkb_messages_end(before);
     if (!done) {
         vkb_device_destroy(device);

@@ -2,7 +2,7 @@
 #ifndef VKB_DEVICE_H
 #define VKB_DEVICE_H
 
-#include "vulkan/choice.h"
+#include "vulkan/adapter.h"
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
@@ -46,8 +46,8 @@ struct vkb_device {
 
 // `device` must not move in memory, since its messages are in a linked list. Vulkan calls with it
 // must be between vkb_messages_begin(&device->messages) and vkb_messages_end. These two functions
-// do that themselves.
-bool vkb_device_create(struct vkb_device *device, const char *adapter_choice, const char *driver,
+// do that themselves. `adapter` is the number of one of the driver's; "" is the system's loader.
+bool vkb_device_create(struct vkb_device *device, uint32_t adapter, const char *driver,
                        bool validation, struct vkb_error *error);
 void vkb_device_destroy(struct vkb_device *device);
 

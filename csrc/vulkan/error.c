@@ -13,8 +13,7 @@
 #endif
 
 const char vkb_memory_hint[] =
-    "Smaller bloom buffers (bloom_scale), half floats, fewer framebuffers or bands "
-    "of rows need less";
+    "Smaller bloom buffers (bloom_scale), half floats or fewer framebuffers need less";
 
 bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...)
 {

@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ MAX_LAYERS: int
 MAX_STAGES: int
 MAX_GHOSTS: int
 
-AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str]
+AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str, int, bool]
 _Array = NDArray[Any]
 _ExportedImage = (
     tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str]
@@ -46,6 +46,7 @@ class OutOfMemoryError(Error, MemoryError): ...
 class ValidationError(Error): ...
 class ShaderError(Error): ...
 
+def fail_without_adapter(text: str, /) -> NoReturn: ...
 def adapters(driver: str, /) -> list[AdapterTuple]: ...
 def image_source(
     image: _Array | _ExportedImage,
@@ -86,7 +87,7 @@ def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 class Renderer:
     def __new__(
         cls,
-        adapter: str,
+        adapter: int,
         driver: str,
         validation: bool,
         variants: str,
@@ -111,29 +112,20 @@ class Renderer:
         source: Source,
         settings: object,
         names: tuple[str, ...] | None,
-        part: tuple[int, tuple[str, ...], int] = ...,
         /,
     ) -> Plan: ...
     def adjoint(
         self, source: Source, settings: object, names: tuple[str, ...], sums: bool, /
     ) -> Plan | None: ...
-    def bands(
-        self, source: Source, settings: object, height: int, /
-    ) -> tuple[str | None, int, tuple[str, ...], int, int] | None: ...
     def run(
         self,
         source: Source,
         plans: tuple[Plan, ...],
         arrays: tuple[tuple[_Array | Exported | None, ...], ...],
         in_place: bool = False,
-        first: int = ...,
-        count: int = ...,
         /,
     ) -> Submission: ...
-    def upload(
-        self, source: Source, spare: Source | None, recycled: bool, height: int = 0, /
-    ) -> Source: ...
-    def fill(self, source: Source, rows: Source, first: int, /) -> None: ...
+    def upload(self, source: Source, spare: Source | None, recycled: bool, /) -> Source: ...
     @property
     def instance(self) -> int: ...
     def open_screen(self, surface: int, mailbox: bool, /) -> int: ...

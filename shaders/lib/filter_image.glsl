@@ -34,7 +34,7 @@ vec4 filtered(sampler2D image)
 {
     Place place = PLACE_IN(image);
     ivec2 size = textureSize(image, 0);
-    vec2 ratio = vec2(COMPLETE_SIZE(image)) / vec2(params.target_width, params.target_height);
+    vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
     Axis row = settled(axis_x(place, size, ratio)), column = settled(axis_y(place, size, ratio));
     if (WINDOW == 0)
         return sparse(image, row, column);

@@ -15,6 +15,8 @@ int group_count()
         return 4;
     if (GROUPS == GROUPS_URP)
         return 1;
+    if (GROUPS == GROUPS_POST_PROCESSING)
+        return 1;
     if (GROUPS == GROUPS_THREE)
         return 1;
     if (GROUPS == GROUPS_BABYLON)
@@ -87,7 +89,9 @@ vec4 prefiltered(vec4 found[5], Place place)
     if (GROUPS == GROUPS_HIGHLIGHTS)
         return highlights(found[0]);
     if (GROUPS == GROUPS_URP)
-        return urp_prefiltered(found[0]);
+        return unity_prefiltered(found[0]);
+    if (GROUPS == GROUPS_POST_PROCESSING)
+        return unity_prefiltered(found[0]);
     if (GROUPS == GROUPS_BABYLON)
         return babylon_factor(found[0]) * found[0];
     if (GROUPS == GROUPS_THREE)

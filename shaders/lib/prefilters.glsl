@@ -89,26 +89,26 @@ vec4 hdrp_prefiltered(vec4 taps[5])
     return sum / shares;
 }
 
-// URP's: a clamp, the soft threshold (Unity-Technologies/Graphics,
-// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509). With NODE it is that of Post
-// Processing v2: another width, negative colours stay, and a tint (Unity-Technologies/PostProcessing
-// @ 32c3155207d3, Bloom.shader).
-float urp_width()
+// Unity's: a clamp, the soft threshold, a tint. URP has no negative colours
+// (Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509);
+// Post Processing v2 has another width (Unity-Technologies/PostProcessing @ 32c3155207d3,
+// Bloom.shader).
+float unity_width()
 {
-    return params.threshold * params.knee + (NODE != 0 ? 1e-5 : 0.0);
+    return params.threshold * params.knee + (GROUPS == GROUPS_URP ? 0.0 : 1e-5);
 }
 
-float urp_divisor()
+float unity_divisor()
 {
-    return 4.0 * urp_width() + (NODE != 0 ? 0.0 : 1e-4);
+    return 4.0 * unity_width() + (GROUPS == GROUPS_URP ? 1e-4 : 0.0);
 }
 
-vec4 urp_prefiltered(vec4 value)
+vec4 unity_prefiltered(vec4 value)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
     if (THRESHOLDED != 0)
-        kept = soft_threshold(kept, params.threshold, urp_width(), urp_divisor(), 1e-4);
-    return NODE != 0 ? params.tint[0] * kept : max(kept, vec4(0.0));
+        kept = soft_threshold(kept, params.threshold, unity_width(), unity_divisor(), 1e-4);
+    return params.tint[0] * (GROUPS == GROUPS_URP ? max(kept, vec4(0.0)) : kept);
 }
 
 // Babylon's: a step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js,

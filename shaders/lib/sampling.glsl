@@ -11,23 +11,16 @@ struct Place {
     vec2 part;
 };
 
-// The position of the centre of a target's pixel, moved down by row_offset / (2 target_size.y) texels.
-// Integers, since a float position at the far end of a large image is too inaccurate for filtering.
+// The position of the centre of a target's pixel. Integers, since a float position at the far end of a large image is too inaccurate for filtering.
 // Unsigned, so that sides of 32768 fit.
-Place place_in_rows(ivec2 source_size, ivec2 pixel, ivec2 target_size, int row_offset)
+Place place_in_size(ivec2 source_size, ivec2 pixel, ivec2 target_size)
 {
     uvec2 divisor = 2u * uvec2(target_size);
     // Positions before the first texel's centre would be negative: add one texel here, and subtract
     // it below.
     uvec2 number = uvec2(2 * pixel + 1) * uvec2(source_size) + uvec2(target_size);
-    number.y += uint(row_offset);
     uvec2 texel = number / divisor;
     return Place(ivec2(texel) - 1, vec2(number - texel * divisor) / vec2(divisor));
-}
-
-Place place_in_size(ivec2 source_size, ivec2 pixel, ivec2 target_size)
-{
-    return place_in_rows(source_size, pixel, target_size, 0);
 }
 
 Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
@@ -35,18 +28,8 @@ Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
     return place_in_size(textureSize(source, 0), pixel, target_size);
 }
 
-ivec2 complete_size(sampler2D source, int height)
-{
-    ivec2 size = textureSize(source, 0);
-    return ivec2(size.x, height == 0 ? size.y : height);
-}
-
-// For a shader whose block has SAMPLING_ROWS: the size of the source, or of the image of which it is
-// a band of rows; the position of this pixel in the source.
-#define COMPLETE_SIZE(source) complete_size(source, params.source_height)
-#define PLACE_IN(source) \
-    place_in_rows(COMPLETE_SIZE(source), PIXEL, ivec2(params.target_width, params.target_height), \
-                  params.row_offset)
+// The position of this pixel in the source, for a shader whose block has SAMPLING_ROWS.
+#define PLACE_IN(source) place_in(source, PIXEL, ivec2(params.target_width, params.target_height))
 
 vec4 fetch_clamped(sampler2D source, ivec2 texel)
 {

@@ -123,13 +123,14 @@ vec4 back_bevy(vec4 found[5], vec4 brought)
     return own_share * (brought / divisor - vec4(slope * LUMINANCE, 0.0));
 }
 
-vec4 back_urp(vec4 value, vec4 brought)
+vec4 back_unity(vec4 value, vec4 brought)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
     // The threshold's factor is not negative.
-    brought *= NODE != 0 ? params.tint[0] : larger(kept, vec4(0.0));
+    brought *= params.tint[0] * (GROUPS == GROUPS_URP ? larger(kept, vec4(0.0)) : vec4(1.0));
     if (THRESHOLDED != 0)
-        brought = back_through_soft(kept, brought, params.threshold, urp_width(), urp_divisor(), 1e-4);
+        brought =
+            back_through_soft(kept, brought, params.threshold, unity_width(), unity_divisor(), 1e-4);
     return vec4(brought.rgb * larger(vec4(params.clamp_max), value).rgb, brought.a);
 }
 
@@ -233,7 +234,9 @@ vec4 back(vec4 found[5], vec4 brought, Place place)
     if (GROUPS == GROUPS_KINO)
         return back_kino(found, brought);
     if (GROUPS == GROUPS_URP)
-        return back_urp(found[0], brought);
+        return back_unity(found[0], brought);
+    if (GROUPS == GROUPS_POST_PROCESSING)
+        return back_unity(found[0], brought);
     if (GROUPS == GROUPS_BABYLON)
         return babylon_factor(found[0]) * brought;
     if (GROUPS == GROUPS_THREE)

@@ -25,12 +25,23 @@ float place_of(int tap)
                           : sign(float(tap)) * params.offsets[abs(tap) >> 2][abs(tap) & 3];
 }
 
+// URP 17: no tap is beyond the middle of the last two columns.
+vec2 within(Place place, vec2 offset)
+{
+    if (UPSAMPLE == UPSAMPLE_INSET_LINEAR) {
+        float last = float(textureSize(source, 0).x - place.texel.x) - 1.5;
+        offset.x = min(offset.x, last - place.part.x);
+    }
+    return offset;
+}
+
 // Adds from the first tap to the last, as all variants of a blur, so that they round identically.
 vec4 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
     vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += weight(tap) * sample_at(source, place, centre + place_of(tap) * tap_step, SAMPLING);
+        sum += weight(tap) * sample_at(source, place, within(place, centre + place_of(tap) * tap_step),
+                                       SAMPLING);
     return sum;
 }
 

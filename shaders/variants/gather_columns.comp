@@ -33,12 +33,11 @@ WRITE_IMAGE(8);
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
-// The position of a row of the target in an image of this size, both of which may be bands of rows.
+// The position of a row of the target in an image of this size.
 Axis row_axis(ivec2 size, int y)
 {
     ivec2 target_size = ivec2(params.target_width, params.target_height);
-    ivec2 complete = ivec2(size.x, params.source_height == 0 ? size.y : params.source_height);
-    return axis_y(place_in_rows(complete, ivec2(0, y), target_size, params.row_offset), size, vec2(1.0));
+    return axis_y(place_in_size(size, ivec2(0, y), target_size), size, vec2(1.0));
 }
 
 vec4 sums[COLUMNS];

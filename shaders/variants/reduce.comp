@@ -56,7 +56,7 @@ vec4 prefiltered(int column)
         return hdrp_prefiltered(taps);
     }
     vec4 value = tap(column, vec2(0.0));
-    return GROUPS == GROUPS_URP ? urp_prefiltered(value) : three_prefiltered(value);
+    return GROUPS == GROUPS_URP ? unity_prefiltered(value) : three_prefiltered(value);
 }
 
 void write_row(int x, int y)

@@ -105,10 +105,10 @@ void main()
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, SHRINK_ROWS));
     int end = min(first.y + SHRINK_ROWS, size.y);
-    // The position as in place_in_rows(), but with a rest in place of a quotient for each row.
-    uint height = uint(params.source_height == 0 ? source_size.y : params.source_height);
+    // The position as in place_in_size(), but with a rest in place of a quotient for each row.
+    uint height = uint(source_size.y);
     uint divisor = 2u * uint(params.target_height);
-    uint number = uint(2 * first.y + 1) * height + divisor / 2u + uint(params.row_offset);
+    uint number = uint(2 * first.y + 1) * height + divisor / 2u;
     uint rest = number % divisor + uint(KEPT) * divisor;
     int row = int(number / divisor) - 1 + AFTER - KEPT;
     float across[COLUMNS];

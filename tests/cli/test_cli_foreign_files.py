@@ -16,10 +16,8 @@ import vkbloom
 from tests.io import foreign
 from tests.io.parts import written
 from tests.io.profiles import store_png
-from vkbloom._cli import bands
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
-from vkbloom._io.rows import opened_rows
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -46,12 +44,7 @@ def apply(*words: object) -> Result:
 
 
 @pytest.mark.parametrize("under", [0, 255])
-@pytest.mark.parametrize("is_large", [False, True])
-def test_colours_under_alpha_0_are_told(
-    tmp_path: Path, under: int, is_large: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if is_large:
-        monkeypatch.setattr(bands, "LARGE", 1)
+def test_colours_under_alpha_0_are_told(tmp_path: Path, under: int) -> None:
     pixels = np.full((48, 64, 4), under, np.uint8)
     pixels[..., 3] = 0
     pixels[20:28, 28:36] = (200, 40, 40, 255)
@@ -81,21 +74,6 @@ def test_ultra_hdr_starts_from_photo(tmp_path: Path, renderer: vkbloom.Renderer)
     image = vkbloom.read(tmp_path / "a.jpg")
     expected = renderer.apply(image, vkbloom.presets["photo"])["final"]
     assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
-
-
-@pytest.mark.parametrize("suffix", ["rla", "tif", "webp"])
-def test_large_files(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    pixels = np.random.default_rng(0).random((40, 48, 3), np.float32)
-    path = vkbloom.write(tmp_path / f"a.{suffix}", pixels, bits=8)
-    words = (path, tmp_path / "b.png", "--preset", "kino")
-    assert apply(*words).exit_code == 0
-    at_once = load(tmp_path / "b.png").pixels
-    monkeypatch.setattr(bands, "LARGE", 1)
-    result = apply(*words)
-    assert result.exit_code == 0, result.output
-    assert np.array_equal(load(tmp_path / "b.png").pixels, at_once)
-    with opened_rows(path) as rows:
-        assert rows.size == (48, 40)
 
 
 @pytest.mark.parametrize("kept", [20, 60, 200])

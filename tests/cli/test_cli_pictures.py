@@ -42,13 +42,6 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.fixture(params=[False, True], ids=["complete", "by rows"])
-def by_rows_or_not(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Read and write pictures in bands of rows, as large ones are, or not."""
-    if request.param:
-        monkeypatch.setattr("vkbloom._cli.bands.LARGE", 1)
-
-
 class TestSequences:
     @pytest.mark.parametrize(
         ("words", "written"),
@@ -174,7 +167,6 @@ class TestNotes:
             ("b.exr", (), False),
         ],
     )
-    @pytest.mark.usefixtures("by_rows_or_not")
     def test_clipping_names_the_cure(
         self,
         tmp_path: Path,
@@ -198,7 +190,6 @@ class TestNotes:
             (".exr", (), False),
         ],
     )
-    @pytest.mark.usefixtures("by_rows_or_not")
     def test_alpha_that_hides_the_bloom(
         self,
         tmp_path: Path,
@@ -224,7 +215,6 @@ class TestNotes:
         assert "darkens" not in result.stderr
 
 
-@pytest.mark.usefixtures("by_rows_or_not")
 @pytest.mark.parametrize(
     ("source", "out", "bits", "numbers"),
     [

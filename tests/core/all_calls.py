@@ -101,13 +101,11 @@ def upload(renderer: Renderer, which: int, size: int) -> Any:
 
 
 def recycle(renderer: Renderer, which: int, size: int) -> Any:
-    """Take the memory of another source, filled in two parts."""
+    """Take the memory of another source."""
     core = renderer._core
     image = IMAGES[size]
-    half = len(image) // 2
     spare = core.upload(_core.image_source(image), None, True)
-    source = core.upload(_core.image_source(image[:half]), spare, True, len(image))
-    core.fill(source, _core.image_source(image[half:]), half)
+    source = core.upload(_core.image_source(image), spare, True)
     assert spare.kind == source.kind
     assert source.resident
     assert not spare.resident
@@ -181,7 +179,6 @@ def look(renderer: Renderer, which: int, size: int) -> Any:
     assert plan.is_of_image(source)
     scene = _core.scene_source((1, MESH, MESH, SKY, ()), CAMERA, (64, 36), "forward", 0.0, 1.0)
     found = [plan.outputs, plan.passes, any_plan.dependencies, plan.size, source.kind]
-    found += [core.bands(source, settings, 64 * IMAGES[size].shape[0])]
     found += [_core.dry_run(((source, plan), (source, plan))), core.info, source.exported]
     found += [_core.plan(scene, Separable(), None).passes, len(core.pages(1 << 20))]
     shader = _core.shader("tried", HEADER)

@@ -134,30 +134,6 @@ def test_a_handle_has_its_mask_and_emission(
             renderer.apply(handle, settings, **{name: array})  # type: ignore[arg-type]
 
 
-def test_rows_of_an_image(renderer: Renderer) -> None:
-    """The core accepts an image in bands, and returns bands of a framebuffer."""
-    core = renderer._core
-    image = picture(33, 21, 3, "float32", seed=13)
-    image[18, 3] = np.nan
-    expected = renderer.apply(image, Separable())
-    source = core.upload(_core.image_source(image[:8]), None, False, 21)
-    core.fill(source, _core.image_source(image[8:16]), 8)
-    core.fill(source, _core.image_source(image[16:]), 16)
-    plan = core.plan(source, Separable(), ("bloom", "final"))
-    for first, count in ((0, 5), (5, 16), (20, 1), (0, 21)):
-        arrays = tuple(np.empty((count, 33, 4 - i), np.float32) for i in range(2))
-        _, counts = core.run(source, (plan,), (arrays,), False, first, count).wait()
-        assert counts == (3, 0)
-        for name, array in zip(("bloom", "final"), arrays, strict=True):
-            np.testing.assert_array_equal(array, expected[name][first : first + count])
-    for first, count in ((0, 22), (21, 1), (0, 0)):
-        with pytest.raises(ValueError, match="the rows are not within the framebuffer"):
-            core.run(source, (plan,), (arrays,), False, first, count)
-    for rows, first in ((image[:8], 14), (image[:8, :30], 0), (image[:8].astype(np.float16), 0)):
-        with pytest.raises(ValueError, match="the rows do not fit into the image"):
-            core.fill(source, _core.image_source(rows), first)
-
-
 @pytest.mark.parametrize("first", ["renderer", "handle"])
 def test_handle_and_renderer_go_in_any_order(first: str) -> None:
     renderer = Renderer(validation=True)

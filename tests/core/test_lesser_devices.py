@@ -182,8 +182,8 @@ def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
     assert "whole uint8" not in wrong
 
 
-# Prints the errors of two plans that need more memory than the device has. The kernel of the second
-# one has four times the size of the image and must not be computed first.
+# Prints the errors of plans that need more memory than the device has. The kernel of the second one
+# has four times the size of the image and must not be computed first.
 TOO_LARGE = """
 import os
 import numpy as np
@@ -201,17 +201,25 @@ with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as rende
             renderer.plan(vkbloom.Scene.ufo(), settings, size)
         except vkbloom.OutOfMemoryError as error:
             print(error)
+    for side in (8000, 5800):
+        try:
+            image = np.broadcast_to(np.float16(1), (side, side, 4))
+            print(renderer.plan(image, vkbloom.Separable(), framebuffers="final").size)
+        except vkbloom.OutOfMemoryError as error:
+            print(error)
 """
 
 
-def test_a_convolution_of_too_much_memory(layer: Path, name: str) -> None:
+def test_images_of_too_much_memory(layer: Path, name: str) -> None:
     """An error of the plan, with the memory that is needed, before any work."""
     done = run(layer, name, "heap", ("-c", TOO_LARGE))
     assert done.returncode == 0, done.stderr
     words = r"memory is short: \d+ MiB of images are needed, and the .* has 256; use a smaller"
-    first, second = done.stdout.splitlines()
+    first, second, image, fits = done.stdout.splitlines()
     assert re.match(words, first), first
     assert re.match(words, second), second
+    assert "has 256; an image of 2" in image
+    print(image, fits)
 
 
 def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:

@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [
     *sorted(ROOT.glob("*.md")),
     *sorted(ROOT.glob("*/*.md")),
+    *sorted(ROOT.glob("docs/*/*.md")),
     *sorted(ROOT.glob("python/*/*/*.md")),
 ]
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.io import foreign
 from tests.io.parts import written
-from vkbloom._io import rows
-from vkbloom._io.image_reading import decode
 from vkbloom._io.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -46,13 +44,6 @@ def meant(codes: NDArray[Any], *, is_multiplied: bool = False) -> NDArray[np.flo
         values[..., :3] = np.minimum(values[..., :3] / values[..., 3:], 1)
     values[..., :3] = decode_srgb(values[..., :3])
     return values
-
-
-def by_rows(path: Path, monkeypatch: pytest.MonkeyPatch) -> NDArray[Any]:
-    """Return a file as large files are read."""
-    monkeypatch.setattr(rows, "_BAND_BYTES", 16 * 32 * 5)
-    with rows.opened_rows(path) as opened:
-        return np.concatenate([decode(stored).pixels for stored in opened.bands()])
 
 
 def pillow(pixels: NDArray[Any], **options: Any) -> Callable[[Path], None]:
@@ -207,7 +198,6 @@ def test_files_of_others(
     # A step of 16 bits, of colours that are divided.
     assert np.allclose(made, expected, rtol=1e-6, atol=4e-5 if is_multiplied else 1e-7)
     assert facts["alpha"] == ("straight" if codes.shape[2] == 4 else None)
-    assert np.array_equal(by_rows(path, monkeypatch), made)
 
 
 def test_masks_of_ten_bits(tmp_path: Path) -> None:

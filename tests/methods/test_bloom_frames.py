@@ -34,6 +34,15 @@ FRAMES: dict[str, tuple[Settings, float]] = {
     "pmndrs/0_odd_f4": (PmndrsBloom(), 1.0),
     "pmndrs/10_wide257_final_f4": (PmndrsBloom(intensity=2.5, radius=0.6, levels=6), 1.0),
     "three_r187/0_odd_f4": (ThreeBloom(variant="r187"), 3.0),
+    "three_r187/6_even_f4": (
+        ThreeBloom(
+            variant="r187",
+            radius=0.25,
+            threshold=0.2,
+            tints=((0.1, 0.2, 0.3), (0.9, 0.5, 0.4), (1, 1, 1), (0.3, 1, 0.7), (0, 0.6, 1)),
+        ),
+        3.0,
+    ),
     "bloom_node/0_odd_f4": (ThreeBloom(variant="node"), 1.0),
     "bloom_node/3_wide_f4": (ThreeBloom(variant="node", radius=0.4, threshold=0.85), 1.5),
     "ppv2/0_odd_f4": (PostProcessingBloom(), 2**0.1 - 1),
@@ -50,8 +59,8 @@ FRAMES: dict[str, tuple[Settings, float]] = {
     "playcanvas/0_odd_f4": (PlayCanvasBloom(), 1.0),
     "playcanvas/11_wide_f4": (PlayCanvasBloom(blur_level=3, threshold=4.0), 1.0),
 }
-#: What the package does not have: tints of three.js' levels; blooms of darktable and film.
-MISSING = {"three_r187/6_even_f4", "darktable", "agx_halation"}
+#: What the package does not have: blooms of darktable and film.
+MISSING = {"darktable", "agx_halation"}
 
 
 @pytest.fixture(scope="session")

@@ -43,7 +43,7 @@ ENGINES: dict[str, Settings] = {
     "blender/0_odd_f4": BlenderGlare(),
     "blender/2_even_f4": BlenderGlare(threshold=0.0, smoothness=0.0),
     "kino/0_odd_f4": KinoBloom(),
-    "urp/0_odd_f4": UrpBloom(),
+    "urp/0_odd_f4": UrpBloom(version="12"),
     "bevy/0_odd_f4": BevyBloom(),
     "three/0_odd_f4": ThreeBloom(),
 }
@@ -107,26 +107,6 @@ def test_a_bloom_is_its_engines(renderer: Renderer, engine_frames: Path, key: st
     of_device = renderer.apply(image.astype(np.float32), settings)["bloom"]
     assert relative(every(of_reference, stride), expected).max() < 1e-3
     assert relative(every(of_device, stride), expected).max() < 1e-3
-
-
-#: URP 17's further filters, by the frame's key in shared/data/blooms. Images are in ../engines.
-URP_17: dict[str, Settings] = {
-    "urp17/6_odd_kawase_f4": UrpBloom(filter="kawase"),
-    "urp17/11_wide_dual_f4": UrpBloom(filter="dual", scatter=0.2, iterations=8),
-}
-
-
-@pytest.mark.parametrize("key", URP_17)
-def test_filters_of_urp_17(renderer: Renderer, engine_frames: Path, key: str) -> None:
-    folder = engine_frames.parent / "blooms"
-    if not folder.is_dir():
-        pytest.skip("the frames of further engines (../shared/data/blooms) are not here")
-    image, bloom, stride = read_frame(folder, key, engine_frames)
-    settings = URP_17[key].replace(format="rgba32float")
-    of_reference = reference.apply(image.astype(np.float64), settings)["bloom"]
-    of_device = renderer.apply(image.astype(np.float32), settings)["bloom"]
-    for actual in (of_reference, of_device):
-        assert np.abs(every(actual, stride) - bloom).max() < 1e-3 * bloom.max()
 
 
 class Cut(Storage):

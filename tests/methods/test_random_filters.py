@@ -23,8 +23,8 @@ def random_filter(random: np.random.Generator) -> Settings:
     found: tuple[Settings, ...] = (
         DualKawase(levels=levels, offset=offset),
         Pyramid(levels=levels, scale_x=scale_x, scale_y=scale_y, radius=radius, bloom_size=size),
-        UrpBloom(filter="kawase", scatter=spread, threshold=None, clamp_max=65504, format=None),
-        UrpBloom(filter="dual", scatter=spread, threshold=None, clamp_max=65504, format=None),
+        UrpBloom(filter="kawase", scatter=spread, threshold=None, clamp=65504, format=None),
+        UrpBloom(filter="dual", scatter=spread, threshold=None, clamp=65504, format=None),
         FilamentBloom(resolution=16 * levels, levels=levels, threshold=None, format=None),
     )
     return found[random.integers(len(found))]

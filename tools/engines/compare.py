@@ -1,8 +1,8 @@
 """Compare the package with engines as they run: python tools/engines/compare.py NAME=PYTHON...
 
 Each engine renders its table of cases (cases.py) with the Python of its own environment. The
-largest differences over the largest value of a frame go to docs/engines.md. With --keep, frames of
-the smallest image go to tests/methods/engine_frames.npz, which the tests compare.
+largest differences over the largest value of a frame go to docs/evidence/engines.md. With --keep,
+frames of the smallest image go to tests/methods/engine_frames.npz, which the tests compare.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import vkbloom
 from vkbloom import reference
 
 FOLDER = Path(__file__).parent
-PAGE = Path("docs/engines.md")
+PAGE = Path("docs/evidence/engines.md")
 KEPT = Path("tests/methods/engine_frames.npz")
 TABLES = {"blender": cases.of_blender, "pygfx": cases.of_pygfx}
 #: Over the largest value of the engine's frame.
@@ -38,7 +38,6 @@ class Row(NamedTuple):
     engine: str
     what: str
     cases: int
-    outputs: str
     of_reference: float
     of_device: float
 
@@ -115,20 +114,14 @@ def rows_of(name: str, table: list[Any], found: list[tuple[str, float, float]]) 
     """Yield a row for each kind of case."""
     for kind in dict.fromkeys(kind for kind, *_ in found):
         same = [one for one in found if one[0] == kind]
-        outputs = "Image" if name == "pygfx" else "Highlights, Glare, Image"
-        yield Row(
-            name, kind, len(same), outputs, max(one[1] for one in same), max(one[2] for one in same)
-        )
+        yield Row(name, kind, len(same), max(one[1] for one in same), max(one[2] for one in same))
 
 
 def table_of(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
     """Return the table of the page."""
-    lines = [
-        "| engine | cases of | cases | outputs | reference | device |",
-        "|---|---|---|---|---|---|",
-    ]
+    lines = ["| engine | cases of | cases | reference | device |", "|---|---|---|---|---|"]
     lines += [
-        f"| {row.engine} | {row.what} | {row.cases} | {row.outputs} "
+        f"| {row.engine} | {row.what} | {row.cases} "
         f"| {shown(row, row.of_reference)} | {shown(row, row.of_device)} |"
         for row in rows
     ]
@@ -137,7 +130,7 @@ def table_of(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
 
 
 def replace_in_page(mark: str, table: str) -> None:
-    """Write a table into docs/engines.md, in the place of the one with this mark."""
+    """Write a table into docs/evidence/engines.md, in the place of the one with this mark."""
     text = PAGE.read_text(encoding="utf-8")
     before, _, rest = text.partition(f"<!-- {mark} -->\n")
     after = rest.partition("<!-- end -->\n")[2]

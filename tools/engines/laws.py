@@ -1,7 +1,7 @@
 """Hold engines as they run to the laws of a bloom: python tools/engines/laws.py NAME=PYTHON...
 
 Runs ``vkbloom check --command`` on each, which is about a hundred runs of the engine, and measures
-it as tools/tables does the presets. Writes two tables of docs/engines.md.
+it as tools/tables does the presets. Writes two tables of docs/evidence/engines.md.
 """
 
 from __future__ import annotations
@@ -56,13 +56,15 @@ def checked(name: str, python: str) -> dict[str, Any]:
 
 
 def laws(name: str, found: dict[str, Any]) -> list[str]:
-    """Return a line of the table for each law."""
+    """Return a line of the table for each law that is not held."""
     lines = []
     for law, verdict in found["laws"].items():
-        held = {True: "yes", False: "no", None: "not tested"}[verdict["held"]]
+        if verdict["held"]:
+            continue
+        held = "broken" if verdict["held"] is False else "not tested"
         why = verdict["message"] if verdict["held"] is None else verdict["why"]
         off = "" if verdict["off"] is None else f"{verdict['off']:.2g}"
-        lines.append(f"| {name} | `{law}` | {held} | {off} | {'' if verdict['held'] else why} |")
+        lines.append(f"| {name} | `{law}` | {held} | {off} | {why} |")
     return lines
 
 
@@ -80,7 +82,7 @@ def figures(name: str, bloom: Callable[[Any], Any]) -> str:
 
 def main() -> None:
     """Measure, and write the tables."""
-    held = ["| engine | law | held | off by | |", "|---|---|---|---|---|"]
+    held = ["| engine | law | | off by | |", "|---|---|---|---|---|"]
     heads = ("", "gain", "light of a point", *(f"{share:.0%} within" for share in SHARES))
     measured = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     with vkbloom.Renderer("software") as renderer:

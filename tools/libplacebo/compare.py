@@ -138,8 +138,19 @@ def with_table(text: str, rows: list[Row], words: str) -> str:
     """Return the text of a page with the table between its marks."""
     before, _, rest = text.partition("<!-- table -->\n")
     after = rest.partition("<!-- end -->\n")[2]
-    lines = ["| file | libplacebo | vkbloom | difference |", "|---|---|---|---|"]
-    table = "\n".join([*lines, *(line_of(row) for row in rows)])
+    lines = ["| repository | files with the same picture | largest difference |", "|---|---|---|"]
+    same = [row for row in rows if verdict(row) == "same"]
+    for name in sorted({row.file.partition("/")[0] for row in rows}):
+        of = [row.difference or 0.0 for row in same if row.file.startswith(f"{name}/")]
+        lines.append(f"| {name} | {len(of)} | {max(of, default=0.0):.1e} |")
+    lines += [
+        "",
+        "The others:",
+        "",
+        "| file | libplacebo | vkbloom | difference |",
+        "|---|---|---|---|",
+    ]
+    table = "\n".join([*lines, *(line_of(row) for row in rows if verdict(row) != "same")])
     return f"{before}<!-- table -->\n\n{words}\n\n{table}\n\n<!-- end -->\n{after}"
 
 

@@ -50,8 +50,10 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
             program, [*words, "--adapter", renderer.info.name], catch_exceptions=False
         )
         found = json.loads(done.stdout)
-        held = {True: "yes", False: "**no**", None: "?"}
-        laws.append([f"`{name}`", *(held[law["held"]] for law in found["laws"].values())])
+        verdicts = {law: verdict["held"] for law, verdict in found["laws"].items()}
+        broken = ", ".join(f"`{law}`" for law, held in verdicts.items() if held is False)
+        untested = ", ".join(f"`{law}`" for law, held in verdicts.items() if held is None)
+        laws.append([f"`{name}`", broken, untested])
         spread, steady, near = found["psf"], found["stability"], found["nearest_preset"]
         figures.append(
             [
@@ -67,10 +69,10 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
                 f"`{near['name']}`, {rounded(near['difference'], 100)} %",
             ]
         )
-    names = [name.replace("_", " ") for name in found["laws"]]
     heads = "preset|gain|energy|50 % within, pixels|90 % within, pixels|ripple, %|jitter, pixels|"
     heads += "shimmer, %|veiling glare, %|from its reference|nearest preset"
-    return f"{table(['preset', *names], laws)}\n{table(heads.split('|'), figures)}"
+    of_laws = table(["preset", "breaks", "could not be tested"], laws)
+    return f"{of_laws}\n{table(heads.split('|'), figures)}"
 
 
 def spread(bloom: NDArray[np.float64], light: float) -> tuple[float, list[float]]:

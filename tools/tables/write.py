@@ -1,7 +1,8 @@
-"""Write the tables of figures that the pages of docs/ include.
+"""Write the tables of docs/evidence, which pages include: ``make tables``.
 
-``python tools/tables/write.py [--out docs] [NAME ...]``; without names all of them, which takes an
-hour on two cores. Names are those of `TABLES`. Costs are wall-clock times: run nothing else then.
+``python tools/tables/write.py [--out docs/evidence] [NAME ...]``; without names all of them, which
+takes an hour on two cores. Names are those of `TABLES`. Costs are wall-clock times: run nothing
+else then.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def main() -> None:
     """Measure, and write each table when it is complete."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TABLES))
-    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--out", type=Path, default=Path("docs/evidence"))
     parser.add_argument("--adapter", default="software")
     parser.add_argument("--quick", action="store_true", help="a part of each, as a check only")
     arguments = parser.parse_args()

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import click
+import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
-from vkbloom._cli.bands import apply_file, is_large
 from vkbloom._cli.glow_options import accompanying, uploaded
 from vkbloom._cli.image_files import FileOptions, finished, read_picture
 from vkbloom._cli.overlapped import read_ahead, rendered
@@ -39,6 +39,8 @@ Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
 
 # Errors of one file, after which a batch goes on. A lost device fails for all of them.
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
+# 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
+_HALVED: Final = 1 << 26
 # Errors about what a picture has, by the argument at their beginning; others hold for all pictures.
 _OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
@@ -88,15 +90,6 @@ class Run:
         self._glow_of = functools.cache(self._read_glow)
         self.failures: dict[str, Exception] = {}
 
-    def kind(self, pair: Pair) -> tuple[bool, Begun]:
-        """Return whether a file is read and written in bands of rows, and its settings."""
-        options, name = self._options, pair[0]
-        is_alone = (
-            options.framebuffers == "final" and not is_stream(name) and not is_stream(pair[1])
-        )
-        is_by_rows = is_alone and is_large(name, options.subimage, options.layer)
-        return is_by_rows, options.settings(name)
-
     @contextlib.contextmanager
     def _of_file(self, pair: Pair) -> Iterator[None]:
         """Keep an error of one of several files, so that the others are done."""
@@ -106,34 +99,6 @@ class Run:
             if not self._several:
                 raise
             self.failures[pair[0]] = error
-
-    def large_file(self, pair: Pair, settings: vkbloom.Settings, expand: float | None) -> None:
-        """Add bloom to one file in bands of rows."""
-        options, (name, target) = self._options, pair
-        with (
-            self._of_file(pair),
-            tqdm(unit="row", leave=False, disable=self._hidden) as bar,
-            _wrong_use_of("mask", "emission", "raw"),
-        ):
-
-            def show(done: int, total: int) -> None:
-                bar.total = total
-                bar.update(done - bar.n)
-
-            self._make_folder(target)
-            notes = apply_file(
-                self._renderer()._core,
-                name,
-                Path(target),
-                settings,
-                options,
-                expand=expand,
-                progress=show,
-            )
-            for text in notes:
-                note(text)
-            if not self._several:
-                say(f"wrote {target}")
 
     def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
         """Add bloom to files one after the other; read and write others meanwhile."""
@@ -214,7 +179,13 @@ class Run:
             expand=expand,
             is_blended=is_blended,
         )
-        return premultiplied(picture) if is_blended else picture
+        picture = premultiplied(picture) if is_blended else picture
+        pixels, is_half = picture.pixels, options.half
+        if is_half is None:
+            is_half = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
+        if is_half and pixels.dtype == np.float32:
+            picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
+        return picture
 
     def _read_glow(self, is_blended: bool) -> Callable[[NDArray[Any]], Any]:
         """Return a function that gives mask and emission for an image."""

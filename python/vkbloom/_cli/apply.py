@@ -97,7 +97,7 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "--half/--no-half",
     "half",
     default=None,
-    help="Hold large pictures in half floats, which need half the memory [default for 8-bit files "
+    help="Hold pictures in half floats, which need half the memory [default for 8-bit files "
     "of at least 64 million pixels]",
 )
 @click.option(
@@ -151,13 +151,9 @@ def command(
 
         run = Run(options, target, Path(folder), renderer, several=len(work) > 1)
         mixed = None
-        for (is_alone, begun), group in itertools.groupby(work, key=run.kind):
+        for begun, group in itertools.groupby(work, key=lambda pair: options.settings(pair[0])):
             mixed = begun[0] if begun[0].composite == "mix" else mixed
-            if is_alone:
-                for pair in group:
-                    run.large_file(pair, *begun)
-            else:
-                run.sequence([*group], *begun)
+            run.sequence([*group], *begun)
     note_step(mixed, options.mask, options.emission)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:

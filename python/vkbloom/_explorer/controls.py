@@ -22,7 +22,7 @@ _FIRST: Final = ("bloom", "intensity", "threshold")
 _LAST: Final = ("exposure", "tonemap")
 # Numbers of methods that are rarely changed.
 _RARE: Final = (
-    "clamp_max",
+    "clamp",
     "jitter",
     "low_frequency_boost_curvature",
     "luminance_cap",

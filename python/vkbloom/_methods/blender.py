@@ -121,7 +121,7 @@ class BlenderGlare(Settings):
     tint.
 
     Source: the formulas of the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
-    node_composite_glare.cc, confirmed by Blender 5.0.1 (``docs/engines.md``).
+    node_composite_glare.cc, confirmed by Blender 5.0.1 (``docs/evidence/engines.md``).
 
     Examples
     --------

@@ -40,7 +40,7 @@ class PygfxBloom(Settings):
     The stock renderer's buffers have the format "rgba8unorm-srgb"; ``glow`` is then its frame.
 
     Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c, confirmed by pygfx 0.17.0
-    (``docs/engines.md``).
+    (``docs/evidence/engines.md``).
 
     Examples
     --------

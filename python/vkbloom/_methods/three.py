@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
 Variant = Literal["r185", "r187", "node"]
+Tint = tuple[float, float, float]
+
+
+def _read_tints(tints: Any) -> tuple[Tint, ...]:
+    read = tuple(read_numbers("tints", tint, 3, 65504.0) for tint in tints)
+    if len(read) != 5:
+        raise ValueError(f"tints: {tints!r} is not five colours, one for each level")
+    return cast("tuple[Tint, ...]", read)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -27,6 +35,8 @@ class ThreeBloom(Settings):
         Luminance over which the threshold fades in, 0.0001 to 65504.
     resolution_scale : float
         Of BloomNode: the size of ``bright`` as a share of the frame's, 0.01 to 1.
+    tints : sequence of five (float, float, float)
+        Factor of each level, 0 to 65504.
     threshold : float or None
         Luminance at which the fade begins.
     composite : {"add"}
@@ -44,13 +54,12 @@ class ThreeBloom(Settings):
     the image above it (``bright`` for ``down_0``), blurred along x, then along y. The taps are one
     pixel of the level apart. Their weights are 0.39894 exp(-i^2 / (2 sigma^2)) / sigma with
     -R < i < R, R = 6, 10, 14, 18, 22 and sigma = R / 3, not normalized. ``up_0`` is the sum of the
-    levels, enlarged bilinearly and multiplied by their factors; ``bloom`` is one bilinear sample
-    of it. In "rgba8unorm", up_0 is a third of that.
+    levels, enlarged bilinearly and multiplied by their factors and tints; ``bloom`` is one bilinear
+    sample of it. In "rgba8unorm", up_0 is a third of that.
 
     "r187" and "node" read the taps 2 n - 1 and 2 n as one bilinear sample between them. This is
     another blur where a level is read at twice its size. Their luminance has the weights of
-    Rec. 709 with four digits. The sizes of "node" are floored, but at least 1. Tints of the levels
-    are not supported.
+    Rec. 709 with four digits. The sizes of "node" are floored, but at least 1.
 
     Source: mrdoob/three.js, examples/jsm/postprocessing/UnrealBloomPass.js since pull requests
     #31528 (kernels), #32517 (factor 3) and #34479 (samples of two taps),
@@ -76,8 +85,9 @@ class ThreeBloom(Settings):
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
+    tints: tuple[Tint, ...] = value_field(((1.0, 1.0, 1.0),) * 5, read=_read_tints)
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
-        values = {"scale_x": self.resolution_scale}
+        values = {"scale_x": self.resolution_scale, "level_weights": self.tints}
         return settings_block(self.method, vars(self) | values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, ClassVar, Literal
 
 from vkbloom._settings.blocks import settings_block
@@ -25,24 +26,36 @@ def _linear(value: float) -> float:
     return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
 
 
+def _read_tint(tint: Any) -> tuple[float, ...]:
+    return read_numbers("tint", tint, 3, 65504.0)
+
+
 def _read_color(color: Any) -> tuple[float, ...]:
     return read_numbers("color", color, 3, 65504.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class UrpBloom(Settings):
-    """Bloom of Unity's Universal Render Pipeline, without high quality.
+    """Bloom of Unity's Universal Render Pipeline.
 
     Parameters
     ----------
     filter : {"gaussian", "kawase", "dual"}
-        How the bloom spreads. The last two are of URP 17 (Unity 6).
+        How the bloom spreads. The last two are of version 17.
+    downscale : {"half", "quarter"}
+        Size of the first level as a share of the frame's.
+    high_quality : bool
+        Whether to reduce the frame by 13 taps, and to enlarge by a cubic B-spline.
     scatter : float
         Share of the larger blurs, 0 to 1.
     iterations : int
         Largest number of levels, 2 to 8.
-    clamp_max : float
+    tint : tuple of 3 floats
+        In sRGB. Its light, divided by its luminance, multiplies the bloom; black counts as white.
+    clamp : float
         Limit of the values that enter the bloom, 0 to 65504.
+    version : {"17", "12"}
+        Of the package: 17 is that of Unity 6.
     threshold : float or None
         In linear light; Unity shows the default as 0.9 in sRGB.
     knee : float
@@ -55,13 +68,15 @@ class UrpBloom(Settings):
 
     Notes
     -----
-    ``down_0`` is one bilinear tap at half of the frame's size, floored. It is clamped; then the
-    knee curve is applied, with k = threshold * knee, 4k + 1e-4 and 1e-4. There are
+    ``down_0`` is one bilinear tap at half or a quarter of the frame's size, floored, or 13 taps up
+    to a texel apart (12 takes a texel's width for its height). It is clamped; then the knee curve
+    is applied, with k = threshold * knee, 4k + 1e-4 and 1e-4. There are
     clamp(floor(log2(longer side of down_0) - 1), 1, iterations) levels. Each next level has half
     the size, floored, by the half-kernel 0.22702703, 0.19459459, 0.12162162, 0.05405405,
     0.01621622. Its horizontal taps are two texels of the level above apart; the vertical taps,
-    which follow, one pixel. With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, bilinear(up_k+1), s),
-    and ``bloom`` is one bilinear sample of up_0. Dirt and tint are not supported.
+    which follow, one pixel. In 17 no horizontal tap is beyond the middle of the last two columns.
+    With s = 0.05 + 0.9 scatter, up_k = lerp(down_k, bilinear(up_k+1), s), and ``bloom`` is one
+    bilinear sample of up_0, times the tint. Dirt is not supported.
 
     "kawase" stays at the size of down_0. As many times as there are levels, n, kawase_i mixes the
     image before with the mean of four diagonal taps, D = 1/2 + i texels away (i - 1 where i is
@@ -90,7 +105,29 @@ class UrpBloom(Settings):
     filter: BlurFilter = choice_field("filter")
     scatter: float = number_field("scatter")
     iterations: int = number_field("iterations")
-    clamp_max: float = number_field("clamp_max", slider=(0, 100))
+    downscale: Literal["half", "quarter"] = choice_field("downscale", ("half", "quarter"))
+    high_quality: bool = value_field(False)
+    tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
+    clamp: float = number_field("clamp_max", slider=(0, 100))
+    version: Literal["17", "12"] = choice_field("version", ("17", "12"))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.version == "12" and self.filter != "gaussian":
+            raise ValueError(f"filter: {self.filter!r} is not in URP 12, which has 'gaussian'")
+
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        colour = [_linear(channel) for channel in self.tint]
+        grey = sum(map(math.prod, zip(colour, (0.2126729, 0.7151522, 0.0721750), strict=True)))
+        values = {
+            "quarter": self.downscale == "quarter",
+            "high_quality_filtering": self.high_quality,
+            "tint": [channel / grey for channel in colour] if grey else (1.0, 1.0, 1.0),
+            "clamp_max": self.clamp,
+            "urp_12": self.version == "12",
+        }
+        return settings_block(self.method, vars(self) | values)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

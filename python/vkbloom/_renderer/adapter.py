@@ -127,5 +127,5 @@ def adapters() -> tuple[AdapterInfo, ...]:
 
 def from_core(adapter: _core.AdapterTuple) -> AdapterInfo:
     """Make an AdapterInfo from the core's description of an adapter."""
-    name, kind, driver, driver_info, api_version, _, bundled, uuid, pci = adapter
+    name, kind, driver, driver_info, api_version, _, bundled, uuid, pci, *_ = adapter
     return AdapterInfo(name, kind, driver, driver_info, api_version, bundled, uuid, pci)

@@ -19,6 +19,7 @@ from vkbloom._array_cache import ArrayCache, shared
 from vkbloom._checks import check_framebuffers, check_size
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
+from vkbloom._renderer.adapter_choice import chosen_adapter
 from vkbloom._renderer.batches import Batches
 from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
 from vkbloom._renderer.frames import Frames
@@ -232,8 +233,7 @@ class Renderer:
 
         self._pipelines = DiskCache("pipelines")
         self._core = _core.Renderer(
-            adapter,
-            bundled_driver(),
+            *chosen_adapter(adapter, bundled_driver()),
             bool(validation),
             os.environ.get("VKBLOOM_VARIANT") or "auto",
             _frame_seconds(),

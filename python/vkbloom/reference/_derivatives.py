@@ -33,7 +33,7 @@ DISCRETE: Final = frozenset(
     {
         *("anamorphic_ratio", "anamorphism", "babylon.kernel", "babylon.scale", "bloom_scale"),
         *("diffusion", "jitter", "pixels_per_degree", "resolution_scale", "size", "size_scale"),
-        *("sizes", "sun_position", "tints"),
+        *("sizes", "sun_position", "unreal.tints"),
     }
 )
 

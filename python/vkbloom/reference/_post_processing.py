@@ -21,7 +21,7 @@ from ._upsampling import combine, tent
 if TYPE_CHECKING:
     from vkbloom._methods.unity import PostProcessingBloom
 
-__all__ = ["gain", "passes"]
+__all__ = ["gain", "linear_light", "passes"]
 
 
 def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]:
@@ -75,17 +75,17 @@ def _plan(
 
 
 def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
-    limit = min(65504.0, _linear(settings.clamp))
+    limit = min(65504.0, linear_light(settings.clamp))
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
     if settings.threshold is None:
         return kept
-    threshold = _linear(settings.threshold)
+    threshold = linear_light(settings.threshold)
     half_width = threshold * settings.knee + 1e-5
     return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
 
 
-def _linear(value: Any) -> Any:
+def linear_light(value: Any) -> Any:
     """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
     if value > 1:
         return value**2.2

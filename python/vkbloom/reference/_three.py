@@ -15,7 +15,7 @@ import numpy as np
 
 from ._image import BlurInput
 from ._sampling import Array, sample
-from ._threshold import luminance, masked, smooth_step
+from ._threshold import luminance, masked, smooth_step, with_alpha
 
 if TYPE_CHECKING:
     from vkbloom._methods.three import ThreeBloom
@@ -35,10 +35,10 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
     of the one above. BloomNode multiplies by its scale and floors. Each level is the image above it
     ("bright" for down_0), blurred by a Gaussian along x, then along y, with taps one pixel of the
     level apart. Newer variants read neighbouring taps by one bilinear sample. up_0 is the sum of
-    the levels, enlarged bilinearly and multiplied by their factors; the bloom is up_0,
+    the levels, enlarged bilinearly and multiplied by their factors and tints; the bloom is up_0,
     bilinear. In rgba8unorm buffers, up_0 is divided by the sum of the factors, 3.
     """
-    height, width, _ = source.image.shape
+    height, width, channels = source.image.shape
     size = _first_size((width, height), settings)
     image = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
     framebuffers = {"bright": image}
@@ -52,7 +52,8 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
         horizontal = source.store(sample(image, level, x_taps=x_taps))
         image = source.store(sample(horizontal, level, y_taps=taps))
         framebuffers[f"down_{k}"] = image
-        total += factor * sample(image, size)
+        tinted = source.store(image * with_alpha(settings.tints[k], channels))
+        total = total + factor * sample(tinted, size)
     sum_of_factors = sum(_factors(settings.radius)) if source.store.holds_means else 1.0
     framebuffers["up_0"] = source.store(total / sum_of_factors)
     framebuffers["bloom"] = source.store.end(
@@ -61,13 +62,13 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
     return framebuffers
 
 
-def gain(settings: ThreeBloom, size: tuple[int, int]) -> float:
+def gain(settings: ThreeBloom, size: tuple[int, int]) -> float | Array:
     """Return the bloom of a flat image of 1: about 3, because each kernel sums to nearly 1."""
-    value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), 0.0
+    value, total = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]), np.zeros(3)
     for k, factor in enumerate(_factors(settings.radius)):
         value *= sum(weight for _, weight in _taps(k, settings)) ** 2
-        total += factor * value
-    return total
+        total = total + factor * value * np.asarray(settings.tints[k])
+    return total if np.ptp(total) else float(total[0])
 
 
 def _first_size(size: tuple[int, int], settings: ThreeBloom) -> tuple[int, int]:

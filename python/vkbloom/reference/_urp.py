@@ -1,4 +1,4 @@
-"""Bloom of Unity's Universal Render Pipeline, without high quality.
+"""Bloom of Unity's Universal Render Pipeline.
 
 From Unity-Technologies/Graphics, Packages/com.unity.render-pipelines.universal:
 Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
@@ -8,16 +8,21 @@ Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+import operator
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
 from ._levels import halved
-from ._sampling import Array, sample
-from ._threshold import masked, soften
-from ._upsampling import combine, flat_gain, linear
+from ._post_processing import linear_light
+from ._pyramid import downsample
+from ._sampling import Array, read_rows, sample
+from ._tape import contiguous
+from ._threshold import masked, soften, with_alpha
+from ._upsampling import combine, cubic, flat_gain, linear
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import UrpBloom
@@ -31,14 +36,20 @@ _WEIGHTS = (0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622)
 def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
     """Return the framebuffers.
 
-    down_0 has half the size of the frame: one bilinear tap, clamped, then the soft threshold. Each
-    further level has half the size of the one above. Nine taps two texels apart reduce its width,
-    then nine taps one pixel apart blur its height. up_k mixes the level with the smaller one, by
-    the scatter; the bloom is up_0. Both are enlarged bilinearly. The other filters are of URP 17.
+    down_0 has half or a quarter of the frame's size: one bilinear tap, or 13 taps, clamped, then
+    the soft threshold and the tint. Each further level has half the size of the one above. Nine
+    taps two texels apart reduce its width, then nine taps one pixel apart blur its height. up_k
+    mixes the level with the smaller one, by the scatter; the bloom is up_0. Both are enlarged
+    bilinearly, or by a cubic B-spline. The other filters are of URP 17.
     """
-    height, width, _ = source.image.shape
-    level = halved((width, height))
-    downs = [source.store(masked(_prefilter(sample(source.image, level), settings), source.mask))]
+    height, width, channels = source.image.shape
+    level = _first_size((width, height), settings)
+    reduced = sample(source.image, level)
+    if settings.high_quality:
+        aspect = height / width if settings.version == "12" else 1.0
+        reduced = source.store(downsample(source.image, level, scale=(0.5, 0.5 * aspect)))
+    bright = _prefilter(reduced, settings) * with_alpha(_tint(settings), channels)
+    downs = [source.store(masked(bright, source.mask))]
     count = _level_count(settings, level)
     if settings.filter == "kawase":
         return _kawase(source, settings, downs[0], count)
@@ -46,10 +57,23 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
         return _dual(source, settings, downs, count)
     for _ in range(1, count):
         level = halved(level)
-        horizontal = source.store(sample(downs[-1], level, x_taps=_taps(2.0)))
+        horizontal = source.store(_across(downs[-1], level, settings))
         downs.append(source.store(sample(horizontal, level, y_taps=_taps(1.0))))
     own, coarse = _shares(settings, len(downs))
-    return combine(downs, source, own=own, coarse=coarse, upsample=linear, last=linear)
+    kernel = _kernel(settings)
+    return combine(downs, source, own=own, coarse=coarse, upsample=kernel, last=kernel)
+
+
+def _across(image: Array, size: tuple[int, int], settings: UrpBloom) -> Array:
+    """Blur along x. In URP 17 no tap is beyond the middle of the last two columns."""
+    width = image.shape[1]
+    lines = sample(image, (width, size[1])).swapaxes(0, 1)
+    centres = (np.arange(size[0]) + 0.5) * width / size[0] - 0.5
+    last = np.inf if settings.version == "12" else width - 1.5
+    total = np.zeros(())
+    for offset, weight in _taps(2.0):
+        total = total + weight * read_rows(lines, np.minimum(centres + offset, last))
+    return contiguous(total.swapaxes(0, 1))
 
 
 def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> dict[str, Array]:
@@ -64,7 +88,7 @@ def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> 
         mean = sample(image, (width, height), sides, sides)
         image = source.store((1 - share) * image + share * mean)
         images[f"kawase_{i}"] = image
-    return images | {"bloom": source.store.end(linear(image, source.size))}
+    return images | {"bloom": source.store.end(_kernel(settings)(image, source.size))}
 
 
 def _dual(
@@ -80,17 +104,33 @@ def _dual(
         image = source.store(dual_kawase.up(image, (width, height), 0.3 + settings.scatter))
         ups[f"up_{level}"] = image
     levels = {f"down_{level}": down for level, down in enumerate(downs)}
-    return levels | ups | {"bloom": source.store.end(linear(image, source.size))}
+    return levels | ups | {"bloom": source.store.end(_kernel(settings)(image, source.size))}
 
 
-def gain(settings: UrpBloom, size: tuple[int, int]) -> float:
+def _kernel(settings: UrpBloom) -> Callable[[Array, tuple[int, int]], Array]:
+    return cubic if settings.high_quality else linear
+
+
+def _first_size(size: tuple[int, int], settings: UrpBloom) -> tuple[int, int]:
+    return halved(halved(size)) if settings.downscale == "quarter" else halved(size)
+
+
+def _tint(settings: UrpBloom) -> Any:
+    """Return the light of the tint, divided by its luminance."""
+    colour = [linear_light(channel) for channel in settings.tint]
+    grey = sum(map(operator.mul, colour, (0.2126729, 0.7151522, 0.0721750)))
+    ones = np.ones(1)
+    return np.concatenate([channel / grey * ones if grey else ones for channel in colour])
+
+
+def gain(settings: UrpBloom, size: tuple[int, int]) -> float | Array:
     """Return the bloom of a flat image of 1: the threshold may change it, the mixes do not."""
-    count = _level_count(settings, halved(size))
+    count = _level_count(settings, _first_size(size, settings))
     first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
-    if settings.filter != "gaussian":
-        return first
-    kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:])
-    return first * flat_gain(*_shares(settings, count), [kernel ** (2 * k) for k in range(count)])
+    kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:]) if settings.filter == "gaussian" else 1.0
+    first *= flat_gain(*_shares(settings, count), [kernel ** (2 * k) for k in range(count)])
+    gains = first * _tint(settings)
+    return gains if np.ptp(gains) else float(gains[0])
 
 
 def _level_count(settings: UrpBloom, size: tuple[int, int]) -> int:
@@ -104,7 +144,7 @@ def _shares(settings: UrpBloom, count: int) -> tuple[list[float], list[float]]:
 
 def _prefilter(rgb: Array, settings: UrpBloom) -> Array:
     # The clamp is not applied to alpha.
-    kept = np.concatenate([np.minimum(rgb[..., :3], settings.clamp_max), rgb[..., 3:]], axis=-1)
+    kept = np.concatenate([np.minimum(rgb[..., :3], settings.clamp), rgb[..., 3:]], axis=-1)
     if settings.threshold is not None:
         half_width = settings.threshold * settings.knee
         kept = soften(kept, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
