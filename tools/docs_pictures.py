@@ -4,6 +4,7 @@ python tools/docs_pictures.py docs/pictures
 
 - gallery.jpg: the saucer with each preset
 - presets.png, profiles.png: how the light of a point spreads with each preset
+- hero.jpg: the saucer without bloom beside the saucer with bloom
 - the flowchart of docs/plans.md, from a plan
 """
 
@@ -25,8 +26,25 @@ from matplotlib import pyplot as plt
 
 SIZE = (640, 360)
 CELL = (480, 270)
+HERO = (1280, 640)
 # The square around a point in pixels, and the range of its logarithmic scale.
 SIDE, DECADES = 300, 5
+
+
+def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
+    """Draw the wipe of the first page; its words can be read on a telephone."""
+    scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
+    lit = vkbloom.presets["bevy_natural"].replace(intensity=0.35, tonemap="aces", encoding="srgb")
+    sides = []
+    for settings, label in ((lit.replace(intensity=0), "no bloom"), (lit, "bloom")):
+        final = renderer.render(scene, settings, HERO, shading="deferred", framebuffers="final")
+        shown = pictures.picture(final["final"], "final", encoded=True)
+        at = (24, 60, label) if label == "no bloom" else (HERO[0] - 170, 60, label)
+        sides.append(pictures.labelled(shown, [at], 48))
+    half = HERO[0] // 2
+    wipe = np.concatenate([sides[0][:, :half], sides[1][:, half:]], axis=1)
+    wipe[:, half - 2 : half + 2] = 255
+    vkbloom.write(path, wipe[..., :3], quality=88)
 
 
 def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
@@ -97,6 +115,7 @@ def main(folder: Path) -> None:
     """Write all pictures."""
     write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
+        draw_hero(renderer, folder / "hero.jpg")
         draw_gallery(renderer, folder / "gallery.jpg")
         draw_points(renderer, folder)
 
