@@ -34,7 +34,7 @@ SIDE, DECADES = 300, 5
 def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
     """Draw the wipe of the first page; its words can be read on a telephone."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
-    lit = vkbloom.presets["bevy_natural"].replace(intensity=0.35, tonemap="aces", encoding="srgb")
+    lit = vkbloom.presets["bevy_natural"].replace(intensity=0.5, tonemap="aces", encoding="srgb")
     sides = []
     for settings, label in ((lit.replace(intensity=0), "no bloom"), (lit, "bloom")):
         final = renderer.render(scene, settings, HERO, shading="deferred", framebuffers="final")
