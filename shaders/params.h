@@ -722,6 +722,7 @@
     NAME(BY_MASK, 2, by_mask) \
     NAME(BY_VALUES, 3, by_values) \
     NAME(BY_SQUARES, 4, by_squares) \
+    NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

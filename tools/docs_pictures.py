@@ -35,16 +35,35 @@ def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
     """Draw the wipe of the first page; its words can be read on a telephone."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
     lit = vkbloom.presets["bevy_natural"].replace(intensity=0.5, tonemap="aces", encoding="srgb")
-    sides = []
-    for settings, label in ((lit.replace(intensity=0), "no bloom"), (lit, "bloom")):
-        final = renderer.render(scene, settings, HERO, shading="deferred", framebuffers="final")
-        shown = pictures.picture(final["final"], "final", encoded=True)
-        at = (24, 60, label) if label == "no bloom" else (HERO[0] - 170, 60, label)
-        sides.append(pictures.labelled(shown, [at], 48))
-    half = HERO[0] // 2
-    wipe = np.concatenate([sides[0][:, :half], sides[1][:, half:]], axis=1)
-    wipe[:, half - 2 : half + 2] = 255
-    vkbloom.write(path, wipe[..., :3], quality=88)
+    off, on = (
+        renderer.render(scene, one, HERO, shading="deferred", framebuffers="final")["final"]
+        for one in (lit.replace(intensity=0), lit)
+    )
+    width, half = HERO[0], HERO[0] // 2
+    figure = plt.figure(figsize=(width / 100, HERO[1] / 100))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.imshow(np.concatenate([off[:, :half, :3], on[:, half:, :3]], axis=1))
+    axes.axvline(half - 0.5, color="white", linewidth=3)
+    axes.text(24, 60, "no bloom", color="white", fontsize=34)
+    axes.text(width - 24, 60, "bloom", color="white", fontsize=34, ha="right")
+    figure.savefig(path, dpi=100, pil_kwargs={"quality": 88})
+    plt.close(figure)
+
+
+def write_sheet(path: Path, tiles: list[tuple[np.ndarray, str]], columns: int) -> None:
+    """Write pictures in rows, with their names below."""
+    height, width = tiles[0][0].shape[:2]
+    rows = -(-len(tiles) // columns)
+    size = (columns * width / 100, rows * (height / 100 + 0.3))
+    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained")
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for axis, (tile, name) in zip(axes.flat, tiles, strict=False):
+        axis.imshow(tile)
+        axis.set_title(name, y=0, verticalalignment="top", fontsize=12)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
 
 
 def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
@@ -60,8 +79,8 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
             final = renderer.apply(lit["scene"], changed, framebuffers="final")["final"]
         else:
             final = renderer.render(scene, changed, CELL, shading="deferred")["final"]
-        tiles.append((pictures.picture(final, "final", encoded=True), name, ""))
-    vkbloom.write(path, pictures.sheet(tiles, 3, CELL), quality=88)
+        tiles.append((pictures.picture(final, "final", encoded=True), name))
+    write_sheet(path, tiles, 3)
 
 
 def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
@@ -90,7 +109,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
         decades = np.log10(np.maximum(middle / bloom.max(), 10.0**-DECADES))
         # 32 levels of grey show the shape and keep the file small.
         grey = np.rint(31 * (1 + decades / DECADES)) * (255 / 31)
-        tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name, ""))
+        tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name))
     axes.set_xlabel("distance, pixels (+ 0.5)")
     axes.set_ylabel("share of the light of the point, per pixel")
     axes.set_ylim(1e-7, 1)
@@ -98,7 +117,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     figure.legend(fontsize=7, loc="outside right upper")
     figure.savefig(folder / "profiles.png", dpi=110)
     plt.close(figure)
-    vkbloom.write(folder / "presets.png", pictures.sheet(tiles, 4, (SIDE, SIDE)))
+    write_sheet(folder / "presets.png", tiles, 4)
 
 
 def write_flowchart(page: Path) -> None:

@@ -95,28 +95,26 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     }
 }
 
-static VkImageUsageFlags image_usage(const struct vkb_device *device, enum vkb_format format)
-{
-    // No pass reads depth.
-    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-         | (format == VKB_FORMAT_DEPTH32_FLOAT
-                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
-                      | (device->dispatch ? VK_IMAGE_USAGE_STORAGE_BIT : 0));
-}
-
 bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
                          struct vkb_error *error)
 {
-    const enum vkb_format format = row->format;
-    const VkFormatFeatureFlags features =
-        format == VKB_FORMAT_DEPTH32_FLOAT
-            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
+    static const struct {
+        VkImageUsageFlags usage;
+        VkFormatFeatureFlags feature;
+        const char *words;
+    } rows[] = {
+        {VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT,
+         VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_SAMPLED_BIT, VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT, "sample"},
+        {VK_IMAGE_USAGE_STORAGE_BIT, VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT, "store"},
+    };
 
-    if (!vkb_device_supports(device, format, features))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
-                        device->adapter.name, vkb_formats[format].name);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
+        if ((row->usage & rows[i].usage)
+            && !vkb_device_supports(device, row->format, rows[i].feature))
+            return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot %s %s images",
+                            device->adapter.name, rows[i].words, vkb_formats[row->format].name);
     return true;
 }
 
@@ -206,7 +204,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .layers = row->layers ? row->layers : 1,
                                 .levels = 1,
                                 .array = row->layers > 0,
-                                .usage = image_usage(device, row->format),
+                                .usage = row->usage,
                                 .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);
@@ -235,11 +233,16 @@ static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache,
     return cached;
 }
 
-bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+static bool is_alike(const struct vkb_image *image, const struct vkb_image_row *row)
 {
     return image->handle && image->format == row->format && image->width == row->width
         && image->height == row->height && image->layers == (row->layers ? row->layers : 1)
         && image->array == (row->layers > 0);
+}
+
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+{
+    return is_alike(image, row) && (row->usage & ~image->usage) == 0;
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
@@ -269,9 +272,12 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
     cached->used = cache->now;
     if (vkb_image_fits(&cached->image, row))
         return true;
+    // Also for the plans that it has been for: they may come by turns.
+    struct vkb_image_row both = *row;
+    both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
     destroy_image(device, cache, cached);
     cached->image_id = ++cache->clock;
-    if (!vkb_image_create_row(device, row, &cached->image, error))
+    if (!vkb_image_create_row(device, &both, &cached->image, error))
         return false;
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)

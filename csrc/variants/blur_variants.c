@@ -146,7 +146,7 @@ static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row 
                        struct chain *chain)
 {
     *chain = (struct chain){.composite = pass};
-    if (!vkb_is_composite(pass) || !graph->images[pass->reads[0]].input)
+    if (!vkb_ends_bloom(pass) || !graph->images[pass->reads[0]].input)
         return false;
     chain->horizontal = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
     if (chain->horizontal)
@@ -163,13 +163,15 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
                                      const struct chain *chain)
 {
     const struct vkb_graph *graph = &choice->plain;
-    const enum vkb_format format = graph->images[chain->composite->targets[0]].format;
+    const enum vkb_format format = graph->images[chain->horizontal->targets[0]].format;
     struct vkb_pass_row row;
     struct vkb_fused_bloom_params *params = &row.params.fused_bloom;
 
     memcpy(&row, chain->composite, sizeof row);
     memset(&row.params, 0, sizeof row.params);
     vkb_drop_reads(&row, 1);
+    if (row.transposed)
+        row.reads[row.read_count++] = chain->composite->reads[3];
     row.fused = true;
     row.block = VKB_BLOCK_fused_bloom;
     VKB_TAKE_COMPOSITE(&row, fused_bloom, chain->composite);
@@ -222,11 +224,14 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     struct chain chain;
 
     *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &chain)
-         && vkb_fits_words(choice, pass);
+         && vkb_fits_words(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    make_strips(choice, &row, strip_shaders[format], vertical);
+    make_strips(choice, &row,
+                pass->transposed ? &vkb_shader_strip_mixed_words_rgba32float
+                                 : strip_shaders[format],
+                vertical);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -280,11 +285,13 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
     struct chain chain;
 
     *fits = fits_tiles(choice->device)
-         && find_chain(&choice->plain, pass, TILE_RADIUS, vkb_threshold_of, &chain);
+         && find_chain(&choice->plain, pass, TILE_RADIUS,
+                       pass->transposed ? vkb_writer_of : vkb_threshold_of, &chain);
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &chain);
-    make_tiles(&row, &vkb_shader_tile_comp, &chain);
+    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
+               &chain);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -311,43 +318,11 @@ static bool find_any_chain(const struct vkb_graph *graph, int radius, struct cha
     return false;
 }
 
-static bool is_differentiated(const struct vkb_graph *graph, uint32_t bloom)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (vkb_transposes(&graph->passes[i], VKB_BLOCK_composite)
-            && vkb_pass_reads(&graph->passes[i], bloom))
-            return true;
-    return false;
-}
-
-// The bloom alone in tiles, where derivatives need it.
-bool vkb_add_bloom_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                         bool *fits, struct vkb_error *error)
-{
-    struct chain chain;
-
-    *fits = vkb_is_line_blur(pass) && fits_tiles(choice->device)
-         && is_differentiated(&choice->plain, pass->targets[0])
-         && find_any_chain(&choice->plain, TILE_RADIUS, &chain) && chain.horizontal == pass;
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = fused_row(choice, &chain);
-    memcpy(row.name, pass->name, sizeof row.name);
-    row.targets[0] = pass->targets[0];
-    row.constants.composite = COMPOSITE_OFF;
-    row.constants.format =
-        vkb_stored_as(choice->device, choice->plain.images[pass->targets[0]].format);
-    make_tiles(&row, &vkb_shader_tile_comp, &chain);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 // The transposes of a chain, of which `pass` is the last one: that of the threshold, or of the
-// vertical blur, if there is no threshold. What the composite brings to the scene is an image, or
-// left to the last pass.
+// vertical blur, if there is no threshold. The chain's composite is its adjoint then, a factor.
+// What it brings to the scene is an image, or left to the last pass.
 static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                               int radius, struct chain *chain,
-                               const struct vkb_pass_row **by_bloom)
+                               int radius, struct chain *chain)
 {
     const enum vkb_block filter = VKB_BLOCK_adjoint_filter, composite = VKB_BLOCK_composite;
     const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
@@ -361,43 +336,40 @@ static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_p
     const struct vkb_pass_row *second = first ? sole_adjoint(graph, first->reads[0], filter) : NULL;
     const uint32_t added = pass->reads[3];
     const struct vkb_pass_row *by_scene = sole_adjoint(graph, added, composite);
-    *by_bloom = second ? sole_adjoint(graph, second->reads[0], composite) : NULL;
-    return *by_bloom && (*by_bloom)->constants.by == BY_BLOOM
-        && (added == (*by_bloom)->reads[3] || (by_scene && by_scene->constants.by == BY_SCENE))
+    chain->composite = second ? vkb_writer_of(graph, second->reads[0]) : NULL;
+    return chain->composite && vkb_is_factor(chain->composite)
+        && (added == chain->composite->reads[3] || (by_scene && by_scene->constants.by == BY_SCENE))
         && chain->threshold->reads[0] == pass->reads[4];
 }
 
 // A fused row of the derivatives by the image, which replaces the composite's passes, the blurs'
-// and the threshold's. Nothing is rounded between them, whatever the formats are.
+// and the threshold's. It reads the image and the composite's cotangents. Nothing is rounded
+// between the passes, whatever the formats are.
 static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
                                        const struct vkb_pass_row *pass, const struct chain *chain)
 {
     struct vkb_pass_row row = fused_row(choice, chain);
 
     memcpy(row.name, pass->name, sizeof row.name);
+    row.reads[0] = chain->composite->reads[3];
+    row.reads[1] = chain->composite->reads[0];
     row.targets[0] = pass->targets[0];
-    row.constants.dither = 0;
     // Its sums have another order, so it is taken always: all runs have the same bits.
     row.fused = false;
+    row.gains_if_finite = true;
     return row;
 }
 
 bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    const struct vkb_pass_row *by_bloom;
     struct chain chain;
 
-    *fits = fits_tiles(choice->device)
-         && find_adjoint_chain(&choice->plain, pass, TILE_RADIUS, &chain, &by_bloom);
+    *fits =
+        fits_tiles(choice->device) && find_adjoint_chain(&choice->plain, pass, TILE_RADIUS, &chain);
     if (!*fits)
         return true;
     struct vkb_pass_row row = adjoint_row(choice, pass, &chain);
-    // Image, bloom and cotangents of the composite.
-    for (row.read_count = 0; row.read_count < 2; ++row.read_count)
-        row.reads[row.read_count] = by_bloom->reads[row.read_count];
-    row.reads[row.read_count++] = by_bloom->reads[3];
-    row.gains_if_finite = true;
     make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -405,21 +377,13 @@ bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct
 bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
-    const struct vkb_pass_row *by_bloom;
     struct chain chain;
-    struct vkb_pass_row row;
 
-    *fits = find_adjoint_chain(&choice->plain, pass, STRIP_RADIUS, &chain, &by_bloom)
-         && vkb_is_factor(by_bloom);
+    *fits = find_adjoint_chain(&choice->plain, pass, STRIP_RADIUS, &chain)
+         && vkb_are_floats(choice, chain.composite);
     if (!*fits)
         return true;
-    row = adjoint_row(choice, pass, &chain);
-    row.reads[0] = by_bloom->reads[3];
-    row.reads[1] = by_bloom->reads[0];
-    row.read_count = 2;
-    *fits = vkb_are_floats(choice, &row);
-    if (!*fits)
-        return true;
+    struct vkb_pass_row row = adjoint_row(choice, pass, &chain);
     make_strips(choice, &row, &vkb_shader_adjoint_strip_words_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

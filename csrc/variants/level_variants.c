@@ -20,6 +20,8 @@ static const struct vkb_shader *const hdrp_columns_words[VKB_FORMAT_COUNT] =
 static const struct vkb_shader *const double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const struct vkb_shader *const double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
+static const struct vkb_shader *const double_mixed_words[VKB_FORMAT_COUNT] = {
+    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_double_final_mixed_words_rgba32float};
 
 // Sets the shader, and the block of pixels that each invocation writes, for storage images or
 // words.
@@ -244,25 +246,31 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     struct vkb_pass_row row;
     struct vkb_filter_final_params *params = &row.params.filter_final;
     const enum vkb_format format = plain->images[pass->targets[0]].format;
+    const bool mixed = pass->transposed;
 
-    if (vkb_is_composite(pass))
+    if (vkb_ends_bloom(pass))
         up = vkb_writer_of(plain, pass->reads[1]);
     // The shader is compiled for one format. The levels of a published method may have their own.
     *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && !up->constants.add_own
          && !pass->constants.masked && plain->images[pass->reads[0]].format == format
          && plain->images[pass->reads[1]].format == format
          && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
-         && loads_to_double(choice, pass);
+         && loads_to_double(choice, pass)
+         && (!mixed || choice->variants != VKB_VARIANTS_CPU || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    make_doubling(choice, &row, &vkb_shader_double_tile_final_comp, double_final_words,
+    make_doubling(choice, &row,
+                  mixed ? &vkb_shader_double_tile_final_mixed_comp
+                        : &vkb_shader_double_tile_final_comp,
+                  mixed ? double_mixed_words : double_final_words,
                   DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
     row.fused = true;
     row.reads[0] = up->reads[0];
     row.reads[1] = pass->reads[0];
-    vkb_drop_reads(&row, 2);
+    row.reads[2] = pass->reads[3];
+    vkb_drop_reads(&row, mixed ? 3 : 2);
     row.block = VKB_BLOCK_filter_final;
     params->coarse = up->params.filter.coarse;
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);

@@ -68,7 +68,6 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "from_lines", vkb_add_from_lines, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
-    {VKB_VARIANTS_GPU, "tiles", vkb_add_bloom_tiles, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_tiles, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_levels, 0},
     {VKB_VARIANTS_GPU, "blocks", vkb_add_adjoint_filter, 0},
