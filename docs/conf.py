@@ -36,7 +36,7 @@ default_role = "py:obj"
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
-# Flowcharts are drawn by the reader's browser. MERMAID: a file of mermaid for a page without a network.
+# The browser draws flowcharts. MERMAID: a file of mermaid, for pages without a network.
 myst_fence_as_directive = ["mermaid"]
 if _mermaid := os.environ.get("MERMAID"):
     mermaid_use_local = _mermaid

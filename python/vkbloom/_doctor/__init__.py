@@ -141,7 +141,10 @@ def _validation(adapter: str) -> Finding:
     answer = child.ask("render", adapter, "validated")
     if answer.value is not None:
         return Finding(topic, "ok", "installed; the test render has no validation errors")
-    missing = {"is not installed": "it is not installed", "needs the system's": "there is no loader"}
+    missing = {
+        "is not installed": "it is not installed",
+        "needs the system's": "there is no loader",
+    }
     for said, found in missing.items():
         if said in answer.failure:
             advice = "To use validation=True: apt install libvulkan1 vulkan-validationlayers."
