@@ -164,13 +164,13 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
 	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
-	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
+	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h packaging/*/*.c tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 
 format: build/stamp/lint
 	$(VENV)/bin/ruff check --fix-only .
 	$(VENV)/bin/ruff format .
-	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
+	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h packaging/*/*.c tests/*/*.c tools/*/*.c
 
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 # Their output is shown last, since a failure among the tests' lines is easily overlooked.

@@ -1,5 +1,5 @@
-// libvulkan.so.1 for systems without the Vulkan loader: hands programs that look for the loader on to
-// the driver beside it. It knows this driver alone, no layers and no windows.
+// libvulkan.so.1 for systems without the Vulkan loader: hands programs that look for the loader on
+// to the driver beside it. It knows this driver alone, no layers and no windows.
 #include <stdint.h>
 #include <string.h>
 
