@@ -17,6 +17,8 @@ int group_count()
         return 1;
     if (GROUPS == GROUPS_POST_PROCESSING)
         return 1;
+    if (GROUPS == GROUPS_UNREAL)
+        return 1;
     if (GROUPS == GROUPS_THREE)
         return 1;
     if (GROUPS == GROUPS_BABYLON)
@@ -96,5 +98,7 @@ vec4 prefiltered(vec4 found[5], Place place)
         return babylon_factor(found[0]) * found[0];
     if (GROUPS == GROUPS_THREE)
         return three_prefiltered(found[0]);
+    if (GROUPS == GROUPS_UNREAL)
+        return clamp(unreal_share(found[0]), 0.0, 1.0) * found[0];
     return combined(taps_of(place));
 }

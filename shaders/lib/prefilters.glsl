@@ -118,6 +118,12 @@ float babylon_factor(vec4 value)
     return THRESHOLDED == 0 || dot(value.rgb, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2) ? 1.0 : 0.0;
 }
 
+// Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
+float unreal_share(vec4 value)
+{
+    return THRESHOLDED == 0 ? 1.0 : dot(value.rgb, LUMINANCE) + 1.0 - params.threshold;
+}
+
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 vec4 three_prefiltered(vec4 value)

@@ -192,6 +192,8 @@ BY_FORMULA = {
     # Kernels whose channels differ.
     "unreal_convolution": {"colour", "grey"},
     "iris_6": {"colour", "grey"},
+    # Film's layers differ.
+    "halation": {"grey"},
     # Light leaves the picture, so that a flat one darkens towards its border.
     "spencer_photopic": {"colour"},
     "camera_lens": {"colour"},
