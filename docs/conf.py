@@ -64,5 +64,7 @@ def setup(app: Sphinx) -> None:
 html_theme = "furo"
 html_title = f"vkbloom {release}"
 html_static_path: list[str] = []
+# The schema of `vkbloom check --json`, beside the pages.
+html_extra_path = ["../python/vkbloom/testing/check.schema.json"]
 html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}

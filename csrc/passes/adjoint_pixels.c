@@ -23,38 +23,42 @@ static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
 }
 
 // Whether the derivatives by the scene are a factor of all colours.
-static bool scales_scene(const struct vkb_pass_row *pass)
+static bool scales_scene(const struct vkb_pass_row *row)
 {
-    const int32_t composite = pass->constants.composite;
+    const int32_t composite = row->constants.composite;
 
-    return pass->block == VKB_BLOCK_composite && !pass->constants.masked
-        && !depends_on_bloom(&pass->constants, pass->params.composite.limit)
+    return row->block == VKB_BLOCK_composite && !row->constants.masked
+        && !depends_on_bloom(&row->constants, row->params.composite.limit)
         && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
 }
 
-static double share_of_scene(const struct vkb_pass_row *pass)
+static double share_of_scene(const struct vkb_pass_row *row)
 {
-    const struct vkb_composite_params *params = &pass->params.composite;
+    const struct vkb_composite_params *params = &row->params.composite;
 
     return exp2(params->exposure)
-         * (pass->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
+         * (row->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
 }
 
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
-static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                            struct vkb_pass_row *row, float limit, struct vkb_error *error)
+static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                                 struct vkb_error *error)
 {
-    if (!depends_on_bloom(&pass->constants, limit))
+    const struct vkb_constants *constants = &row->constants;
+    const uint32_t images[] = {row->reads[0], row->reads[1], row->reads[2]};
+    const float limit = row->block == VKB_BLOCK_composite ? row->params.composite.limit
+                                                          : row->params.godot_final.limit;
+
+    if (!depends_on_bloom(constants, limit))
         row->reads[1] = row->reads[0];
     for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
         row->constants.by = by;
-        if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
-            || (by == BY_MASK && !pass->constants.masked))
+        if ((by == BY_BLOOM && constants->composite == COMPOSITE_OFF)
+            || (by == BY_MASK && !constants->masked))
             continue;
-        if (by == BY_SCENE && scales_scene(pass)
-            && adjoint->brought[pass->reads[0]] == VKB_NO_IMAGE)
-            vkb_bring_scene(adjoint, row, share_of_scene(pass), pass->reads[0]);
-        else if (!vkb_bring(adjoint, row, pass->reads[by], error))
+        if (by == BY_SCENE && scales_scene(row) && adjoint->cotangents[images[0]] == VKB_NO_IMAGE)
+            vkb_delay_scene(adjoint, row, share_of_scene(row), images[0]);
+        else if (!vkb_accumulate_cotangent(adjoint, row, images[by], error))
             return false;
     }
     return true;
@@ -71,79 +75,79 @@ static bool is_clamped(const struct vkb_graph *graph)
     return false;
 }
 
-static struct vkb_pass_row composite_row(const struct vkb_adjoint *adjoint,
-                                         const struct vkb_pass_row *pass,
-                                         const struct vkb_shader *shader)
+// Whether the picture before exposure and curves is a share of the scene and one of the bloom.
+static bool is_sum(const struct vkb_constants *constants)
 {
-    const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
-                              vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(shader, reads, 4);
+    return (constants->composite == COMPOSITE_ADD || constants->composite == COMPOSITE_MIX)
+        && constants->alpha == ALPHA_KEEP && !constants->masked && !constants->groups;
+}
 
-    row.constants = pass->constants;
-    row.constants.dither = 0;
-    return row;
+// Adds the cotangents of the picture before exposure and curves, and makes `row` that of a
+// composite without these.
+static bool add_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                       struct vkb_error *error)
+{
+    struct vkb_pass_row curves = *row;
+
+    curves.constants.by = BY_MIXED;
+    row->constants.tonemap = TONEMAP_NONE;
+    row->constants.encoding = ENCODING_NONE;
+    row->params.composite.exposure = 0.0f;
+    row->params.composite.limit = (float)SINGLE_LIMIT;
+    return vkb_add_adjoint_image(adjoint, &curves, size_of(adjoint, row->reads[0]), &row->reads[3],
+                                 error);
 }
 
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_composite_frag);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_composite_frag, 3);
 
-    row.block = VKB_BLOCK_composite;
-    row.params.composite = pass->params.composite;
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
-    if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
+    if (!vkb_add_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error)
+        || (is_sum(&row.constants) && depends_on_bloom(&row.constants, row.params.composite.limit)
+            && !add_curves(adjoint, &row, error)))
         return false;
-    return bring_composite(adjoint, pass, &row, row.params.composite.limit, error);
+    return accumulate_composite(adjoint, &row, error);
 }
 
 bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                                    struct vkb_error *error)
 {
-    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag, 3);
 
-    row.block = VKB_BLOCK_godot_final;
-    row.params.godot_final = pass->params.godot_final;
-    return bring_composite(adjoint, pass, &row, row.params.godot_final.limit, error);
+    return accumulate_composite(adjoint, &row, error);
 }
 
-// Brings what is at the pixels of the target to an image that these sample linearly.
-static bool bring_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                          uint32_t image, uint32_t target, struct vkb_error *error)
+// Accumulates what is at the pixels of the target for an image that these sample linearly.
+static bool accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                               uint32_t image, uint32_t target, struct vkb_error *error)
 {
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, image, target, &filter);
-    return vkb_bring_through(adjoint, row, &filter, image, target, error);
+    return vkb_accumulate_through(adjoint, row, &filter, image, target, error);
 }
 
 bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
     const uint32_t target = pass->targets[0];
-    const uint32_t reads[] = {pass->reads[0], pass->reads[1], vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_threshold_frag, reads, 3);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_threshold_frag, 2);
 
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_threshold;
-    row.params.threshold = pass->params.threshold;
     if (pass->constants.threshold_mode == THRESHOLD_KNEE
-        && !vkb_bring_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
+        && !vkb_add_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
-    return bring_sampled(adjoint, &row, pass->reads[0], target, error)
-        && vkb_bring_mask(adjoint, pass, &row, error);
+    return accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
+        && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                                struct vkb_error *error)
 {
-    const uint32_t reads[] = {pass->reads[0], vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_blender_end_frag, reads, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
 
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_blender_end;
-    row.params.blender_end = pass->params.blender_end;
-    return bring_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
+    return accumulate_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
 }

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.resources
 import json
 import math
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -95,9 +97,13 @@ def two_presets(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def checked(*words: str) -> tuple[Result, dict[str, Any]]:
+    """Return the result of the command, and its values, which fit the published schema."""
     done = CliRunner().invoke(program, ["check", *words, "--json"])
     assert done.exit_code in {0, 1}, done.output
-    return done, json.loads(done.stdout)
+    found = json.loads(done.stdout)
+    schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
+    pytest.importorskip("jsonschema").validate(found, json.loads(schema.read_text()))
+    return done, found
 
 
 def of_text(folder: Path, text: str, *words: str) -> tuple[Result, dict[str, Any]]:
@@ -375,3 +381,103 @@ def test_veiling_glare_of_a_flat_share() -> None:
     assert index == pytest.approx(100 * 0.1 * 0.75)
     with pytest.raises(ValueError, match="patch: "):
         testing.veiling_glare_index(lambda image: image, size=(40, 20), patch=20)
+
+
+LEAKY = chain("return 0.9 * GLOW_texOff(0.5);")
+
+
+@pytest.mark.usefixtures("compiler")
+@pytest.mark.parametrize(
+    ("text", "against", "verdict", "newly"),
+    [
+        (LEAKY, SOUND, "broken", ["gain", "symmetric"]),
+        (SOUND, LEAKY, "mended", []),
+        (LEAKY, LEAKY, "same", []),
+    ],
+    ids=["a bad change", "a good change", "none"],
+)
+def test_a_change_of_a_file(
+    tmp_path: Path, text: str, against: str, verdict: str, newly: list[str]
+) -> None:
+    before = tmp_path / "before" / "planted.hook"
+    before.parent.mkdir()
+    before.write_text(against)
+    page = tmp_path / "change.md"
+    words = ["--require", "gain,symmetric,round", "--against", str(before)]
+    done, found = of_text(tmp_path, text, *words, "--markdown", str(page))
+    assert (done.exit_code, found["newly_broken"]) == (bool(newly), newly)
+    verdicts = {one["name"]: one["verdict"] for one in found["changes"] if one["kind"] == "law"}
+    assert {name for name, one in verdicts.items() if one == verdict} >= {"gain", "symmetric"}
+    assert verdicts["round"] == "same"
+    sides = [found[side]["gain"] for side in ("against", "bloom")]
+    assert sides == pytest.approx([0.9 if one is LEAKY else 1 for one in (against, text)])
+    written = page.read_text()
+    assert ("| gain | " in written.partition("<details>")[0]) == (verdict != "same")
+    assert written.startswith(f"### `planted` against `{before}`")
+
+
+def test_changes_of_presets_and_commands(copying: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    words = ["--preset", "dual_kawase", "--against", copying, *SMALL, "--markdown", str(page)]
+    done = CliRunner().invoke(program, ["check", *words, "--require", "finite"])
+    assert (done.exit_code, "broken: " in done.stdout) == (0, True), done.output
+    # A law that both break is not newly broken.
+    words = ["--preset", "tutorial", "--against", "tutorial", *SMALL, "--require", "resolution"]
+    done, found = checked(*words)
+    assert (done.exit_code, found["newly_broken"]) == (0, [])
+    assert {one["verdict"] for one in found["changes"] if one["name"] != "together"} == {"same"}
+    alone = CliRunner().invoke(program, ["check", *words[:2], *SMALL, "--markdown", str(page)])
+    assert alone.exit_code == 0, alone.output
+    assert "| symmetric | yes | " in page.read_text()
+    refused = CliRunner().invoke(program, ["check", *words[:2], "--against", "tutoral"])
+    assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
+
+
+@pytest.mark.usefixtures("compiler")
+def test_the_first_infected_framebuffer_is_named(tmp_path: Path) -> None:
+    # GLOW has no NaN, MAIN has.
+    text = chain("return texelFetch(MAIN_raw, ivec2(gl_FragCoord), 0);").replace("GLOW", "MAIN")
+    done, found = of_text(tmp_path, text, "--require", "finite")
+    assert (done.exit_code, found["first_infected"]) == (1, "rows"), found["laws"]["finite"]
+    assert "reaches is rows" in found["laws"]["finite"]["message"]
+    assert of_text(tmp_path, SOUND)[1]["first_infected"] is None
+
+
+VIEWS = """\
+import sys, numpy as np, vkbloom
+image = vkbloom.read(sys.argv[1], premultiplied=True)
+x, y, width, height = map(int, sys.argv[3].split(","))
+if sys.argv[4] == "leak":
+    image = image + 0.01 * image.mean((0, 1))
+view = image[y : y + height, x : x + width]
+shade = 1 + 0.5 * (int(sys.argv[5]) % 2) if len(sys.argv) > 5 else 1
+vkbloom.write(sys.argv[2], (view * shade).astype("float32"), premultiplied=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "broken", "untaken"),
+    [
+        ("keep", set(), ("time",)),
+        ("leak", {"views"}, ("time",)),
+        ("keep {frame}", {"history"}, ()),
+    ],
+)
+def test_regions_and_frames_of_a_program(
+    tmp_path: Path, words: str, broken: set[str], untaken: tuple[str, ...]
+) -> None:
+    script = tmp_path / "views.py"
+    script.write_text(VIEWS)
+    argv = shlex.split(f"{sys.executable} {script} {{input}} {{output}} {{region}} {words}")
+    laws = ["views", *(["history"] if "frame" in words else [])]
+    found = testing.report(testing.command(argv), size=(16, 16), laws=laws)
+    assert found.untaken == untaken
+    assert {row.name for row in found.rows if not row.held} == broken
+    assert ("takes no time" in str(found)) == (untaken == ("time",))
+
+
+def test_what_a_program_does_not_take_is_not_tested() -> None:
+    found = testing.report(testing.command(["cp", "{input}", "{output}"]), size=(16, 16))
+    views = next(row for row in found.rows if row.name == "views")
+    assert (found.untaken, views.held, views.applies) == (("region", "time"), None, False)
+    assert "takes no region and no time" in str(found)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from tests.plugin.faults import FAULTS
+from tests.plugin.faults import FAULTS, doubled, gaussian, halved
 from vkbloom import Renderer, presets, reference, testing
 from vkbloom.testing._law_table import LAWS
 
@@ -36,14 +40,42 @@ def test_each_law_has_a_limit() -> None:
     assert {name for name in NEW if not LAWS[name].limit} == set()
 
 
-@pytest.mark.parametrize("name", ["bevy_natural", "unity_urp", "threejs_unreal", "pygfx"])
+#: Smaller levels than the presets', whose references take seconds.
+SMALLER = {"bevy": {"max_mip_dimension": 64}, "filament": {"resolution": 64}}
+
+
+@pytest.mark.parametrize("name", presets)
 def test_energies_at_the_border_are_those_of_the_reference(renderer: Renderer, name: str) -> None:
     settings = presets[name].replace(format="rgba32float")
-    probe = testing.Probe(size=(96, 64), value=16.0)
-    device = testing.border_energy(
-        lambda image: renderer.apply(image, settings)["bloom"][..., :3], probe
-    )
-    expected = testing.border_energy(
-        lambda image: reference.apply(image, settings)["bloom"][..., :3], probe
-    )
+    settings = settings.replace(**SMALLER.get(settings.method, {}))
+    # Above all thresholds.
+    probe = testing.Probe(size=(64, 48), value=100.0)
+
+    def energy(made: Callable[..., Any]) -> dict[str, float]:
+        return testing.border_energy(lambda a: made(a, settings)["bloom"][..., :3], probe)
+
+    device, expected = energy(renderer.apply), energy(reference.apply)
     assert device == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", ["border", "sizes"])
+def test_light_that_leaves_a_small_image_is_not_judged(law: str) -> None:
+    settings = presets["dual_kawase"]
+    found = testing.report(
+        lambda image: reference.apply(image, settings)["bloom"][..., :3], size=(64, 64), laws=[law]
+    )
+    (row,) = found.rows
+    if law == "border":  # its corners swell by formula
+        assert "swells" in row.message
+        assert "opposite" not in row.message
+    else:
+        assert (row.held, "a larger size is needed" in row.message) == (None, True)
+
+
+def test_a_threshold_of_an_average_is_no_fault_of_alpha() -> None:
+    def bloom(image: NDArray[Any]) -> NDArray[Any]:
+        dim = np.maximum(halved(image[..., :3]) - 0.6, 0)
+        glow = gaussian(doubled(dim, image.shape))
+        return np.concatenate([image[..., :3] + glow, image[..., 3:]], axis=2)
+
+    testing.assert_alpha(bloom, testing.Probe(size=(65, 65)))

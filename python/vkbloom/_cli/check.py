@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import runpy
@@ -14,6 +15,7 @@ from typing import Any
 
 import click
 from rich.console import Console
+from rich.status import Status
 
 import vkbloom
 from vkbloom._cli.check_sequence import judge
@@ -22,9 +24,11 @@ from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import detail_device, is_quiet, note, say
-from vkbloom._custom.method import CustomMethod
+from vkbloom._custom.method import CustomMethod, own_name
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._suggestions import did_you_mean
+from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing import _showing as showing
 from vkbloom.testing._law_table import law_name
@@ -111,6 +115,12 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     help="Exit status 1 if one of these laws is not held.",
 )
 @click.option(
+    "--against",
+    metavar="FILE|PRESET|COMMAND",
+    help="Measure another bloom, too, and tell what is better and worse than there. Exit status 1 "
+    "if a law of --require is newly broken.",
+)
+@click.option(
     "--sequence",
     metavar="PATTERN",
     help="Judge frames in time instead, such as f.%04d.exr: flashes by WCAG 2.2, and flicker. "
@@ -134,6 +144,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--html", "page", metavar="FILE", type=click.Path(), help="Write a page with pictures."
 )
+@click.option(
+    "--markdown", metavar="FILE", type=click.Path(), help="Write tables for a pull request."
+)
 @device_options
 @settings_options
 def command(
@@ -148,11 +161,13 @@ def command(
     measured: tuple[int, int],
     size: tuple[int, int],
     require: tuple[str, ...],
+    against: str | None,
     sequence: str | None,
     fps: float,
     degrees: float,
     as_json: bool,
     page: str | None,
+    markdown: str | None,
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
@@ -164,61 +179,141 @@ def command(
     Prints the passes and their times; each law, held or by how much it is not; energy, point
     spread, stability of a moving light, response to the resolution, veiling glare index, the
     differences from the twin, and the nearest preset. Laws are measured with buffers of 32-bit
-    floats, unless --format is given.
+    floats, unless --format is given. With --against, prints both and what changed.
 
     The exit status is 1 if a law of --require is not held, or was not tested.
     """
     if sequence is not None:
-        if file is not None or program is not None or given("preset") or given("method"):
+        if file or program or against or given("preset") or given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, fps, degrees, as_json=as_json)
-    _check_choice(file, program, twin)
+    _check_choice(file, program, twin, against, page)
+    options = _Options(suffix, timeout, less_input, gain, measured, size, require)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
         detail_device(renderer)
-        if program is None:
-            name = click.get_current_context().params["preset"] or settings.method
-            if twin is not None:
-                _add_twin(settings, twin)
-            subject = measuring.of_settings(renderer, settings, measured, gain)
-            passes, device = measuring.pass_times(renderer, settings, size), renderer.info.summary
-        else:
-            name = program
-            with as_wrong_use():
-                run = Program(shlex.split(program), suffix, timeout)
-            with _notes():
-                subject = measuring.of_program(run, measured, gain, less_input=less_input)
-            passes, device = measuring.run_time(run, size), "this machine"
-        try:
-            found = measuring.measured(
-                subject,
-                renderer,
-                name=name,
-                device=device,
-                settings=measuring.exact(settings) if program is None else None,
-                passes=passes,
-                frame=size,
-                required=require,
-                progress=lambda text: bar.update(f"{name}: {text}"),
+        if twin is not None:
+            _add_twin(settings, twin)
+        preset = click.get_current_context().params["preset"]
+        sources = {program or preset or settings.method: program or settings}
+        if against is not None:
+            sources[against if against not in sources else f"{against} (against)"] = _other(
+                against, settings
             )
-        except AssertionError as error:
-            raise click.ClickException(f"{name}: {error}") from error
+        all_found = [_measured(renderer, *source, options, bar) for source in sources.items()]
+        found = all_found[0]
         if page is not None:
             safe_writing.write_file(Path(page), showing.as_page(found).encode())
-    if as_json:
-        click.echo(json.dumps(showing.as_values(found), indent=2))
+    values = showing.as_values(found)
+    if against is None:
+        written, text = values, showing.as_text(found)
+        table, failed = (
+            showing.as_markdown(found),
+            [row.name for row in showing.broken(found.report)],
+        )
     else:
-        click.echo(showing.as_text(found))
-    if page is not None:
-        say(f"wrote {page}", err=as_json)
-    for row in showing.broken(found.report):
-        note(f"{name}: required law {row.name}: {row.words}")
-    return 1 if showing.broken(found.report) else 0
+        before = showing.as_values(all_found[1])
+        changes = comparing.changes(before, values)
+        names = (all_found[1].name, found.name)
+        failed = comparing.newly_broken(changes, require)
+        written = comparing.as_values(changes, before, values, failed)
+        text = comparing.as_text(changes, names)
+        table = comparing.as_markdown(changes, names, found.device)
+    click.echo(json.dumps(written, indent=2) if as_json else text)
+    for name, content in {page: None, markdown: table}.items():
+        if name is not None:
+            if content is not None:
+                safe_writing.write_file(Path(name), content.encode())
+            say(f"wrote {name}", err=as_json)
+    laws = {row.name: row for row in found.report.rows}
+    for name in failed:
+        newly = "" if against is None else "newly broken, "
+        note(f"{found.name}: required law {name}: {newly}{laws[name].words}")
+    return int(bool(failed))
 
 
-def _check_choice(file: str | None, program: str | None, twin: str | None) -> None:
+@dataclasses.dataclass(frozen=True)
+class _Options:
+    """How blooms are measured, as the options of the command say."""
+
+    suffix: str
+    timeout: float
+    less_input: bool
+    gain: float | None
+    measured: tuple[int, int]
+    size: tuple[int, int]
+    require: tuple[str, ...]
+
+
+def _measured(
+    renderer: vkbloom.Renderer,
+    name: str,
+    source: str | vkbloom.Settings,
+    options: _Options,
+    bar: Status,
+) -> measuring.Measured:
+    """Measure the bloom of settings, or of a command."""
+    if isinstance(source, str):
+        with as_wrong_use():
+            run = Program(shlex.split(source), options.suffix, options.timeout)
+        with _notes():
+            subject = measuring.of_program(
+                run, options.measured, options.gain, less_input=options.less_input
+            )
+        passes, device = measuring.run_time(run, options.size), "this machine"
+    else:
+        subject = measuring.of_settings(renderer, source, options.measured, options.gain)
+        passes = measuring.pass_times(renderer, source, options.size)
+        device = renderer.info.summary
+    try:
+        return measuring.measured(
+            subject,
+            renderer,
+            name=name,
+            device=device,
+            settings=None if isinstance(source, str) else measuring.exact(source),
+            passes=passes,
+            frame=options.size,
+            required=options.require,
+            progress=lambda text: bar.update(f"{name}: {text}"),
+        )
+    except AssertionError as error:
+        raise click.ClickException(f"{name}: {error}") from error
+
+
+def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
+    """Return what --against names: a command, or settings.
+
+    Of a file, parameters have the values that differ from the defaults of the first bloom.
+    """
+    if "{input}" in against:
+        return against
+    if os.path.isfile(against):
+        # Another name, so that it does not replace a file of the same name.
+        kind = vkbloom.load_method(against, name=f"{own_name(Path(against).stem)}_against")
+        usual, other = type(settings)(), kind()
+        changed = {
+            one.name: getattr(settings, one.name)
+            for one in dataclasses.fields(settings)
+            if hasattr(other, one.name)
+            and getattr(settings, one.name) != getattr(usual, one.name, None)
+        }
+        return other.replace(**changed) if isinstance(settings, CustomMethod) else other
+    if against not in vkbloom.presets:
+        near = did_you_mean(against, vkbloom.presets)
+        raise click.UsageError(
+            f"--against: {against!r} is not a file, a preset, or a command with {{input}}{near}"
+        )
+    return vkbloom.presets[against]
+
+
+def _check_choice(
+    file: str | None, program: str | None, twin: str | None, against: str | None, page: str | None
+) -> None:
     if file is not None:
         raise click.UsageError(f"{file}: there is no such file")
+    if against is not None and page is not None:
+        raise click.UsageError("--html shows one bloom; --against writes --markdown")
     chosen = [name for name in ("preset", "method") if given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")

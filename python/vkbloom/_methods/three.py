@@ -86,7 +86,7 @@ class ThreeBloom(Settings):
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
     tints: tuple[Tint, ...] = value_field(
-        ((1.0, 1.0, 1.0),) * 5, kind="pairs", read=_read_tints, option="level_tints"
+        ((1.0, 1.0, 1.0),) * 5, kind="pairs", read=_read_tints, option="level-tints"
     )
 
     def _core_block(self) -> bytes:

@@ -21,6 +21,7 @@ from vkbloom.testing._laws import (
     assert_no_ringing,
     assert_superposition,
     assert_symmetric,
+    first_infected,
 )
 from vkbloom.testing._moving_light import Stability, assert_stable, stability
 from vkbloom.testing._point_spread import (
@@ -79,6 +80,7 @@ __all__ = [
     "border_energy",
     "command",
     "diagnose",
+    "first_infected",
     "flash",
     "flicker",
     "point_spread",

@@ -15,6 +15,7 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom._views import markup
 from vkbloom._views.markup import element
+from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import NotTaken, measuring
 from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
@@ -82,6 +83,9 @@ class LawReport:
         tested with it.
     required : tuple of str
         Names of the laws that the bloom promises.
+    untaken : tuple of str
+        What the bloom does not take, of "region" and "time": `views` is not tested without a
+        region; without a time, `history` tests the order of the images alone.
 
     Examples
     --------
@@ -98,6 +102,7 @@ class LawReport:
     probe: Probe
     gain: float
     required: tuple[str, ...] = ()
+    untaken: tuple[str, ...] = ()
 
     def assert_held(self, *names: str) -> None:
         """Assert that the laws of these names hold; without a name, all that apply to the bloom.
@@ -132,7 +137,8 @@ class LawReport:
         width, height = self.probe.size
         lines = [
             f"Laws of a bloom, on {self.probe.dtype} images of {width} x {height} with values up "
-            f"to {self.probe.value:g}; gain {self.gain:.4g}",
+            f"to {self.probe.value:g}; gain {self.gain:.4g}"
+            + (f"; the bloom takes no {' and no '.join(self.untaken)}" if self.untaken else ""),
             f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
         ]
         for row in self.rows:
@@ -209,11 +215,6 @@ def report(
     -------
     LawReport
 
-    Raises
-    ------
-    TypeError, ValueError
-        `bloom` is not such a callable, or a law is unknown.
-
     Examples
     --------
     >>> from vkbloom import reference, testing
@@ -247,7 +248,10 @@ def law_report(
         if law.name in required or law.applies(subject):
             progress(law.name)
             rows.append(_row(law, subject))
-    return LawReport(rows=tuple(rows), probe=subject.probe, gain=gain, required=required)
+    untaken = tuple(name for name in ("region", "time") if not takes(subject.bloom, name))
+    return LawReport(
+        rows=tuple(rows), probe=subject.probe, gain=gain, required=required, untaken=untaken
+    )
 
 
 def _row(law: Law, subject: Subject) -> LawRow:

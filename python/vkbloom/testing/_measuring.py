@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -94,6 +95,7 @@ def of_settings(
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=lambda: differences(renderer, used),
+        frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
         own = isinstance(used, CustomMethod) and used.file.saves_bloom
@@ -110,8 +112,14 @@ def of_program(
     if program.bits is not None:
         probe = Probe(size=size, atol=COARSE_ERROR)
 
-    def difference(image: NDArray[Any]) -> NDArray[Any]:
-        return np.asarray(program(image)[..., :3] - image)
+    @functools.wraps(program)
+    def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
+        found = program(image, **options)[..., :3]
+        x, y, *_ = options.get("region") or (0, 0)
+        if found.shape[:2] == image.shape[:2]:
+            x, y = 0, 0
+        height, width = found.shape[:2]
+        return np.asarray(found - image[y : y + height, x : x + width, :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(

@@ -369,9 +369,9 @@ def _check_lit(assertion: str, spread: Image, error: float) -> None:
             )
 
 
-def check_inside(share: float, size: tuple[int, int]) -> None:
+def check_inside(share: float, size: tuple[int, int], allowed: float = _AT_THE_BORDER) -> None:
     """Raise ValueError if too large a share of the light reaches the border of the image."""
-    if share > _AT_THE_BORDER:
+    if share > allowed:
         raise ValueError(
             f"probe: of the light, {100 * share:.3g} % lies in the outermost pixels of an image of "
             f"{size[0]} x {size[1]}; a larger size is needed"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
+import re
 import signal
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +25,11 @@ from vkbloom.testing._probe import Bloom
 __all__ = ["COARSE_ERROR", "Program", "command"]
 
 _PLACES: Final = ("{input}", "{output}")
+#: Keywords of the bloom, by what stands for them in a command.
+_KEYWORDS: Final = {"{region}": "region", "{frame}": "time"}
+_PLACE: Final = re.compile("|".join(map(re.escape, (*_PLACES, *_KEYWORDS))))
+#: Frames a second, by which a time is the number of a frame.
+RATE: Final = 60.0
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
 _BITS: Final = {"uint8": 8, "uint16": 16}
 _COARSE: Final = 8
@@ -40,7 +47,10 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     Parameters
     ----------
     argv : sequence of str
-        The program and its arguments. ``{input}`` and ``{output}`` in them stand for the files.
+        The program and its arguments. ``{input}`` and ``{output}`` in them stand for the files,
+        ``{region}`` for the view to blur, as "x,y,width,height" in pixels, ``{frame}`` for the
+        number of the frame, at 60 a second from 0. A program without the last two is not tested
+        with views, or in time.
     suffix : str
         The type of both files. EXR files have linear floats. Files of integers, such as ".png",
         are written and read as sRGB.
@@ -50,15 +60,11 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     Returns
     -------
     callable
-        Takes an image (H, W, 3) or (H, W, 4) and returns one in float32. Its errors name the
+        Takes an image (H, W, 3) or (H, W, 4), with ``{region}`` and ``{frame}`` also the keywords
+        `region` and `time`, and returns an image in float32. Its errors name the
         program: TimeoutError if it hangs, ChildProcessError if it fails, FileNotFoundError if it
         does not exist or writes nothing, ValueError if its file cannot be read, has another size,
         or has NaN or infinity where the image has none. A file of 8 bits is a UserWarning, once.
-
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is out of range, or `argv` lacks ``{input}`` or ``{output}``.
 
     Examples
     --------
@@ -83,19 +89,38 @@ class Program:
         check_number("timeout", timeout, 1e-3, 1e6)
         self._suffix, self._timeout = suffix, timeout
         self.bits: int | None = None
+        # The laws ask for the keywords that a bloom takes.
+        kinds = dict.fromkeys(
+            (key for place, key in _KEYWORDS.items() if any(place in word for word in argv)),
+            inspect.Parameter.KEYWORD_ONLY,
+        )
+        self.__signature__ = inspect.Signature(
+            [
+                inspect.Parameter(name, kind, default=None)
+                for name, kind in {"image": inspect.Parameter.POSITIONAL_ONLY, **kinds}.items()
+            ]
+        )
 
-    def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
+    def __call__(
+        self,
+        image: NDArray[Any],
+        *,
+        region: tuple[int, int, int, int] | None = None,
+        time: float | None = None,
+    ) -> NDArray[Any]:
         """Run the program once."""
         __tracebackhide__ = True
+        height, width = image.shape[:2]
+        view = region or (0, 0, width, height)
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
             write(source, np.ascontiguousarray(image, np.float32), premultiplied=True)
-            self._run(str(source), str(target))
+            values = (source, target, ",".join(map(str, view)), round((time or 0) * RATE))
+            self._run(dict(zip((*_PLACES, *_KEYWORDS), map(str, values), strict=True)))
             if not target.exists():
                 raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACES[1]}")
             result = self._read(target)
-        if result.shape[:2] != image.shape[:2]:
-            height, width = image.shape[:2]
+        if result.shape[1::-1] not in ((width, height), view[2:]):
             raise ValueError(
                 f"{self._name}: it wrote {result.shape[1]} x {result.shape[0]} pixels for "
                 f"{width} x {height}; both files must have the same size"
@@ -113,11 +138,9 @@ class Program:
     def _name(self) -> str:
         return f"command {Path(self._argv[0]).name!r}"
 
-    def _run(self, source: str, target: str) -> None:
+    def _run(self, values: Mapping[str, str]) -> None:
         __tracebackhide__ = True
-        words = [
-            word.replace(_PLACES[0], source).replace(_PLACES[1], target) for word in self._argv
-        ]
+        words = [_PLACE.sub(lambda found: values[found[0]], word) for word in self._argv]
         # A session of its own, so that what the program started ends with it.
         with subprocess.Popen(
             words,

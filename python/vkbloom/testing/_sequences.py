@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, Final
 
 import numpy as np
@@ -114,11 +115,6 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
     Returns
     -------
     Flash
-
-    Raises
-    ------
-    TypeError, ValueError
-        There are less than two frames, they have different sizes, or a number is out of range.
 
     Notes
     -----
@@ -266,12 +262,7 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     -------
     Flicker
         With the package ``cvvdp``, `jod` compares the sequence with its mean picture, as
-        ColorVideoVDP does for a standard display in 4K.
-
-    Raises
-    ------
-    TypeError, ValueError
-        There are less than two frames, they have different sizes, or `fps` is out of range.
+        ColorVideoVDP does for a standard display in 4K; all frames are then held in memory.
 
     Notes
     -----
@@ -279,7 +270,8 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     display distortions", SIGGRAPH 2024.
     """
     check_number("fps", fps, 1e-3, 1e5)
-    lights = np.stack(list(_lights(frames, _FIELD)))
+    kept = list(frames) if find_spec("pycvvdp") else frames
+    lights = np.stack(list(_lights(kept, _FIELD)))
     luminances = lights @ _LUMINANCE
     mean = luminances.mean(axis=0)
     count = len(luminances)
@@ -289,19 +281,18 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     largest = max(float(mean.max()), 1e-300)
     contrast = (amplitudes / np.maximum(mean, 1e-3 * largest)).max(axis=(1, 2))
     return Flicker(
-        jod=_jod(lights, fps),
+        jod=_jod(kept, fps) if isinstance(kept, list) else None,
         frequencies=np.asarray(np.fft.rfftfreq(count, 1 / fps)[1:], np.float64),
         contrast=contrast,
     )
 
 
-def _jod(lights: NDArray[np.float64], fps: float) -> float | None:
-    try:
-        import pycvvdp  # noqa: PLC0415  an extra, and it imports PyTorch
-    except ImportError:
-        return None
-    metric = pycvvdp.cvvdp(display_name="standard_4k", heatmap=None)
+def _jod(frames: list[NDArray[Any]], fps: float) -> float:
+    import pycvvdp  # noqa: PLC0415  an extra, and it imports PyTorch
+
+    lights = np.stack([_linear(np.asarray(frame)[..., :3]).astype(np.float32) for frame in frames])
     still = np.broadcast_to(lights.mean(axis=0), lights.shape)
+    metric = pycvvdp.cvvdp(display_name="standard_4k", heatmap=None, quiet=True)
     encoded = [encode_srgb(x).astype(np.float32) for x in (lights, still)]
     jod, _ = metric.predict(*encoded, dim_order="FHWC", frames_per_second=fps)
     return float(jod)

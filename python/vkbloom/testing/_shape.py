@@ -13,7 +13,7 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
 from vkbloom.testing._moving_light import moments
-from vkbloom.testing._point_spread import point_spread
+from vkbloom.testing._point_spread import border_share, check_inside, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
 
 __all__ = ["SIZE_LIMITS", "assert_round", "assert_sizes", "roundness"]
@@ -26,6 +26,8 @@ SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05}
 # Contours nearer to their middle, in pixels, are a few pixels, which are never round.
 _LEAST_RADIUS: Final = 3.0
 _ANGLES: Final = 90
+# The largest share of the light of a square in the outermost pixels.
+_OUTERMOST: Final = 0.01
 _SQUARE: Final = 16
 
 
@@ -53,8 +55,6 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     ------
     AssertionError
         A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     plane = point_spread(bloom, probe).mean(axis=2)
@@ -103,9 +103,6 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or all contours are smaller than three pixels or leave the
-        image.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
@@ -146,8 +143,6 @@ def assert_sizes(
     ------
     AssertionError
         The law does not hold, a result is black or not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     allowed = SIZE_LIMITS | dict(limits or {})
@@ -173,6 +168,7 @@ def assert_sizes(
                     f"at {width} x {height}: {allowed[name]:.3g} allowed"
                 )
     if told:
+        check_inside(base[4], (width, height), _OUTERMOST)
         fail("assert_sizes", law, "; ".join(told.values()))
 
 
@@ -184,8 +180,8 @@ def _beside(side: int) -> int:
 
 def _square_figures(
     bloom: Bloom, probe: Probe, at: tuple[int, int]
-) -> tuple[float, float, float, float]:
-    """Return width, energy, and the shift along x and y of the bloom of a square."""
+) -> tuple[float, float, float, float, float]:
+    """Return width, energy, shift along x and y, and share at the border of a square's bloom."""
     __tracebackhide__ = True
     image = probe.flat(0.0)
     left, top = at
@@ -197,7 +193,8 @@ def _square_figures(
     middle = (_SQUARE - 1) / 2
     squared = variance - 2 * (_SQUARE**2 - 1) / 12
     figure("squared_width", squared)
-    return math.sqrt(max(squared, 0.0)), energy, place[0] - left - middle, place[1] - top - middle
+    shift = np.subtract(place, (left, top)) - middle
+    return math.sqrt(max(squared, 0.0)), energy, shift[0], shift[1], border_share(lit)
 
 
 def _bilinear(plane: Image, x: Image, y: Image) -> Image:

@@ -86,6 +86,7 @@ def as_values(found: Measured) -> dict[str, Any]:
                 row.name: {name: getattr(row, name) for name in _OF_A_LAW}
                 for row in found.report.rows
             },
+            "untaken": found.report.untaken,
             "gain": found.report.gain,
             "energy": spread.energy,
             "psf": {
@@ -100,6 +101,7 @@ def as_values(found: Measured) -> dict[str, Any]:
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
             "veiling_glare_index": found.veiling_glare_index,
+            "first_infected": found.subject.first_infected,
             "reference": found.subject.reference or None,
             "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
             "required": found.report.required,
@@ -107,6 +109,20 @@ def as_values(found: Measured) -> dict[str, Any]:
         }
     )
     return value
+
+
+def as_markdown(found: Measured) -> str:
+    """Return the laws and the figures as tables for a pull request."""
+    laws = [
+        f"| {row.name} | {row.words} | {cells[0]} | {cells[1]} |"
+        for row in found.report.rows
+        for cells in [("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")]
+    ]
+    times = {"passes together": f"{1000 * sum(found.passes.values()):.3f} ms"}
+    shown = [f"| {name} | {text} |" for name, text in (figures(found) | times).items()]
+    head = f"### `{found.name.replace('`', chr(39))}`\n\nOn {found.device}.\n"
+    tables = ("| law | held | off by | allowed |\n|---|---|---|---|", *laws, "")
+    return "\n".join((head, *tables, "| figure | |\n|---|---|", *shown, ""))
 
 
 def broken(report: LawReport) -> list[LawRow]:

@@ -16,6 +16,7 @@ from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._programs import RATE
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
@@ -28,7 +29,6 @@ HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 # Frames after a jump: of a bloom that is given the time, and of any other.
 _FRAMES: Final = 60
 _FEW_FRAMES: Final = 8
-_RATE: Final = 60.0
 # Bisections of a threshold, and the lowest value that is tried, as a share of the probe's.
 _HALVINGS: Final = 12
 _LEAST: Final = 2.0**-12
@@ -85,8 +85,6 @@ def assert_jitter(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     check_number("feedback", feedback, 0.0, 1.0)
@@ -210,8 +208,6 @@ def assert_history(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or the bloom is black.
     """
     __tracebackhide__ = True
     allowed = HISTORY_LIMITS | dict(limits or {})
@@ -219,7 +215,7 @@ def assert_history(
     clock = iter(range(1 << 30))
 
     def at(image: Image) -> Image:
-        options: dict[str, Any] = {"time": next(clock) / _RATE} if takes(bloom, "time") else {}
+        options: dict[str, Any] = {"time": next(clock) / RATE} if takes(bloom, "time") else {}
         return probe.apply(lambda given: bloom(given, **options), image)[0]
 
     x, y = probe.centre

@@ -1,0 +1,217 @@
+"""Two measured blooms beside each other: what got better, and what worse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+__all__ = ["Change", "changes", "newly_broken"]
+
+Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
+
+#: Figures by name: their place in the values of a bloom, and whether less of them is better.
+_FIGURES: Final[Mapping[str, tuple[str, bool]]] = {
+    "gain": ("gain", False),
+    "energy of a pixel": ("energy", False),
+    "50 % within, pixels": ("psf.r50", False),
+    "90 % within, pixels": ("psf.r90", False),
+    "peak": ("psf.peak", False),
+    "ripple": ("stability.ripple", True),
+    "jitter, pixels": ("stability.jitter", True),
+    "shimmer": ("stability.shimmer", True),
+    "growth": ("stability.growth", True),
+    "veiling glare index, %": ("veiling_glare_index", False),
+}
+# What counts as a change: of a deviation, as a share of its limit; of a figure, as a share of
+# itself and at least so much; of a time, as a share, since a shared machine repeats it within that.
+_LAW: Final = 0.1
+_FIGURE: Final = (0.02, 1e-3)
+_TIME: Final = 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """A law, a figure or a time of two blooms.
+
+    - `before`, `after`: Of a law its deviation as a share of the limit; times are in seconds. None:
+      not measured.
+    - `words`: Both in words, before and after.
+    """
+
+    kind: Literal["law", "figure", "time"]
+    name: str
+    before: float | None
+    after: float | None
+    words: tuple[str, str]
+    verdict: Verdict
+
+
+def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[Change, ...]:
+    """Compare the values that `vkbloom check --json` prints of two blooms."""
+    return (*_laws(before, after), *_figures(before, after), *_times(before, after))
+
+
+def newly_broken(found: Sequence[Change], required: Sequence[str]) -> list[str]:
+    """Return the required laws that the second bloom breaks and the first did not."""
+    broken = [one.name for one in found if one.kind == "law" and one.verdict == "broken"]
+    return [name for name in broken if name in required]
+
+
+def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
+    untested: Mapping[str, Any] = {"held": None, "off": None, "limit": None}
+    for name in dict.fromkeys([*after["laws"], *before["laws"]]):
+        old, new = (side["laws"].get(name, untested) for side in (before, after))
+        was, now = _share(old), _share(new)
+        verdict: Verdict
+        if old["held"] != new["held"]:
+            # A law that is no longer tested is no longer promised.
+            lost = new["held"] is False or old["held"]
+            verdict = "broken" if lost else "mended" if old["held"] is False else "changed"
+        else:
+            verdict = _verdict(was, now, 0.0 if old["held"] else _LAW, _LAW, less=True)
+        yield Change(
+            kind="law",
+            name=name,
+            before=was,
+            after=now,
+            words=(_held(old), _held(new)),
+            verdict=verdict,
+        )
+
+
+def _share(law: Mapping[str, Any]) -> float | None:
+    off, limit = law["off"], law["limit"]
+    return None if off is None or limit is None else off / max(limit, 1e-300)
+
+
+def _held(law: Mapping[str, Any]) -> str:
+    words = {True: "yes", False: "**no**", None: "not tested"}[law["held"]]
+    return words if law["held"] is not False or law["off"] is None else f"{words}, {law['off']:.3g}"
+
+
+def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
+    for name, (place, less) in _FIGURES.items():
+        old, new = (_at(side, place) for side in (before, after))
+        words = tuple("none" if x is None else f"{x:.4g}" for x in (old, new))
+        verdict = _verdict(old, new, *_FIGURE, less=less)
+        yield Change(
+            kind="figure",
+            name=name,
+            before=old,
+            after=new,
+            words=(words[0], words[1]),
+            verdict=verdict,
+        )
+
+
+def _at(values: Mapping[str, Any], place: str) -> float | None:
+    found: Any = values
+    for key in place.split("."):
+        found = found[key]
+    return None if found is None else float(found)
+
+
+def _times(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
+    sides = [{one["name"]: one["seconds"] for one in side["passes"]} for side in (before, after)]
+    for side in sides:
+        side["together"] = math.fsum(side.values())
+    for name in dict.fromkeys([*sides[1], *sides[0]]):
+        old, new = (side.get(name) for side in sides)
+        words = tuple("none" if x is None else f"{1e3 * x:.3f} ms" for x in (old, new))
+        verdict = _verdict(old, new, _TIME, 0.0, less=True) if name == "together" else "same"
+        yield Change(
+            kind="time",
+            name=name,
+            before=old,
+            after=new,
+            words=(words[0], words[1]),
+            verdict=verdict,
+        )
+
+
+def _verdict(
+    old: float | None, new: float | None, share: float, least: float, *, less: bool
+) -> Verdict:
+    """Return whether a number changed by more than a share of itself, and more than `least`."""
+    if old is None or new is None:
+        return "same" if old == new else "changed"
+    if abs(new - old) <= max(share * abs(old), least):
+        return "same"
+    if not less:
+        return "changed"
+    return "worse" if new > old else "better"
+
+
+def summary(found: Sequence[Change]) -> str:
+    """Return which laws, figures and times got better and worse, as a sentence for each verdict."""
+    told = []
+    for verdict in ("broken", "mended", "worse", "better"):
+        names = [one.name for one in found if one.verdict == verdict and one.name != "together"]
+        times = [one for one in found if one.verdict == verdict and one.name == "together"]
+        names += [f"time ({_ratio(one)})" for one in times]
+        if names:
+            told.append(f"{verdict}: {', '.join(names)}")
+    return "; ".join(told) or "nothing got better or worse"
+
+
+def _ratio(change: Change) -> str:
+    return f"{change.after / change.before:.2f} times" if change.before and change.after else "new"
+
+
+def as_text(found: Sequence[Change], names: tuple[str, str]) -> str:
+    """Return a table for a terminal: before, after, and what became of it."""
+    lines = [f"{names[1]}, against {names[0]}: {summary(found)}", ""]
+    for kind in ("law", "figure", "time"):
+        lines.append(f"{kind:<24} {'against':>22} {'now':>22}")
+        for one in found:
+            if one.kind == kind:
+                old, new = (words.replace("*", "") for words in one.words)
+                verdict = "" if one.verdict == "same" else one.verdict
+                lines.append(f"{one.name:<24} {old:>22} {new:>22}  {verdict}".rstrip())
+        lines.append("")
+    return "\n".join(lines[:-1])
+
+
+def as_markdown(found: Sequence[Change], names: tuple[str, str], device: str) -> str:
+    """Return the comparison for a pull request: what changed, then everything, folded."""
+    old, new = (name.replace("|", "\\|").replace("`", "'") for name in names)
+    head = f"| | `{old}` | `{new}` | |\n|---|---|---|---|"
+    rows = [
+        (one.verdict, f"| {one.name} | {one.words[0]} | {one.words[1]} | {_mark(one.verdict)} |")
+        for one in found
+    ]
+    changed = "\n".join(row for verdict, row in rows if verdict != "same")
+    every = "\n".join(row for _, row in rows)
+    return (
+        f"### `{new}` against `{old}`\n\n{summary(found).capitalize()}. On {device}.\n\n"
+        + (f"{head}\n{changed}\n\n" if changed else "")
+        + f"<details><summary>All laws, figures and times</summary>\n\n{head}\n{every}\n\n"
+        "</details>\n"
+    )
+
+
+def _mark(verdict: Verdict) -> str:
+    return "" if verdict == "same" else f"**{verdict}**" if verdict == "broken" else verdict
+
+
+def as_values(
+    found: Sequence[Change],
+    before: Mapping[str, Any],
+    after: Mapping[str, Any],
+    failed: Sequence[str],
+) -> dict[str, Any]:
+    """Return plain values: both blooms, and the changes from the first to the second."""
+    return {
+        "bloom": after,
+        "against": before,
+        "changes": [
+            {"kind": one.kind, "name": one.name, "before": one.before, "after": one.after}
+            | {"verdict": one.verdict}
+            for one in found
+        ],
+        "summary": summary(found),
+        "newly_broken": list(failed),
+        "passed": not failed,
+    }
