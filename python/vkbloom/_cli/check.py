@@ -202,9 +202,10 @@ def command(
             )
         all_found = [_measured(renderer, *source, options, bar) for source in sources.items()]
         found = all_found[0]
+        # Some figures are rendered when they are read.
+        values, *others = map(showing.as_values, all_found)
         if page is not None:
             safe_writing.write_file(Path(page), showing.as_page(found).encode())
-    values = showing.as_values(found)
     if against is None:
         written, text = values, showing.as_text(found)
         table, failed = (
@@ -212,7 +213,7 @@ def command(
             [row.name for row in showing.broken(found.report)],
         )
     else:
-        before = showing.as_values(all_found[1])
+        before = others[0]
         changes = comparing.changes(before, values)
         names = (all_found[1].name, found.name)
         failed = comparing.newly_broken(changes, require)
