@@ -263,7 +263,7 @@ class FieldOptions(click.Option):
             fields: dict[str, dict[str, FieldInfo]] = {}
             for label, kind in kinds.items():
                 for name, info in fields_of(kind).items():
-                    # Fields of type "object" are for Python and JSON.
+                    # (A value of a further kind has no spelling as a word.)
                     if name in inherited or info.kind == "object":
                         continue
                     if METHODS.is_added(label) and any(
