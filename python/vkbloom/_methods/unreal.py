@@ -52,11 +52,6 @@ class UnrealBloom(GaussianSum):
     engine blurs at reduced sizes and limits its kernels; this is the formula that it documents.
 
     Source: Epic Games, "Bloom" (Unreal Engine 4.27), GaussianSumBloomSettings (Python API 5.0).
-
-    Examples
-    --------
-    >>> round(sum(vkbloom.UnrealBloom().tints), 4)
-    0.7951
     """
 
     method: ClassVar[str] = "unreal"

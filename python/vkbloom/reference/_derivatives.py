@@ -115,7 +115,7 @@ def vjp(
     >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
     np.float64(1.5)
     """
-    if hasattr(settings, "twin"):
+    if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )
