@@ -125,26 +125,26 @@ def assert_border(
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
     lights = _Lights(bloom, probe, _check_stale(bloom, probe, allowed["stale"]))
     share = border_share(_expected(lights, probe.centre)[0])
-    told = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
-    told += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
+    reasons = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
+    reasons += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
     flat = probe.apply(bloom, probe.flat(probe.value))[0]
     middle = float(flat[probe.centre[1], probe.centre[0]].mean())
     if middle > 0:
         off = abs(float(flat[0, 0].mean()) / middle - 1)
         if not is_within(law, off, allowed["flat"], "flat"):
-            told.append(
+            reasons.append(
                 f"a flat image has {flat[0, 0].mean() / middle:.3g} times as much bloom in the "
                 "corner as in the middle"
             )
-    if told:
-        fail("assert_border", law, "; ".join(told))
+    if reasons:
+        fail("assert_border", law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
 
 
 def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> list[str]:
     """Return what is wrong with lights 1.5 standard deviations from an edge."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _near(lights).items():
         found, error = lights.spread(at)
         expected, energy = _expected(lights, at)
@@ -156,13 +156,13 @@ def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> li
         quarter = len(profile) // 4
         wrapped = profile[-quarter:].sum() - profile[-2 * quarter : -quarter].sum()
         shares = {"wrap": max(0.0, float(wrapped)), "inside": float(profile.sum())}
-        told += [
+        reasons += [
             f"{100 * share:.3g} % of the light of a square near the {name} edge is "
             + ("at the opposite side" if kind == "wrap" else "where the middle has none")
             for kind, share in shares.items()
             if not is_within(law, share, allowed[kind], kind)
         ]
-    return told
+    return reasons
 
 
 def _at_the_border(
@@ -170,7 +170,7 @@ def _at_the_border(
 ) -> list[str]:
     """Return what is wrong with lights in the outermost pixels."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _places(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
@@ -179,12 +179,12 @@ def _at_the_border(
         figure(f"energy_{name}", share)
         lost = max(0.0, inside - share)
         if complete and not is_within(law, lost, allowed["lost"], "lost"):
-            told.append(
+            reasons.append(
                 f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the frame"
             )
         if not is_within(law, share, allowed[kind], kind):
-            told.append(f"a light at the {name} swells to {share:.3g} times its energy")
-    return told
+            reasons.append(f"a light at the {name} swells to {share:.3g} times its energy")
+    return reasons
 
 
 def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> Image:

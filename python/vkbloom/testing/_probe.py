@@ -56,14 +56,6 @@ class Probe:
         for float.
     seed : int
         Seed of the noise images.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> probe = testing.Probe(size=(32, 24), dtype="float16", value=4.0)
-    >>> probe.centre
-    (16, 12)
-    >>> testing.assert_gain(lambda image: image, 1.0, probe)
     """
 
     size: tuple[int, int] = (65, 65)

@@ -24,7 +24,7 @@ LEVELS: Final = (0.5, 0.1, 0.01)
 #: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
 SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05}
 # Contours nearer to their middle, in pixels, are a few pixels, which are never round.
-_LEAST_RADIUS: Final = 3.0
+_MIN_RADIUS: Final = 3.0
 _ANGLES: Final = 90
 # The largest share of the light of a square in the outermost pixels.
 _OUTERMOST: Final = 0.01
@@ -79,8 +79,8 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
         last = len(steps) - 1 - above[:, ::-1].argmax(axis=1)
         inner, outer = (rays[np.arange(_ANGLES), last + i] for i in (0, 1))
         radii = steps[last] + 0.125 * (inner - level * peak) / np.maximum(inner - outer, 1e-300)
-        if radii.max() >= _LEAST_RADIUS:
-            found[level] = float(radii.max() / max(radii.min(), _LEAST_RADIUS))
+        if radii.max() >= _MIN_RADIUS:
+            found[level] = float(radii.max() / max(radii.min(), _MIN_RADIUS))
     return found
 
 
@@ -110,14 +110,14 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     if not found:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
-    told = [
+    reasons = [
         f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction as in "
         "another"
         for level, ratio in found.items()
         if not is_within(law, ratio, limit, f"round_{level:g}")
     ]
-    if told:
-        fail("assert_round", law, f"{'; '.join(told)}: {limit:.3g} allowed")
+    if reasons:
+        fail("assert_round", law, f"{'; '.join(reasons)}: {limit:.3g} allowed")
 
 
 @checked
@@ -151,7 +151,7 @@ def assert_sizes(
     at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
     base = _square_figures(bloom, dataclasses.replace(probe, size=(width, height)), at)
     law = "the bloom of a square does not depend on whether the size is a multiple of 16"
-    told: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for step in (-3, -2, -1, 1, 2, 3):
         size = (width + step, height + step)
         found = _square_figures(bloom, dataclasses.replace(probe, size=size), at)
@@ -161,15 +161,15 @@ def assert_sizes(
             "centroid": math.hypot(found[2] - base[2], found[3] - base[3]),
         }
         for name, value in off.items():
-            if not is_within(law, value, allowed[name], name) and name not in told:
+            if not is_within(law, value, allowed[name], name) and name not in reasons:
                 unit = " pixels" if name == "centroid" else " of it"
-                told[name] = (
+                reasons[name] = (
                     f"at {size[0]} x {size[1]} the {name} differs by {value:.3g}{unit} from that "
                     f"at {width} x {height}: {allowed[name]:.3g} allowed"
                 )
-    if told:
+    if reasons:
         check_inside(base[4], (width, height), _OUTERMOST)
-        fail("assert_sizes", law, "; ".join(told.values()))
+        fail("assert_sizes", law, "; ".join(reasons.values()))
 
 
 def _beside(side: int) -> int:

@@ -90,7 +90,7 @@ def assert_jitter(
     check_number("feedback", feedback, 0.0, 1.0)
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
-    told = []
+    reasons = []
     small = dataclasses.replace(probe, size=(min(probe.size[0], _SIDE), min(probe.size[1], _SIDE)))
     for name, scene in _SCENES.items():
         frames = [scene(small, x, y) for x, y in halton(16)]
@@ -99,7 +99,7 @@ def assert_jitter(
             np.array([_light(bloom, small, frame) for frame in part]) for part in (frames, resolved)
         )
         if not lights.mean() > 0:
-            told.append(f"the bloom of a thin {name} is black in all frames")
+            reasons.append(f"the bloom of a thin {name} is black in all frames")
             is_within(law, math.inf, allowed["flicker"], "flicker")
             continue
         for kind, where, values in (
@@ -110,18 +110,18 @@ def assert_jitter(
             off = float(np.ptp(values) / values.mean())
             figure(f"{name}, {where}", off)
             if not is_within(law, off, allowed[kind], kind):
-                told.append(
+                reasons.append(
                     f"{name}, {where}: the light changes by {off:.3g} of its mean, "
                     f"{allowed[kind]:g} allowed"
                 )
     ratio = _threshold_ratio(bloom, small)
     if not is_within(law, ratio, allowed["threshold"], "threshold"):
-        told.append(
+        reasons.append(
             f"a lit pixel blooms from {ratio:.3g} times the value on that a flat image needs: the "
             "threshold reads an average"
         )
-    if told:
-        fail("assert_jitter", law, "; ".join(told))
+    if reasons:
+        fail("assert_jitter", law, "; ".join(reasons))
 
 
 def _point(probe: Probe, x: float, y: float) -> Image:
@@ -233,19 +233,19 @@ def assert_history(
     sums = np.array([image.sum() for image in images[count // 2 :]])
     steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
     figure("frames", float(sum(share > allowed["stays"] for share in left)))
-    told = []
+    reasons = []
     if not is_within(law, steady, allowed["steady"], "steady"):
-        told.append(
+        reasons.append(
             f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
         )
     if not is_within(law, left[0], allowed["stays"], "stays"):
-        told.append(
+        reasons.append(
             f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
             f"and {sum(share > allowed['stays'] for share in left)} frames are above "
             f"{allowed['stays']:g}"
         )
-    if told:
-        fail("assert_history", law, "; ".join(told))
+    if reasons:
+        fail("assert_history", law, "; ".join(reasons))
 
 
 def _square(probe: Probe, at: tuple[int, int]) -> Image:
