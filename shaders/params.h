@@ -479,6 +479,7 @@
 #define DOUBLE_TILE_COLUMNS    64
 #define DOUBLE_TILE_ROWS       16
 #define DOUBLE_TILE_RUNS       4
+#define FILTER_TILE_SIDE       16
 #define ADJOINT_HALVE_COLUMNS  32
 #define ADJOINT_HALVE_ROWS     16
 #define ADJOINT_HALVE_RUNS     4
@@ -536,7 +537,7 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
 // to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
 // is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl). EXACT says that their images are in this ratio, or for strips the widths of
+// (lib/filter.glsl), and SOURCE_ROWS of their tiles. EXACT says that their images are in this ratio, or for strips the widths of
 // these. With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
 // threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
 // of. With ENLARGED the target has more rows than the source. STORED is the format of the target
@@ -591,7 +592,8 @@
     CONSTANT(43, EXACT, exact) \
     CONSTANT(44, TAP_COUNT, taps) \
     CONSTANT(45, KERNELS, kernels) \
-    CONSTANT(46, WINDOW, window)
+    CONSTANT(46, WINDOW, window) \
+    CONSTANT(47, SOURCE_ROWS, source_rows)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -31,11 +31,13 @@ struct pipeline_key {
     uint32_t textured, blend;  // enum vkb_blend
     uint32_t target_count;
     uint32_t layout;  // the number of the layouts
+    // An even number of integers, so that the key has no padding.
+    uint32_t unused[1 + VKB_CONSTANT_COUNT % 2];
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
                    == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (5 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                          + (6 + VKB_CONSTANT_COUNT % 2 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {

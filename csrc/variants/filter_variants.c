@@ -132,6 +132,37 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
         && vkb_add_from_image(choice, pass, &row, error);
 }
 
+// The most rows of its source that a tile of a filter reads.
+static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    const uint32_t source = graph->images[pass->reads[0]].height;
+    const uint32_t target = graph->images[pass->targets[0]].height;
+
+    return (uint32_t)(((uint64_t)(FILTER_TILE_SIDE - 1) * source + target - 1) / target) + 1
+         + (uint32_t)pass->constants.window;
+}
+
+bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                          bool *fits, struct vkb_error *error)
+{
+    // A row of sums of each kernel, and the weights of a row and a column of the tile.
+    enum { ROW = FILTER_TILE_SIDE * 4 * sizeof(float), WEIGHTS = 2 * ROW * MAX_WINDOW };
+    const VkPhysicalDeviceLimits *limits = &choice->device->limits;
+    struct vkb_pass_row row;
+
+    *fits = vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
+         && limits->maxComputeWorkGroupInvocations >= FILTER_TILE_SIDE * FILTER_TILE_SIDE
+         && limits->maxComputeSharedMemorySize
+                >= tile_rows(&choice->plain, pass) * (uint32_t)pass->constants.kernels * ROW
+                       + WEIGHTS + ROW;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
+    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, FILTER_TILE_SIDE, FILTER_TILE_SIDE);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
 #define TAKE_VEC4S(B, name, count) \
     memcpy(params->name, up->params.filter.name, sizeof params->name);

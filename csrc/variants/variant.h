@@ -38,7 +38,7 @@ vkb_variant_add vkb_add_shrunk;
 // Blurs of nine taps, of images of the same size and of twice the size.
 vkb_variant_add vkb_add_nine;
 // Filters in strips, also fused with the composite; the sum of several levels that are filtered.
-vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
+vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_filter_tiles, vkb_add_gathered;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images as words.

@@ -75,6 +75,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "halved", vkb_add_halved, 0},
     {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, 0},
     {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_filter_tiles, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels, 0},
 };
 
