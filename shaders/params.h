@@ -479,7 +479,9 @@
 #define DOUBLE_TILE_COLUMNS    64
 #define DOUBLE_TILE_ROWS       16
 #define DOUBLE_TILE_RUNS       4
-#define FILTER_TILE_SIDE       16
+// Tiles of filters: their rows, and the invocations of a workgroup.
+#define FILTER_TILE_ROWS        16
+#define FILTER_TILE_INVOCATIONS 256
 #define ADJOINT_HALVE_COLUMNS  32
 #define ADJOINT_HALVE_ROWS     16
 #define ADJOINT_HALVE_RUNS     4

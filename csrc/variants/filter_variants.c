@@ -135,31 +135,46 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
 // The most rows of its source that a tile of a filter reads.
 static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    const uint32_t source = graph->images[pass->reads[0]].height;
-    const uint32_t target = graph->images[pass->targets[0]].height;
+    const uint64_t source = graph->images[pass->reads[0]].height;
+    const uint64_t target = graph->images[pass->targets[0]].height;
 
-    return (uint32_t)(((uint64_t)(FILTER_TILE_SIDE - 1) * source + target - 1) / target) + 1
+    return (uint32_t)(((FILTER_TILE_ROWS - 1) * source + target - 1) / target) + 1
          + (uint32_t)pass->constants.window;
+}
+
+// The columns of a tile; 0: none fits. Wide tiles compute fewer weights, but a workgroup of more
+// than 32 KiB leaves processors idle.
+static uint32_t tile_columns(const struct vkb_variant_choice *choice,
+                             const struct vkb_pass_row *pass)
+{
+    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 32 << 10, VEC4 = 4 * sizeof(float) };
+    const uint32_t limit = choice->device->limits.maxComputeSharedMemorySize;
+    const uint32_t window = (uint32_t)pass->constants.window;
+    const uint32_t sums = (uint32_t)pass->constants.kernels * tile_rows(&choice->plain, pass);
+    uint32_t columns = WIDEST;
+
+    while (columns >= NARROWEST
+           && VEC4 * ((window + 2) * (columns + FILTER_TILE_ROWS) + (sums + 1) * (columns + 1))
+                  > (limit < FASTEST ? limit : FASTEST))
+        columns /= 2;
+    return columns < NARROWEST ? 0 : columns;
 }
 
 bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                           bool *fits, struct vkb_error *error)
 {
-    // A row of sums of each kernel, and the weights of a row and a column of the tile.
-    enum { ROW = FILTER_TILE_SIDE * 4 * sizeof(float), WEIGHTS = 2 * ROW * MAX_WINDOW };
-    const VkPhysicalDeviceLimits *limits = &choice->device->limits;
     struct vkb_pass_row row;
 
     *fits = vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
-         && limits->maxComputeWorkGroupInvocations >= FILTER_TILE_SIDE * FILTER_TILE_SIDE
-         && limits->maxComputeSharedMemorySize
-                >= tile_rows(&choice->plain, pass) * (uint32_t)pass->constants.kernels * ROW
-                       + WEIGHTS + ROW;
+         && choice->device->limits.maxComputeWorkGroupInvocations >= FILTER_TILE_INVOCATIONS
+         && tile_columns(choice, pass) > 0;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
-    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, FILTER_TILE_SIDE, FILTER_TILE_SIDE);
+    row.constants.group_width = (int32_t)tile_columns(choice, pass);
+    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, (uint32_t)row.constants.group_width,
+                      FILTER_TILE_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
