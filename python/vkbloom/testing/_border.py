@@ -238,7 +238,8 @@ def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> tuple[Image, Ima
             fail(
                 "assert_border",
                 law,
-                f"after a bright image{name}, a black one has {off:.3g} of its light at x {x}, y {y}",
+                f"after a bright image{name}, a black one has {off:.3g} of its light at "
+                f"x {x}, y {y}",
             )
     return after, flat
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, is_within
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
 
 __all__ = ["assert_alpha"]
 
@@ -49,6 +49,7 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
     check_number("limit", limit, 0.0, 1.0)
     if probe.dtype.kind == "u" or probe.colours < 3:
         raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
+    probe = small_probe(probe)
     colours, alpha = _lights(probe)
     glow, opaque, is_picture = _colours_alike(bloom, probe, colours, alpha, limit)
     if not is_picture:
