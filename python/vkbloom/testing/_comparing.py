@@ -7,22 +7,31 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from vkbloom.testing._shape import LEVELS
+
 __all__ = ["Change", "changes", "newly_broken"]
 
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
 #: Figures by name: their place in the values of a bloom, and whether less of them is better.
-_FIGURES: Final[Mapping[str, tuple[str, bool]]] = {
-    "gain": ("gain", False),
-    "energy of a pixel": ("energy", False),
-    "50 % within, pixels": ("psf.r50", False),
-    "90 % within, pixels": ("psf.r90", False),
-    "peak": ("psf.peak", False),
-    "ripple": ("stability.ripple", True),
-    "jitter, pixels": ("stability.jitter", True),
-    "shimmer": ("stability.shimmer", True),
-    "growth": ("stability.growth", True),
-    "veiling glare index, %": ("veiling_glare_index", False),
+_FIGURES: Final[Mapping[str, tuple[tuple[str, ...], bool]]] = {
+    "gain": (("gain",), False),
+    "energy of a pixel": (("energy",), False),
+    "50 % within, pixels": (("psf", "r50"), False),
+    "90 % within, pixels": (("psf", "r90"), False),
+    "peak": (("psf", "peak"), False),
+    **{
+        f"contour at {level:g} of the peak, longest over shortest": (
+            ("laws", "round", "figures", f"round_{level:g}"),
+            True,
+        )
+        for level in LEVELS
+    },
+    "ripple": (("stability", "ripple"), True),
+    "jitter, pixels": (("stability", "jitter"), True),
+    "shimmer": (("stability", "shimmer"), True),
+    "growth": (("stability", "growth"), True),
+    "veiling glare index, %": (("veiling_glare_index",), False),
 }
 # What counts as a change: of a deviation, as a share of its limit; of a figure, as a share of
 # itself and at least so much; of a time, as a share, since a shared machine repeats it within that.
@@ -106,10 +115,10 @@ def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Ch
         )
 
 
-def _at(values: Mapping[str, Any], place: str) -> float | None:
+def _at(values: Mapping[str, Any], place: Sequence[str]) -> float | None:
     found: Any = values
-    for key in place.split("."):
-        found = found[key]
+    for key in place:
+        found = found.get(key)
     return None if found is None else float(found)
 
 
