@@ -21,8 +21,8 @@
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
 #   which comes as packages of Debian 13 that are unpacked, not installed.
-# make cluster: renders grids under Slurm, SSH and Ray with two nodes on this machine, and kills some;
-#   installs them (with apt, as root). CLUSTER="--driver MANIFEST": a driver that they must refuse.
+# make cluster: renders grids under Slurm with two nodes on this machine, and kills some; installs
+#   it (with apt, as root). CLUSTER="--driver MANIFEST": a driver that they must refuse.
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -48,7 +48,7 @@ PIP_INSTALL = $(PYTHON) -m pip install --quiet --no-compile
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
 	tests/core/test_refusals.py tests/core/test_frames.py tests/core/test_out_of_date.py \
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
-	tests/io/test_files.py tests/views tests/grid/test_grid_reductions.py
+	tests/io/test_files.py tests/views tests/grid/test_grid_order.py
 
 .PHONY: demo test test-devices exhaustive check docs tables bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-aarch64 format sanitize clean
@@ -150,6 +150,8 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
+	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
 	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so

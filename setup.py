@@ -81,9 +81,15 @@ class Module(NamedTuple):
 def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to, with those for the images of a batch.
 
-    Adjoints and Fourier transforms run for one image.
+    Adjoints and Fourier transforms run for one image. A shader that uses MIXED is also compiled for
+    the adjoint of what it ends with, in single floats.
     """
     plain = list(plain_modules(shader))
+    adjoints = [
+        Module(name.replace(shader.stem, f"{shader.stem}_mixed"), shader, (*options, "-DMIXED"))
+        for name, _, options in plain
+        if "MIXED" in shader.read_text() and name.endswith(("_comp", "_words_rgba32float"))
+    ]
     if shader.stem.startswith(("adjoint", "fft")):
         return plain
     layered = [
@@ -92,7 +98,7 @@ def modules(shader: Path) -> list[Module]:
         if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
         and "-DWORDS" not in module.options
     ]
-    return plain + layered
+    return plain + layered + adjoints
 
 
 def plain_modules(shader: Path) -> list[Module]:
@@ -101,9 +107,9 @@ def plain_modules(shader: Path) -> list[Module]:
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for images as words, of each format. Lines of it say more: with `#pragma compile
     floats` it is for single floats alone, with `#pragma compile images` also for storage images.
-    If it calls finished(), or has `#pragma compile packed`, it can make the caller's array, and is
-    also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can read the
-    caller's image, and is also compiled for an image of three single floats. If it uses
+    If it calls finished() or ended(), or has `#pragma compile packed`, it can make the caller's
+    array, and is also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can
+    read the caller's image, and is also compiled for an image of three single floats. If it uses
     TARGET_BYTES, it also loads single floats and stores words of each format.
     """
     name = shader.name.replace(".", "_")
@@ -126,7 +132,7 @@ def plain_modules(shader: Path) -> list[Module]:
                 kinds.append(("rgb_", ("-DRGB",)))
             for kind, options in kinds:
                 found.append(Module(f"{shader.stem}_words_{kind}{ours}", shader, words + options))
-                if "finished(" in text or "packed" in marks:
+                if re.search(r"\b(finished|ended)\(", text) or "packed" in marks:
                     packed = (*words, *options, "-DTARGET_CHANNELS=3")
                     found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
         return found

@@ -103,7 +103,7 @@ def points() -> None:
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         print(f"{total} points of {SIDE} x {SIDE} into Zarr: {seconds:.1f} s, "
               f"{total / seconds:.0f} points/s, {size / 2**20:.0f} MiB")  # fmt: skip
-        print(f"  passes run {made.attrs['passes_run']}, saved {made.attrs['passes_saved']}")
+        print(f"  passes run {made.attrs['passes_run']}")
         print(f"  memory: {spread(samples)}")
         with vkbloom.Renderer(ADAPTER) as renderer:
             every = list(np.ndindex(*made["done"].shape))
@@ -121,7 +121,7 @@ def points() -> None:
                 SETTINGS,
                 values,
                 framebuffers=(),
-                reduce={"mean": vkbloom.reductions.Mean()},
+                reduce={"mean": lambda frames: frames["final"].mean()},
                 renderer=renderer,
             )
             seconds_reduced = time.perf_counter() - start
@@ -197,7 +197,7 @@ def tiny() -> None:
         assert bool(made["done"].values.all())
         print(f"{count} points of 16 x 16, two workers: {seconds:.1f} s, "
               f"{count / seconds:.0f} points/s")  # fmt: skip
-        print(f"  passes run {made.attrs['passes_run']}, saved {made.attrs['passes_saved']}")
+        print(f"  passes run {made.attrs['passes_run']}")
         print(f"  {tasks[0]} tasks in all, at most {most[0]} on the scheduler at a time")
         print(f"  scheduler and client: {used.user + used.system - times.user - times.system:.1f} "
               f"s of processor time; memory {spread(samples)}")  # fmt: skip

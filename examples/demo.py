@@ -4,7 +4,7 @@ Writes into the folder ``--out``, by default ``out``:
 
 - ``bloom_off/`` and ``bloom_on/``: each framebuffer as PNG, depth as OpenEXR
 - ``bloom_on.exr``: all framebuffers of the second in one file
-- ``contact_sheet.png``: a picture of all framebuffers, with their names
+- ``contact_sheet.html``: a page with all framebuffers and the time of each pass
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from rich.console import Console
 from rich.table import Table
 
 import vkbloom
-from vkbloom._views.pictures import contact_sheet_png
 
 SIZE = (1280, 720)
 
@@ -60,8 +59,8 @@ def main(out: Path, adapter: str) -> None:
 
     files = [path for name, frames in rendered.items() for path in frames.save(out / name)]
     files += rendered["bloom_on"].save(out / "bloom_on.exr")
-    sheet = out / "contact_sheet.png"
-    sheet.write_bytes(contact_sheet_png(rendered["bloom_on"]))
+    sheet = out / "contact_sheet.html"
+    sheet.write_text(rendered["bloom_on"]._repr_html_())
 
     console = Console(markup=False, highlight=False)
     console.print(f"The saucer at {SIZE[0]} x {SIZE[1]} on {info.summary}", soft_wrap=True)

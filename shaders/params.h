@@ -453,7 +453,7 @@
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
 #define HALVE_WORDS_ROWS              32
-#define REDUCE_COLUMNS                4
+#define PREFILTER_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
 #define DOUBLE_FINAL_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
 #define DOUBLE_WORDS_ROWS             64
@@ -464,8 +464,7 @@
 #define SHRINK_ROWS                   32
 #define GATHER_COLUMNS                4
 #define GATHER_ROWS                   16
-#define GODOT_COLUMNS                 8
-#define HDRP_OUTPUTS                  8
+#define NINE_OUTPUTS                  8
 #define STREAK_COLUMNS                8
 #define STREAK_ROWS                   32
 #define TILE_LOADED                   64
@@ -722,6 +721,7 @@
     NAME(BY_MASK, 2, by_mask) \
     NAME(BY_VALUES, 3, by_values) \
     NAME(BY_SQUARES, 4, by_squares) \
+    NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_GREY, 2, grey) \

@@ -29,6 +29,21 @@ CELL = (480, 270)
 SIDE, DECADES = 300, 5
 
 
+def write_sheet(path: Path, tiles: list[tuple[np.ndarray, str]], columns: int) -> None:
+    """Write pictures in rows, with their names below."""
+    height, width = tiles[0][0].shape[:2]
+    rows = -(-len(tiles) // columns)
+    size = (columns * width / 100, rows * (height / 100 + 0.3))
+    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained")
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for axis, (tile, name) in zip(axes.flat, tiles, strict=False):
+        axis.imshow(tile)
+        axis.set_title(name, y=0, verticalalignment="top", fontsize=12)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
 def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     """Draw the deferred saucer with each preset, and without bloom."""
     scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
@@ -42,8 +57,8 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
             final = renderer.apply(lit["scene"], changed, framebuffers="final")["final"]
         else:
             final = renderer.render(scene, changed, CELL, shading="deferred")["final"]
-        tiles.append((pictures.picture(final, "final", encoded=True), name, ""))
-    vkbloom.write(path, pictures.sheet(tiles, 3, CELL), quality=88)
+        tiles.append((pictures.picture(final, "final", encoded=True), name))
+    write_sheet(path, tiles, 3)
 
 
 def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
@@ -72,7 +87,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
         decades = np.log10(np.maximum(middle / bloom.max(), 10.0**-DECADES))
         # 32 levels of grey show the shape and keep the file small.
         grey = np.rint(31 * (1 + decades / DECADES)) * (255 / 31)
-        tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name, ""))
+        tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name))
     axes.set_xlabel("distance, pixels (+ 0.5)")
     axes.set_ylabel("share of the light of the point, per pixel")
     axes.set_ylim(1e-7, 1)
@@ -80,7 +95,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     figure.legend(fontsize=7, loc="outside right upper")
     figure.savefig(folder / "profiles.png", dpi=110)
     plt.close(figure)
-    vkbloom.write(folder / "presets.png", pictures.sheet(tiles, 4, (SIDE, SIDE)))
+    write_sheet(folder / "presets.png", tiles, 4)
 
 
 def write_flowchart(page: Path) -> None:

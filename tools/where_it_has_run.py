@@ -31,6 +31,7 @@ def rows(file: Path) -> Iterator[tuple[str, ...]]:
         for one in report["families"]:
             # As in "Null hardware (RADV NAVI21) (discrete, Mesa 22.3.6, Vulkan 1.3.230)".
             name, about = one["adapter"].rstrip(")").rsplit(" (", 1)
+            name = name.removeprefix("Null hardware (").removesuffix(")")
             found = f"{one['count']} requests, {len(one['wrong'])} wrong"
             spilled = f"{one['vgprs_spilled']} vector and {one['sgprs_spilled']} scalar registers"
             more = f"{one['shaders']} shaders; spilled: {spilled}; shared: {one['shared']} bytes"
@@ -59,7 +60,10 @@ def main() -> None:
     table.sort(key=lambda row: row[2] != "drawn")
     table += [(name, "", "not tried", "", "") for name in NOT_TRIED]
     lines = ["| device | driver | | result | figures |", "|---|---|---|---|---|"]
-    lines += [f"| {' | '.join(row)} |" for row in table]
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for name, *found in table:
+        alike.setdefault((*found,), []).append(name)
+    lines += [f"| {' | '.join(('; '.join(names), *row))} |" for row, names in alike.items()]
     (arguments.out / "drivers_table.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

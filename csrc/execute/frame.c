@@ -207,11 +207,12 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     run->graph = graph;
     request->timing_count = 0;
     request->first_span = submission->timer.span_count;
-    for (uint32_t i = 0; i < graph->image_count; ++i)
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct vkb_image_row row = vkb_run_row(run, i);
         vkb_run_set_image(run, i,
-                          graph->images[i].input != VKB_INPUT_NONE
-                              ? run->inputs[graph->images[i].input].image
-                              : vkb_image_cache_find(&frame->cache, &graph->images[i]));
+                          row.input != VKB_INPUT_NONE ? run->inputs[row.input].image
+                                                      : vkb_image_cache_find(&frame->cache, &row));
+    }
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -253,10 +254,35 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
 
+// No image is replaced within a submission, so that each is for all requests.
+static void find_usages(struct vkb_run *run, const struct vkb_frame_source *source,
+                        const struct vkb_request *requests, uint32_t request_count)
+{
+    for (uint32_t i = 0; i < request_count; ++i) {
+        const struct vkb_plan *plan = requests[i].plan;
+        for (uint32_t image = 0; image < plan->graph.image_count; ++image) {
+            const struct vkb_image_row *row = &plan->graph.images[image];
+            const struct vkb_input *input = source->inputs[row->input];
+            run->usages[image] |= row->usage;
+            if (row->input && ((input && input->exported) || !run->device->words))
+                run->usages[image] |= vkb_access_usage(VKB_ACCESS_COPY_TARGET);
+            if (input && input->exported)
+                run->usages[image] |=
+                    vkb_exported_usage(run->device, row, VKB_ACCESS_DISPATCH_STORED);
+        }
+        for (uint32_t output = 0; output < plan->output_count; ++output)
+            if (requests[i].outputs[output].exported)
+                run->usages[plan->outputs[output]] |=
+                    vkb_exported_usage(run->device, &plan->graph.images[plan->outputs[output]],
+                                       VKB_ACCESS_DISPATCH_SAMPLED);
+    }
+}
+
 static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
                    struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
 {
     run->graph = &requests[0].plan->graph;
+    find_usages(run, source, requests, request_count);
     return (!source->scene || load_scene(run, source->scene, error))
         && vkb_sources_stage(run, source, requests, request_count, error)
         && stage_constants(run, error) && reserve(run, requests, request_count, error)
@@ -327,9 +353,11 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     trim(device, frame, run.submission);
     done = (run.images = vkb_alloc(error, image_count, sizeof *run.images))
         && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
+        && (run.usages = vkb_alloc(error, image_count, sizeof *run.usages))
         && submit(&run, source, requests, request_count, error);
     vkb_free(run.images);
     vkb_free(run.contents);
+    vkb_free(run.usages);
     if (done && (!show || show->acquired)) {
         run.submission->requests = requests;
         run.submission->request_count = request_count;

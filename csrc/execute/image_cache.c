@@ -1,9 +1,7 @@
 #include "execute/image_cache.h"
 
-#include "execute/limits.h"
 #include "vulkan/labels.h"
 
-#include <math.h>
 #include <string.h>
 
 // Keys are compared byte by byte. All members have 64 bits, so there is no padding.
@@ -95,106 +93,6 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
     }
 }
 
-static VkImageUsageFlags image_usage(const struct vkb_device *device, enum vkb_format format)
-{
-    // No pass reads depth.
-    return VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT
-         | (format == VKB_FORMAT_DEPTH32_FLOAT
-                ? VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT
-                : VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
-                      | (device->dispatch ? VK_IMAGE_USAGE_STORAGE_BIT : 0));
-}
-
-bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
-                         struct vkb_error *error)
-{
-    const enum vkb_format format = row->format;
-    const VkFormatFeatureFlags features =
-        format == VKB_FORMAT_DEPTH32_FLOAT
-            ? VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT
-            : VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT;
-
-    if (!vkb_device_supports(device, format, features))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot render to %s images",
-                        device->adapter.name, vkb_formats[format].name);
-    return true;
-}
-
-static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
-                         uint32_t image, struct vkb_error *error)
-{
-    const enum vkb_format format = graph->images[image].format;
-
-    if (!vkb_image_row_check(device, &graph->images[image], error))
-        return false;
-    if (vkb_graph_blends(graph, image)
-        && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
-        return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "the adapter %s cannot add up layers in %s images, but in %s it can",
-                        device->adapter.name, vkb_formats[format].name,
-                        vkb_formats[VKB_FORMAT_RGBA16_FLOAT].name);
-    return true;
-}
-
-// Dispatches that variants chose do not come here without them.
-static bool check_passes(const struct vkb_device *device, const struct vkb_graph *graph,
-                         struct vkb_error *error)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        if (pass->geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
-            return vkb_fail(error, VKB_ERROR_GENERAL,
-                            "the compute shaders of %s cannot write images, which the pass %s "
-                            "needs",
-                            device->adapter.name, pass->name);
-        // Plans without a renderer know no limits.
-        if (pass->block == VKB_BLOCK_own && device->limits.maxPerStageResources
-            && !vkb_limits_check(device, pass, error))
-            return false;
-    }
-    return true;
-}
-
-// All images must fit the largest heap of the device together. Those of a convolution are many
-// times larger than the frame.
-static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
-                         struct vkb_error *error)
-{
-    const uint64_t needed = vkb_graph_size(graph);
-    uint64_t largest = 0;
-    bool convolves = false;
-
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        convolves = convolves || graph->images[i].serial;
-    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
-        if (device->memory.memoryHeaps[i].size > largest)
-            largest = device->memory.memoryHeaps[i].size;
-    // Plans without a renderer know no heaps.
-    if (!largest || needed <= largest)
-        return true;
-    vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
-             "memory is short: %llu MiB of images are needed, and the adapter %s has %llu",
-             (unsigned long long)(needed >> 20), device->adapter.name,
-             (unsigned long long)(largest >> 20));
-    const struct vkb_image_row *image = &graph->images[0];
-    const double share = sqrt((double)largest / (double)needed);
-    if (convolves)
-        vkb_add_words(error, "; use a smaller bloom_scale or kernel_size");
-    else
-        vkb_add_words(error, "; an image of %u x %u fits, or use a smaller bloom_scale",
-                      (uint32_t)(share * image->width), (uint32_t)(share * image->height));
-    return false;
-}
-
-bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
-                           struct vkb_error *error)
-{
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (!check_format(device, graph, i, error))
-            return false;
-    return check_passes(device, graph, error) && check_memory(device, graph, error);
-}
-
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
                           struct vkb_image *image, struct vkb_error *error)
 {
@@ -206,7 +104,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
                                 .layers = row->layers ? row->layers : 1,
                                 .levels = 1,
                                 .array = row->layers > 0,
-                                .usage = image_usage(device, row->format),
+                                .usage = row->usage,
                                 .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
                             },
                             image, error);
@@ -235,11 +133,16 @@ static struct vkb_cached_image *add_cached(struct vkb_image_cache *cache,
     return cached;
 }
 
-bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+static bool is_alike(const struct vkb_image *image, const struct vkb_image_row *row)
 {
     return image->handle && image->format == row->format && image->width == row->width
         && image->height == row->height && image->layers == (row->layers ? row->layers : 1)
         && image->array == (row->layers > 0);
+}
+
+bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row)
+{
+    return is_alike(image, row) && (row->usage & ~image->usage) == 0;
 }
 
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
@@ -269,9 +172,12 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
     cached->used = cache->now;
     if (vkb_image_fits(&cached->image, row))
         return true;
+    // Also for the plans that it has been for: they may come by turns.
+    struct vkb_image_row both = *row;
+    both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
     destroy_image(device, cache, cached);
     cached->image_id = ++cache->clock;
-    if (!vkb_image_create_row(device, row, &cached->image, error))
+    if (!vkb_image_create_row(device, &both, &cached->image, error))
         return false;
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)

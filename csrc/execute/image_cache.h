@@ -39,24 +39,17 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
 
 void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache);
 
-// Checks that the device supports the graph's images, with the usage that the passes need.
-bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
-                           struct vkb_error *error);
-
-// The same for one row, without the usage that only passes need.
-bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
-                         struct vkb_error *error);
-// Whether the image has the row's size and format; and the creation of such an image outside of the
-// cache.
+// Whether the image has the row's size, format and usage; and the creation of such an image outside
+// of the cache.
 bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row);
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
                           struct vkb_image *image, struct vkb_error *error);
 
-// Finds the cached image of a row; NULL if there is none of its size and format.
+// Finds the cached image of a row; NULL if there is none of its size, format and usage.
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row);
 
-// Whether vkb_image_cache_resolve would replace an image of another size or format. Pending
+// Whether vkb_image_cache_resolve would replace an image of another size, format or usage. Pending
 // commands must not use the replaced image.
 bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row);
 

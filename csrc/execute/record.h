@@ -24,6 +24,7 @@ struct vkb_run {
     const struct vkb_graph *graph;                    // the request's
     struct vkb_cached_image **images;                 // by the graph's image index
     struct vkb_content **contents;                    // of the cache
+    VkImageUsageFlags *usages;                        // by image: what all requests need
     struct vkb_staged_input inputs[VKB_INPUT_COUNT];  // by kind
     // Images to be filled by this submission, and where their pixels start in the staging memory: a
     // kernel, a picture of dirt, and the weights and the kernel of adjoint passes at most.

@@ -24,11 +24,11 @@ static struct vkb_dry_image *find_image(const struct vkb_dry_run *dry_run, const
 static bool fits(const struct vkb_dry_image *image, const struct vkb_image_row *row)
 {
     return image->row.format == row->format && image->row.width == row->width
-        && image->row.height == row->height;
+        && image->row.height == row->height && (row->usage & ~image->row.usage) == 0;
 }
 
-// Returns the content of the image with that row's name. An image of another size or format is
-// replaced, as the image cache does it.
+// Returns the content of the image with that row's name. An image of another size, format or
+// usage is replaced, as the image cache does it.
 static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb_image_row *row,
                                    struct vkb_error *error)
 {
@@ -38,8 +38,10 @@ static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb
         && !(image = vkb_append(error, &dry_run->images, &dry_run->count, &dry_run->capacity,
                                 sizeof *image)))
         return NULL;
+    const VkImageUsageFlags before = image->row.usage;
     image->content.valid = image->content.valid && fits(image, row);
     image->row = *row;
+    image->row.usage |= before;
     return &image->content;
 }
 

@@ -260,6 +260,36 @@ uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image)
     return row->channels ? row->channels : vkb_formats[row->format].channels;
 }
 
+void vkb_graph_set_usages(struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        struct vkb_image_row *row = &graph->images[i];
+        const enum vkb_access rest = vkb_graph_rest(graph, i);
+        row->usage = (row->framebuffer || rest == VKB_ACCESS_COPY_SOURCE
+                          ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE)
+                          : 0)
+                   | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0);
+    }
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
+        // Words are a buffer.
+        if (pass->reading == VKB_READING_WORDS)
+            continue;
+        for (uint32_t read = 0; read < pass->read_count; ++read)
+            graph->images[pass->reads[read]].usage |= vkb_access_usage(vkb_pass_reads_as(pass));
+        for (uint32_t target = 0; target < pass->target_count; ++target)
+            graph->images[pass->targets[target]].usage |=
+                vkb_access_usage(draws ? VKB_ACCESS_COLOR_TARGET : VKB_ACCESS_DISPATCH_STORED);
+        if (pass->depth != VKB_NO_IMAGE)
+            graph->images[pass->depth].usage |= vkb_access_usage(VKB_ACCESS_DEPTH_TARGET);
+    }
+    // No image is without a usage, also if all passes access it as words.
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (graph->images[i].usage == 0)
+            graph->images[i].usage = vkb_access_usage(VKB_ACCESS_COPY_SOURCE);
+}
+
 // Whether the image is given, or written before pass `pass_index`.
 static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
 {

@@ -54,6 +54,7 @@ struct vkb_image_row {
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
+    VkImageUsageFlags usage;  // that the graph's passes need (vkb_graph_set_usages)
     // Filled by the host once: the pixels, without gaps, and their number; 0: it is not.
     const void *pixels;
     uint64_t serial;
@@ -175,6 +176,10 @@ bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t 
 // all layers of its target. A VALUE error where this cannot be done: of draws, of words, of shaders
 // without layers, and of images that the host fills for all frames.
 bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error);
+
+// Derives how each image is used from the passes that read and write it, and from whether the host
+// fills it once or reads it. How inputs are filled is the source's business.
+void vkb_graph_set_usages(struct vkb_graph *graph);
 
 // Bytes of all images that passes use, without layers.
 uint64_t vkb_graph_size(const struct vkb_graph *graph);

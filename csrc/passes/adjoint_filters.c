@@ -13,6 +13,8 @@ static void set_line(const struct vkb_blur_params *params, int radius, double st
     for (int tap = -radius; tap <= radius; ++tap) {
         const int weight = tap < 0 ? -tap : tap;
         const double place = placed ? params->offsets[weight / 4][weight % 4] : weight;
+        if (weight && params->weights[weight / 4][weight % 4] == 0.0f)
+            continue;
         axis->taps[axis->count++] = (struct vkb_tap){
             .offset = (tap < 0 ? -place : place) * step,
             .weights = {params->weights[weight / 4][weight % 4]},

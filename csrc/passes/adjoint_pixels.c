@@ -23,38 +23,42 @@ static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
 }
 
 // Whether the derivatives by the scene are a factor of all colours.
-static bool scales_scene(const struct vkb_pass_row *pass)
+static bool scales_scene(const struct vkb_pass_row *row)
 {
-    const int32_t composite = pass->constants.composite;
+    const int32_t composite = row->constants.composite;
 
-    return pass->block == VKB_BLOCK_composite && !pass->constants.masked
-        && !depends_on_bloom(&pass->constants, pass->params.composite.limit)
+    return row->block == VKB_BLOCK_composite && !row->constants.masked
+        && !depends_on_bloom(&row->constants, row->params.composite.limit)
         && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
 }
 
-static double share_of_scene(const struct vkb_pass_row *pass)
+static double share_of_scene(const struct vkb_pass_row *row)
 {
-    const struct vkb_composite_params *params = &pass->params.composite;
+    const struct vkb_composite_params *params = &row->params.composite;
 
     return exp2(params->exposure)
-         * (pass->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
+         * (row->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
 }
 
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
-static bool bring_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                            struct vkb_pass_row *row, float limit, struct vkb_error *error)
+static bool bring_composite(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                            struct vkb_error *error)
 {
-    if (!depends_on_bloom(&pass->constants, limit))
+    const struct vkb_constants *constants = &row->constants;
+    const uint32_t images[] = {row->reads[0], row->reads[1], row->reads[2]};
+    const float limit = row->block == VKB_BLOCK_composite ? row->params.composite.limit
+                                                          : row->params.godot_final.limit;
+
+    if (!depends_on_bloom(constants, limit))
         row->reads[1] = row->reads[0];
     for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
         row->constants.by = by;
-        if ((by == BY_BLOOM && pass->constants.composite == COMPOSITE_OFF)
-            || (by == BY_MASK && !pass->constants.masked))
+        if ((by == BY_BLOOM && constants->composite == COMPOSITE_OFF)
+            || (by == BY_MASK && !constants->masked))
             continue;
-        if (by == BY_SCENE && scales_scene(pass)
-            && adjoint->brought[pass->reads[0]] == VKB_NO_IMAGE)
-            vkb_bring_scene(adjoint, row, share_of_scene(pass), pass->reads[0]);
-        else if (!vkb_bring(adjoint, row, pass->reads[by], error))
+        if (by == BY_SCENE && scales_scene(row) && adjoint->brought[images[0]] == VKB_NO_IMAGE)
+            vkb_bring_scene(adjoint, row, share_of_scene(row), images[0]);
+        else if (!vkb_bring(adjoint, row, images[by], error))
             return false;
     }
     return true;
@@ -84,6 +88,28 @@ static struct vkb_pass_row composite_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
+// Whether the picture before exposure and curves is a share of the scene and one of the bloom.
+static bool is_sum(const struct vkb_constants *constants)
+{
+    return (constants->composite == COMPOSITE_ADD || constants->composite == COMPOSITE_MIX)
+        && constants->alpha == ALPHA_KEEP && !constants->masked && !constants->groups;
+}
+
+// Brings the cotangents to the picture before exposure and curves, and makes `row` that of a
+// composite without these.
+static bool bring_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                         struct vkb_error *error)
+{
+    struct vkb_pass_row curves = *row;
+
+    curves.constants.by = BY_MIXED;
+    row->constants.tonemap = TONEMAP_NONE;
+    row->constants.encoding = ENCODING_NONE;
+    row->params.composite.exposure = 0.0f;
+    row->params.composite.limit = (float)SINGLE_LIMIT;
+    return vkb_add_apart(adjoint, &curves, size_of(adjoint, row->reads[0]), &row->reads[3], error);
+}
+
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
@@ -93,9 +119,11 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.params.composite = pass->params.composite;
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
-    if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error))
+    if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error)
+        || (is_sum(&row.constants) && depends_on_bloom(&row.constants, row.params.composite.limit)
+            && !bring_curves(adjoint, &row, error)))
         return false;
-    return bring_composite(adjoint, pass, &row, row.params.composite.limit, error);
+    return bring_composite(adjoint, &row, error);
 }
 
 bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -105,7 +133,7 @@ bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb
 
     row.block = VKB_BLOCK_godot_final;
     row.params.godot_final = pass->params.godot_final;
-    return bring_composite(adjoint, pass, &row, row.params.godot_final.limit, error);
+    return bring_composite(adjoint, &row, error);
 }
 
 // Brings what is at the pixels of the target to an image that these sample linearly.

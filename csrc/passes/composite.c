@@ -92,3 +92,9 @@ bool vkb_is_composite(const struct vkb_pass_row *pass)
 {
     return vkb_computes(pass, VKB_BLOCK_composite) && pass->constants.composite != COMPOSITE_OFF;
 }
+
+bool vkb_ends_bloom(const struct vkb_pass_row *pass)
+{
+    return vkb_is_composite(pass)
+        || (vkb_transposes(pass, VKB_BLOCK_composite) && pass->constants.by == BY_MIXED);
+}

@@ -25,6 +25,9 @@ bool vkb_add_composite(const struct vkb_settings *settings,
 
 // Whether the row is a composite that adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);
+// The same, or the row that brings cotangents back through exposure and curves of one, its last
+// image.
+bool vkb_ends_bloom(const struct vkb_pass_row *pass);
 
 // Copies all parameters and constants of the composite to the row of a fused pass with block B. A
 // block without COMPOSITE_ROWS does not compile.

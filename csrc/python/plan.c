@@ -3,6 +3,7 @@
 #include "python/module.h"
 #include "python/values.h"
 
+#include "execute/limits.h"
 #include "graph/dry_run.h"
 #include "methods/adjoint.h"
 
@@ -181,14 +182,18 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                         struct vkb_error *error)
 {
     graph->max_width = device->max_side;
-    return (portion ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side,
-                                        graph, &portion->first, &portion->is_possible, error)
-                    : vkb_source_build(source, settings, device->max_side, graph, error))
+    const bool built =
+        (portion ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
+                                     &portion->first, &portion->is_possible, error)
+                 : vkb_source_build(source, settings, device->max_side, graph, error))
         // Variants divide by the sizes of images, and add images of their own.
         && vkb_graph_check(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
-        && vkb_graph_check(graph, device->max_side, error)
-        && vkb_image_cache_check(device, graph, error)
+        && vkb_graph_check(graph, device->max_side, error);
+    if (!built)
+        return false;
+    vkb_graph_set_usages(graph);
+    return vkb_limits_check_graph(device, graph, error)
         && (!graph->layers || layer_graph(device, graph, error));
 }
 

@@ -74,14 +74,20 @@ static VkDeviceSize input_scratch(const struct vkb_device *device, const struct 
              : (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
 }
 
-static bool reads_image(const struct vkb_device *device, const struct vkb_output *output)
+static bool reads_image(const struct vkb_device *device, enum vkb_format format)
 {
-    return dispatches(device) && output->format != VKB_FORMAT_DEPTH32_FLOAT;
+    return dispatches(device) && format != VKB_FORMAT_DEPTH32_FLOAT;
+}
+
+VkImageUsageFlags vkb_exported_usage(const struct vkb_device *device,
+                                     const struct vkb_image_row *row, enum vkb_access access)
+{
+    return reads_image(device, row->format) ? vkb_access_usage(access) : 0;
 }
 
 static VkDeviceSize output_scratch(const struct vkb_device *device, const struct vkb_output *output)
 {
-    return reads_image(device, output) || vkb_readback_is_complete(output)
+    return reads_image(device, output->format) || vkb_readback_is_complete(output)
              ? 0
              : (VkDeviceSize)output->width * output->row_count * vkb_pixel_size(output->format);
 }
@@ -313,7 +319,7 @@ static bool record_output(struct vkb_run *run, struct vkb_image *image,
                           const struct vkb_output *output, struct vkb_error *error)
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
-    const bool from_image = reads_image(run->device, output);
+    const bool from_image = reads_image(run->device, output->format);
     const bool copied = !from_image && vkb_readback_is_complete(output);
     const uint32_t size = (uint32_t)element_size(output->format);
     const uint32_t pixel = (uint32_t)vkb_pixel_size(output->format);

@@ -1,5 +1,6 @@
 #include "transfer/resident.h"
 
+#include "execute/limits.h"
 #include "execute/list.h"
 
 struct vkb_residents {
@@ -89,11 +90,15 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
         .width = input->width,
         .height = input->height,
         .input = kind,
+        // Whatever plan it will be for.
+        .usage = vkb_access_usage(VKB_ACCESS_COPY_SOURCE) | vkb_access_usage(VKB_ACCESS_SAMPLED)
+               | (device->words ? 0 : vkb_access_usage(VKB_ACCESS_COPY_TARGET))
+               | (device->dispatch ? vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED) : 0),
     };
     struct vkb_cached_image *cached = &resident->inputs[kind].cached;
 
     if (!vkb_check_size(row.name, row.width, row.height, device->max_side, error)
-        || !vkb_image_row_check(device, &row, error))
+        || !vkb_limits_check_image(device, &row, error))
         return false;
     if (!vkb_image_fits(&cached->image, &row)) {
         vkb_image_destroy(device, &cached->image);

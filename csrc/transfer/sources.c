@@ -8,9 +8,17 @@ void vkb_run_set_image(struct vkb_run *run, uint32_t image, struct vkb_cached_im
     run->contents[image] = cached ? &cached->content : NULL;
 }
 
+struct vkb_image_row vkb_run_row(const struct vkb_run *run, uint32_t image)
+{
+    struct vkb_image_row row = run->graph->images[image];
+
+    row.usage = run->usages[image];
+    return row;
+}
+
 bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
-    const struct vkb_image_row *row = &run->graph->images[image];
+    const struct vkb_image_row wanted = vkb_run_row(run, image), *row = &wanted;
     struct vkb_image_cache *cache = &run->frame->cache;
     struct vkb_cached_image *cached;
 

@@ -23,7 +23,10 @@ uint64_t vkb_sources_version(const struct vkb_run *run);
 // Sets the image of the graph's row; NULL: there is none yet.
 void vkb_run_set_image(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached);
 
-// Finds or creates the cached image of the graph's image. A cached image of another size is
+// The row of the graph's image, used as all requests of the submission need it.
+struct vkb_image_row vkb_run_row(const struct vkb_run *run, uint32_t image);
+
+// Finds or creates the cached image of the graph's image. A cached image that does not fit is
 // replaced only after all pending commands, which may use it. The requests of one submission have
 // the same images.
 bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error);

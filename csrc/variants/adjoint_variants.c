@@ -256,7 +256,8 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
 
     *fits = (filter || blend || threshold) && vkb_are_floats(choice, pass)
          && (filter ? fits_lists(choice->graph, pass, MAX_WORDS)
-                    : !pass->constants.masked && pass->constants.by <= BY_BLOOM)
+                    : !pass->constants.masked
+                          && (pass->constants.by <= BY_BLOOM || pass->constants.by == BY_MIXED))
          && (!threshold
              || (pass->constants.alpha != ALPHA_BLUR
                  && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0])));

@@ -9,7 +9,8 @@ static const struct access_info {
     VkPipelineStageFlags stages;
     VkAccessFlags reads, writes;
     VkImageLayout layout;
-    bool attachment;  // accesses only the pixel's own position
+    VkImageUsageFlags usage;  // that an image must have
+    bool attachment;          // accesses only the pixel's own position
 } accesses[VKB_ACCESS_COUNT] = {
     [VKB_ACCESS_NONE] =
         {
@@ -21,6 +22,7 @@ static const struct access_info {
             .stages = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT,
             .writes = VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT,
             .attachment = true,
         },
     [VKB_ACCESS_COLOR_BLEND] =
@@ -29,6 +31,7 @@ static const struct access_info {
             .reads = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT,
             .writes = VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT,
             .attachment = true,
         },
     [VKB_ACCESS_DEPTH_TARGET] =
@@ -37,6 +40,7 @@ static const struct access_info {
             .reads = VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT,
             .writes = VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT,
             .attachment = true,
         },
     [VKB_ACCESS_SAMPLED] =
@@ -44,24 +48,28 @@ static const struct access_info {
             .stages = VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
             .reads = VK_ACCESS_SHADER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_SAMPLED_BIT,
         },
     [VKB_ACCESS_DISPATCH_SAMPLED] =
         {
             .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
             .reads = VK_ACCESS_SHADER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_SAMPLED_BIT,
         },
     [VKB_ACCESS_DISPATCH_LOADED] =
         {
             .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
             .reads = VK_ACCESS_SHADER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_GENERAL,
+            .usage = VK_IMAGE_USAGE_STORAGE_BIT,
         },
     [VKB_ACCESS_DISPATCH_STORED] =
         {
             .stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
             .writes = VK_ACCESS_SHADER_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_GENERAL,
+            .usage = VK_IMAGE_USAGE_STORAGE_BIT,
         },
     [VKB_ACCESS_DISPATCH_CHANGED] =
         {
@@ -69,6 +77,7 @@ static const struct access_info {
             .reads = VK_ACCESS_SHADER_READ_BIT,
             .writes = VK_ACCESS_SHADER_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_GENERAL,
+            .usage = VK_IMAGE_USAGE_STORAGE_BIT,
         },
     [VKB_ACCESS_ANY_READ] =
         {
@@ -90,12 +99,14 @@ static const struct access_info {
             .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
             .reads = VK_ACCESS_TRANSFER_READ_BIT,
             .layout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
         },
     [VKB_ACCESS_COPY_TARGET] =
         {
             .stages = VK_PIPELINE_STAGE_TRANSFER_BIT,
             .writes = VK_ACCESS_TRANSFER_WRITE_BIT,
             .layout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+            .usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT,
         },
     // The stage of the wait for the semaphore, after which the barrier comes.
     [VKB_ACCESS_ACQUIRED] =
@@ -114,6 +125,11 @@ static const struct access_info {
 VkImageLayout vkb_access_layout(enum vkb_access access)
 {
     return accesses[access].layout;
+}
+
+VkImageUsageFlags vkb_access_usage(enum vkb_access access)
+{
+    return accesses[access].usage;
 }
 
 VkPipelineStageFlags vkb_access_stages(enum vkb_access access)

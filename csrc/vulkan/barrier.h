@@ -25,6 +25,7 @@ enum vkb_access {
 };
 
 VkImageLayout vkb_access_layout(enum vkb_access access);
+VkImageUsageFlags vkb_access_usage(enum vkb_access access);
 VkPipelineStageFlags vkb_access_stages(enum vkb_access access);
 
 // Records the barrier between two accesses: for an image with the given layouts (NULL: its layout

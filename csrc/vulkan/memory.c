@@ -456,6 +456,11 @@ static bool map_image(const struct vkb_device *device, struct vkb_image *image,
     return true;
 }
 
+// Images with none of these have no view.
+#define VIEWED \
+    (VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT \
+     | VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT)
+
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error)
 {
@@ -469,6 +474,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .height = spec->height,
         .layers = spec->layers,
         .levels = spec->levels,
+        .usage = spec->usage,
         .array = spec->array,
         .channels = vkb_formats[spec->format].channels,
     };
@@ -480,7 +486,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                                 &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || ((spec->layers == 1 || spec->array)
+        || ((spec->layers == 1 || spec->array) && (spec->usage & VIEWED)
             && !create_view(device, image, spec->levels, &image->view, error))) {
         vkb_image_destroy(device, image);
         return false;

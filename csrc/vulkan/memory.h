@@ -30,6 +30,7 @@ struct vkb_image {
     VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
     enum vkb_format format;
     uint32_t width, height, layers, levels;
+    VkImageUsageFlags usage;
     bool array;              // its view is of an array, also of six layers
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible

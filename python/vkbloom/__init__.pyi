@@ -16,11 +16,8 @@ from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
 from ._gradients import vjp
-from ._grid import reductions
 from ._grid.checking import GridReport, check_grid
-from ._grid.curves import response_curves
 from ._grid.grid import grid
-from ._grid.sheet import contact_sheet
 from ._io.array_files import read, write
 from ._methods.babylon import BabylonBloom
 from ._methods.bevy import BevyBloom
@@ -94,7 +91,6 @@ __all__ = [
     "apply",
     "capture",
     "check_grid",
-    "contact_sheet",
     "default_renderer",
     "explore",
     "fit",
@@ -106,10 +102,8 @@ __all__ = [
     "presets",
     "psf",
     "read",
-    "reductions",
     "reference",
     "render",
-    "response_curves",
     "testing",
     "translate",
     "vjp",

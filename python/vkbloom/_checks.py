@@ -9,6 +9,9 @@ from __future__ import annotations
 import importlib
 import math
 import operator
+import signal
+import sys
+import threading
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import ModuleType
 from typing import Any
@@ -61,11 +64,31 @@ _MODE_HINTS = {
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
     """Import a package that one of vkbloom's extras installs."""
     try:
-        return importlib.import_module(package)
+        return sys.modules.get(package) or _imported(package)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
             f"{purpose} needs {package}: pip install vkbloom[{extra}]", name=error.name
         ) from error
+
+
+def _imported(package: str) -> ModuleType:
+    """Import a package; Ctrl-C raises after it.
+
+    The modules of nanobind, OpenImageIO's among them, call Python while they are imported, and
+    abort the process if that raises (OpenImageIO 3.2.2).
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    # Python runs signal handlers in the main thread alone.
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        return importlib.import_module(package)
+    interrupts: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        return importlib.import_module(package)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if interrupts:
+            signal.raise_signal(signal.SIGINT)
 
 
 def as_float(name: str, value: Any) -> float:

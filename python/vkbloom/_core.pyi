@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NoReturn, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ MAX_LAYERS: int
 MAX_STAGES: int
 MAX_GHOSTS: int
 
-AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str, int, bool]
+_AdapterTuple = tuple[str, str, str, str, str, bytes, bool, str, str, int, bool]
 _Array = NDArray[Any]
 _ExportedImage = (
     tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str]
@@ -47,7 +47,7 @@ class ValidationError(Error): ...
 class ShaderError(Error): ...
 
 def fail_without_adapter(text: str, /) -> NoReturn: ...
-def adapters(driver: str, /) -> list[AdapterTuple]: ...
+def adapters(driver: str, /) -> list[_AdapterTuple]: ...
 def image_source(
     image: _Array | _ExportedImage,
     emission: _Array | _ExportedImage | None = None,
@@ -84,6 +84,7 @@ def read_dlpack(
 ) -> tuple[int, tuple[int, int], tuple[int, int, int], tuple[int, ...], tuple[int, ...] | None]: ...
 def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
 
+@final
 class Renderer:
     def __new__(
         cls,
@@ -100,7 +101,7 @@ class Renderer:
     @property
     def lost(self) -> bool: ...
     @property
-    def info(self) -> AdapterTuple: ...
+    def info(self) -> _AdapterTuple: ...
     @property
     def pipeline_count(self) -> int: ...
     @property
@@ -149,6 +150,7 @@ class Renderer:
         self, what: str, address: int, size: int, stream: int, waits: bool, /
     ) -> Exported: ...
 
+@final
 class Source:
     @property
     def kind(self) -> tuple[tuple[int, int, int], str]: ...
@@ -157,6 +159,7 @@ class Source:
     @property
     def exported(self) -> bool: ...
 
+@final
 class Plan:
     @property
     def outputs(self) -> tuple[tuple[str, tuple[int, ...], str], ...]: ...
@@ -171,19 +174,23 @@ class Plan:
     def shares_images(self, other: Plan, /) -> bool: ...
     def is_of_image(self, source: Source, /) -> bool: ...
 
+@final
 class Resource: ...
 
+@final
 class Shader:
     @property
     def name(self) -> str: ...
     @property
     def hash(self) -> str: ...
 
+@final
 class Submission:
     @property
     def ordered(self) -> bool: ...
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, ...]]: ...
 
+@final
 class Exported:
     @property
     def address(self) -> int: ...
@@ -205,6 +212,7 @@ class Exported:
     def write(self, array: _Array, /) -> None: ...
     def copy_to(self, address: int, size: int, stream: int, offset: int = 0, /) -> None: ...
 
+@final
 class Pages:
     def __len__(self) -> int: ...
     def __buffer__(self, flags: int, /) -> memoryview: ...

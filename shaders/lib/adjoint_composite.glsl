@@ -135,23 +135,26 @@ vec4 by_values(Pixel p)
     return vec4(by_intensity, p.by_curves, 0.0);
 }
 
+vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by, bool side)
+{
+    growing = side;
+    Pixel p = pixel_of(given, bloom, share, cotangent);
+    if (by == BY_MIXED)
+        return vec4(p.by_mixed, p.brought.a);
+    if (by >= BY_VALUES)
+        return by_values(p);
+    if (by == BY_MASK)
+        return vec4(-params.intensity * dot(p.by_mixed, p.scene.rgb), 0.0, 0.0, 0.0);
+    return by == BY_BLOOM ? by_bloom(p) : by_scene(p);
+}
+
 // GROUPS is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
-// sides is that of the clamp.
+// sides is that of the clamp. BY_MIXED is of the picture before exposure and curves, which adds a share of
+// the bloom to a share of the scene.
 vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 {
-    vec4 sum = vec4(0.0), grown;
-    int side = 0;
-    for (; follow(side); ++side) {
-        Pixel p = pixel_of(given, bloom, share, cotangent);
-        if (by >= BY_VALUES)
-            sum += by_values(p);
-        else if (by == BY_MASK)
-            sum.r -= params.intensity * dot(p.by_mixed, p.scene.rgb);
-        else
-            sum += by == BY_BLOOM ? by_bloom(p) : by_scene(p);
-        if (side == 0)
-            grown = sum;
-    }
+    vec4 grown = back_on_side(given, bloom, share, cotangent, by, true);
+    vec4 mean = mean_of_sides(grown, back_on_side(given, bloom, share, cotangent, by, false));
     bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
-    return mix(sum / float(side), grown, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
+    return mix(mean, grown, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
 }

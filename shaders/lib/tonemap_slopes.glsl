@@ -1,21 +1,19 @@
 // Cotangents through tone maps and encodings (tonemap.glsl): of a curve's argument from those of its
 // result. At kinks, the derivative is the mean of both sides. Each side is followed through all curves:
-// the mean of a clamp of a clamp is not the product of their means. Equal channels have equal shares.
+// the mean of a clamp of a clamp is not the product of their means. Both are computed always, since a loop
+// over them is slow: what they share is computed once. Equal channels have equal shares.
 
-bool growing, at_kink;
+// The side that is followed.
+bool growing;
 
-// Whether to follow this side, after the ones before it: the second one only if there was a kink.
-bool follow(int side)
+vec4 mean_of_sides(vec4 grown, vec4 shrunk)
 {
-    growing = side == 0;
-    at_kink = at_kink && side > 0;
-    return side < (at_kink ? 2 : 1);
+    return mix(0.5 * (grown + shrunk), grown, equal(grown, shrunk));
 }
 
 // 1 above a kink, 0 below it.
 vec3 above(vec3 value, float kink)
 {
-    at_kink = at_kink || any(equal(value, vec3(kink)));
     return growing ? vec3(greaterThanEqual(value, vec3(kink))) : vec3(greaterThan(value, vec3(kink)));
 }
 

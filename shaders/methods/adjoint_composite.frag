@@ -31,5 +31,5 @@ SUM_OF_BLOCK(back)
 
 vec4 shade()
 {
-    return BY >= BY_VALUES ? sum_of_block(textureSize(scene, 0)) : gathered(back(PIXEL));
+    return BY == BY_VALUES || BY == BY_SQUARES ? sum_of_block(textureSize(scene, 0)) : gathered(back(PIXEL));
 }

@@ -54,8 +54,9 @@ Parts back_blend(vec3 s, vec3 bloom_light, float share, vec3 brought)
     return Parts(by_sum, by_sum);
 }
 
-vec4 to_one_side(vec4 pixel)
+vec4 to_one_side(vec4 pixel, bool side)
 {
+    growing = side;
     Pixel p;
     p.scene = finite_or_zero(pixel);
     p.bloom = texelFetch(bloom, PIXEL, 0);
@@ -75,9 +76,6 @@ vec4 to_one_side(vec4 pixel)
 
 vec4 shade()
 {
-    vec4 pixel = texelFetch(scene, PIXEL, 0), sum = vec4(0.0);
-    int side = 0;
-    for (; follow(side); ++side)
-        sum += to_one_side(pixel);
-    return gathered(sum / float(side));
+    vec4 pixel = texelFetch(scene, PIXEL, 0);
+    return gathered(mean_of_sides(to_one_side(pixel, true), to_one_side(pixel, false)));
 }

@@ -12,14 +12,22 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, smaller);
 READ_IMAGE(2, own);
+#ifdef MIXED
+READ_IMAGE(3, cotangents);
+WRITE_IMAGE(4);
+#define COTANGENT(pixel) \
+    load_floats(cotangents, read_shapes[2], min(pixel.x, read_shapes[2].x - 1), pixel.y)
+#else
 WRITE_IMAGE(3);
+#endif
+#include "lib/ended.glsl"
 
 #define HAS_OWN true
 #define WORDS_COLUMNS DOUBLE_FINAL_COLUMNS
 
 uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
 {
-    return finished(scene, finish(value_of(scene), as_stored(sum, FORMAT), pixel));
+    return ended(scene, as_stored(sum, FORMAT), pixel);
 }
 
 #include "variants/double.glsl"

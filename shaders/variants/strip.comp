@@ -6,8 +6,16 @@
 #include "variants/pixels.glsl"
 
 #define STRIP_CHANNELS SOURCE_CHANNELS
+#ifdef MIXED
+#define STRIP_TARGET 3
+READ_IMAGE(2, cotangents);
+#define COTANGENT(pixel) \
+    load_floats(cotangents, read_shapes[1], clamp(pixel.x, 0, read_shapes[1].x - 1), pixel.y)
+#else
 #define STRIP_TARGET 2
+#endif
 #include "variants/strip.glsl"
+#include "lib/ended.glsl"
 
 float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
 
@@ -62,5 +70,5 @@ void end_columns(int x, int at, int width, inout vec3 sums[ROWS][COLUMNS])
 
 uvec4 finished_pixel(uvec4 raw, vec3 sum, ivec2 pixel)
 {
-    return finished(raw, finish(value_of(raw), vec4(as_stored(sum, FORMAT), 1.0), pixel));
+    return ended(raw, vec4(as_stored(sum, FORMAT), 1.0), pixel);
 }

@@ -1,14 +1,21 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // The complete bloom of an image for GPUs. A workgroup writes a tile, and keeps its vertical sums
-// in shared memory between the two blurs. With COMPOSITE_OFF it is the bloom alone.
+// in shared memory between the two blurs.
 #include "variants/fused_bloom.glsl"
 
 const int RUN = TILE_ROWS / TILE_RUNS;
 
 layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
 layout(set = 0, binding = 1) uniform sampler2D image;
+#ifdef MIXED
+layout(set = 0, binding = 2) uniform sampler2D cotangents;
+layout(set = 0, binding = 3) uniform writeonly image2D target;
+#define COTANGENT(pixel) texelFetch(cotangents, pixel, 0)
+#else
 layout(set = 0, binding = 2) uniform writeonly image2D target;
+#endif
+#include "lib/ended.glsl"
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
 // that neighbours are in neighbouring banks.
@@ -87,9 +94,7 @@ void main()
         ivec2 pixel = first + ivec2(column, row);
         if (pixel.y > last.y)
             continue;
-        vec4 result = vec4(sum_horizontally(row, column), 1.0);
-        if (COMPOSITE != COMPOSITE_OFF)
-            result = finish(texelFetch(image, pixel, 0), result, pixel);
-        imageStore(target, pixel, result);
+        vec4 bloom = vec4(sum_horizontally(row, column), 1.0);
+        imageStore(target, pixel, ended(texelFetch(image, pixel, 0), bloom, pixel));
     }
 }

@@ -167,11 +167,6 @@ ERRORS = """
 2 : translate --preset kino => Missing option '--to'
 2 : translate --preset kino --to pyramids => 'pyramids'; did you mean 'pyramid'?
 2 : translate --preset kino --to pyramid --vary levls => did you mean 'levels'?
-2 : glares --sheet a.png => --sheet IMAGE and --out FILE need each other
-2 : glares -o a.png => --sheet IMAGE and --out FILE need each other
-2 : glares --sheet a.png -o b.jpg => --out: b.jpg does not end in .png
-1 : glares --sheet none.png -o b.png => none.png: No such file
-1 : glares --sheet none.png -o none/b.png => none/b.png: there is no folder none
 """
 
 

@@ -79,3 +79,17 @@ def test_what_ignores_interrupts_goes_on_to_do_so() -> None:
     )
     ended = python("-c", code, "20", "script", "glares", "--json")
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_imports_of_compiled_packages_are_not_interrupted(tmp_path: Path) -> None:
+    """An exception inside of nanobind's modules aborts the process."""
+    (tmp_path / "compiled.py").write_text(
+        "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = 1\n"
+    )
+    code = (
+        "import sys; from vkbloom._checks import import_extra\n"
+        "try: import_extra('compiled', 'images', '')\n"
+        "except KeyboardInterrupt: print(sys.modules['compiled'].whole)"
+    )
+    ended = python("-c", code, cwd=tmp_path)
+    assert (ended.returncode, ended.stdout) == (0, "1\n"), ended.stderr

@@ -47,6 +47,10 @@ Result = TypeVar("Result")
 core: Any = _core  # arm_fault, fault_state and forget_instances are in test builds only
 
 
+def mean(frames: vkbloom.Frames) -> float:
+    return float(frames["final"].mean())
+
+
 def textured() -> Scene:
     """Return a scene with textures of two meshes, of which one emits."""
     colours = np.random.default_rng(1).random((5, 7, 4)).astype(np.float16)
@@ -184,7 +188,7 @@ def stored_grid(renderer: Renderer) -> Arrays:
         AXES,
         store=FOLDER,
         chunks={"exposure": 2},
-        reduce={"mean": vkbloom.reductions.Mean()},
+        reduce={"mean": mean},
         progress=False,
         renderer=renderer,
     )

@@ -26,10 +26,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     save(Picture.of_values(photo, "half"), "photo.exr")
     write("photo.jpg", photo.astype(np.float32))
     np.save("picture.npy", photo)
-    (own,) = blocks(ROOT / "docs" / "custom_methods.md", "glsl")
-    Path("soft.hook").write_text(own)
-    (twin,) = [
-        text for text in blocks(ROOT / "docs" / "custom_methods.md", "python") if "def soft" in text
-    ]
-    Path("twin.py").write_text(twin)
+    custom = ROOT / "docs" / "custom_methods.md"
+    (passes,) = blocks(custom, "glsl")
+    Path("soft.hook").write_text(passes)
+    (function,) = [text for text in blocks(custom, "python") if "def soft" in text]
+    Path("soft_reference.py").write_text(function)
     return tmp_path

@@ -29,7 +29,7 @@ def render(store: Path, part: str | None) -> None:
         },
         store=store,
         chunks={"blur_strength": 4},
-        reduce={"mean": vkbloom.reductions.Mean()},
+        reduce={"framebuffers": len},
         part=part,
         progress=False,
     )

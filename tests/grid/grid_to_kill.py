@@ -22,7 +22,7 @@ def fill(store: Path | str) -> None:
         },
         store=store,
         chunks={"exposure": 20, "blur_strength": 1},
-        reduce={"mean": vkbloom.reductions.Mean()},
+        reduce={"framebuffers": len},
         progress=False,
     )
 

@@ -17,7 +17,7 @@ import pytest
 import vkbloom
 from tests.grid.stores import contents
 from tests.images import noise
-from vkbloom import Frames, Separable, check_grid, reductions
+from vkbloom import Frames, Separable, check_grid
 from vkbloom._grid import cluster
 
 distributed = pytest.importorskip("distributed")
@@ -28,7 +28,7 @@ AXES: dict[str, Any] = {
     "blur_scale": np.linspace(0.5, 2, 6),
     "threshold": [None, 0.2],
 }
-REDUCE = {"mean": reductions.Mean(), "psnr": reductions.PSNR(against={"blur_scale": 0.5})}
+REDUCE = {"peak": lambda frames: float(frames["final"].max())}
 
 # Of sockets and event loops that Dask leaves to the garbage collector.
 pytestmark = [
@@ -90,7 +90,6 @@ def test_workers_write_what_one_process_writes(
     assert made["done"].values.all()
     # What the workers ran, counted here: the two first points of the workers at least.
     assert made.attrs["passes_run"] > 0
-    assert made.attrs["passes_saved"] > 0
 
 
 def test_renderers_are_kept_between_runs_and_closed_at_the_end(client: Any, tmp_path: Path) -> None:
@@ -142,9 +141,9 @@ def test_few_tasks_at_a_time(client: Any, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_refused_store_leaves_no_renderer(client: Any, tmp_path: Path) -> None:
-    make(tmp_path / "a.zarr", client, reduce={"n": reductions.Max()}, framebuffers=())
+    make(tmp_path / "a.zarr", client, reduce={"n": len}, framebuffers=())
     with pytest.raises(ValueError, match="another grid"):
-        make(tmp_path / "a.zarr", client, reduce={"n": reductions.Mean()}, framebuffers=())
+        make(tmp_path / "a.zarr", client, reduce={"n": slow_mean}, framebuffers=())
     assert list(client.run(lambda: len(cluster._held)).values()) == [0, 0]
 
 

@@ -143,16 +143,13 @@ def test_another_grid_is_refused(tmp_path: Path) -> None:
         make(tmp_path / "a.zarr", part=(2, 2), framebuffers=("bloom",))
 
 
-def test_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_line(tmp_path: Path) -> None:
     image = tmp_path / "a.png"
     vkbloom.write(image, noise(12, 10, 3, dtype="uint8"))
     for out in ("whole", "parts"):
         words = ["grid", str(image), "-o", str(tmp_path / out), "--axis", "intensity=0:1:6"]
         for number in "20" if out == "parts" else [""]:
-            if number:
-                monkeypatch.setenv("SLURM_ARRAY_TASK_ID", number)
-                monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "3")
-            more = ["--part", "auto"] if number else []
+            more = ["--part", f"{number}/3"] if number else []
             done = CliRunner().invoke(program, [*words, *more])
             assert done.exit_code == 0, done.output
         assert len(list((tmp_path / out).glob("*.png"))) == (4 if out == "parts" else 6)
@@ -160,23 +157,6 @@ def test_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done = CliRunner().invoke(program, [*words, "--part", "1/3"])
     assert contents(tmp_path / "whole") == contents(tmp_path / "parts")
     assert CliRunner().invoke(program, [*words, "--part", "4/3"]).exit_code == 2
-
-
-def test_numbers_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT"):
-        monkeypatch.delenv(name, raising=False)
-    with pytest.raises(ValueError, match="is not known without SLURM_ARRAY_TASK_ID; write I/N"):
-        read_part("auto/3")
-    monkeypatch.setenv("SLURM_ARRAY_TASK_ID", "2")
-    assert read_part("auto/16") == (2, 16)
-    with pytest.raises(ValueError, match="is not I/N"):
-        read_part("auto")
-    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "4")
-    assert read_part("auto") == (2, 4)
-    # The tasks 2 and 7 alone, which a count does not tell.
-    monkeypatch.setenv("SLURM_ARRAY_TASK_ID", "7")
-    with pytest.raises(ValueError, match="7 of 4 is not 1 to 4; write auto/N"):
-        read_part("auto")
 
 
 @pytest.mark.parametrize("part", [(0, 0), (17, 16), (-1, 16), "3", "3/", "a/b", "1/2/3", ""])

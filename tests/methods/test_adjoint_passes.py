@@ -172,12 +172,14 @@ def test_the_cubic_filter_of_large_frames_is_transposed(renderer: Renderer) -> N
     check(pullback(cotangents), expected, "image")
 
 
-#: Sizes of several tiles, and kernels of all lengths that tiles have.
+#: Sizes of several tiles, and kernels of all lengths that tiles have, with the number of passes; 0:
+#: the composite is no sum.
 TILED = (
     (Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61), "f4", 2),
     (Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50), "f4", 1),
-    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", 2),
-    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", 2),
+    (Separable(blur_scale=4, tonemap="aces"), (9, 40), "f2", 2),
+    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", 0),
+    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", 0),
     (Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1), "u1", 2),
 )
 
@@ -198,7 +200,8 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             plan = renderer._core.adjoint(source, floats, ("final",), False)
             assert plan
             shaders = [shader for _, shader, *_ in plan.passes]
-            assert shaders == ["tile_comp", "adjoint_tile_comp"][2 - passes :]
+            tiles = ["tile_mixed_comp", "adjoint_tile_comp"]
+            assert (shaders == tiles[2 - passes :]) if passes else (tiles[1] not in shaders)
             # The sums need the images between; the other derivatives keep their bits.
             both = Passes(renderer, Inputs(image), floats, cotangents)
             both.fields()
@@ -257,13 +260,15 @@ def test_levels_are_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None
             assert exact == sorted(passes.split()), (size, shaders)
 
 
-#: Several strips, less than one, and less than a kernel.
+#: Several strips, less than one, and less than a kernel. A curve needs the bloom.
 STRIPS = (
-    (Separable(threshold=0.5, knee=0.5), (35, 261, 3)),
-    (Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4)),
-    (Separable(composite="mix", intensity=0.4), (3, 9, 3)),
-    (Separable(threshold=0.2, knee=0.3), (1, 70, 4)),
-    (Separable(), (7, 1, 3)),
+    (Separable(threshold=0.5, knee=0.5), (35, 261, 3), 1),
+    (Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4), 1),
+    (Separable(threshold=0.5, tonemap="reinhard", exposure=0.5), (70, 50, 4), 2),
+    (Separable(composite="mix", intensity=0.4), (3, 9, 3), 1),
+    (Separable(composite="mix", intensity=0.4, tonemap="aces"), (3, 9, 3), 2),
+    (Separable(threshold=0.2, knee=0.3), (1, 70, 4), 1),
+    (Separable(), (7, 1, 3), 1),
 )
 
 
@@ -272,9 +277,14 @@ def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
     random = np.random.default_rng(1)
     with Renderer("software") as renderer:
-        for settings, size in STRIPS:
+        for settings, size, passes in STRIPS:
             shaders = shaders_of_transpose(renderer, settings, size, random)
-            assert shaders == ["adjoint_strip_words_rgba32float"]
+            strips = ["strip_mixed_words_rgba32float", "adjoint_strip_words_rgba32float"]
+            assert shaders == strips[2 - passes :]
+        for levels, ends in ((Pyramid, "double_final"), (DualKawase, "filter_final")):
+            curved = levels(levels=1, threshold=0.5, tonemap="aces")
+            shaders = shaders_of_transpose(renderer, curved, (8, 32, 3), random)
+            assert f"{ends}_mixed_words_rgba32float" in shaders
 
 
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import vkbloom
-from vkbloom import reductions
 from vkbloom._views.comparison import compare, flip_map
 
 A = np.random.default_rng(0).random((24, 32, 3), np.float32)
@@ -33,12 +31,6 @@ def test_flip_sees_less_from_far_away() -> None:
     assert flip_map(A, B, pixels_per_degree=20).mean(dtype=np.float64) == pytest.approx(near)
 
 
-def test_the_reduction_takes_it() -> None:
-    frames = vkbloom.Frames({"final": B}, timings={}, settings=vkbloom.Separable(), info={})
-    found = reductions.FLIP(against=A, pixels_per_degree=20)(frames)
-    assert found == compare(A, B, metrics=["flip"], pixels_per_degree=20).flip
-
-
 @pytest.mark.parametrize("name", ["nits_per_unit", "pixels_per_degree"])
 @pytest.mark.parametrize("value", [0, -1, np.inf, np.nan])
 def test_out_of_range(name: str, value: float) -> None:
@@ -49,20 +41,13 @@ def test_out_of_range(name: str, value: float) -> None:
 def test_vdp_needs_both() -> None:
     with pytest.raises(ValueError, match="nits_per_unit: None is not a number; the metric cvvdp"):
         compare(A, B, metrics=["cvvdp"], pixels_per_degree=60)
-    with pytest.raises(ValueError, match="pixels_per_degree: None is not a number; ColorVideoVDP"):
-        reductions.ColorVideoVDP(against=A, nits_per_unit=100)
 
 
 def test_vdp_that_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pycvvdp", None)
-    monkeypatch.setattr(reductions, "find_spec", lambda name: None)
     found = compare(A, B, metrics=["cvvdp"], nits_per_unit=100, pixels_per_degree=60)
     assert found.cvvdp is None
     assert found.not_computed["cvvdp"].endswith("needs pycvvdp: pip install vkbloom[cvvdp]")
-    with pytest.warns(UserWarning, match=r"left out: it needs pycvvdp, pip install vkbloom\[cvv"):
-        reduction = reductions.ColorVideoVDP(against=A, nits_per_unit=100, pixels_per_degree=60)
-    frames = vkbloom.Frames({"final": B}, timings={}, settings=vkbloom.Separable(), info={})
-    assert np.isnan(reduction(frames))
 
 
 class Package:

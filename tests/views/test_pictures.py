@@ -1,4 +1,4 @@
-"""Pictures of framebuffers: PNG, and contact sheets as HTML and as PNG."""
+"""Pictures of framebuffers: PNG, and contact sheets as HTML."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ import dataclasses
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
@@ -22,7 +20,7 @@ from vkbloom import Separable
 from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._renderer.frames import Frames
-from vkbloom._views.pictures import contact_sheet_png, picture
+from vkbloom._views.pictures import picture
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -105,7 +103,7 @@ class TestPng:
 
     def test_leaves_the_framebuffers_as_they_are(self, frames: Frames) -> None:
         before = {name: array.tobytes() for name, array in frames.items()}
-        frames._repr_png_(), frames._repr_html_(), contact_sheet_png(frames)
+        frames._repr_png_(), frames._repr_html_()
         assert {name: array.tobytes() for name, array in frames.items()} == before
 
     def test_empty(self) -> None:
@@ -216,74 +214,6 @@ class TestHtml:
         image = np.broadcast_to(ramp[np.newaxis, :, np.newaxis], (1080, 1920, 4))
         page = make({f"down_{level}": image for level in range(9)})._repr_html_()
         assert len(page) < 100_000
-
-
-class TestContactSheet:
-    def test_holds_every_picture_in_rows(self, tmp_path: Path) -> None:
-        colours = {"glow": (250, 0, 0), "bloom": (0, 250, 0), "final": (0, 0, 250)}
-        heights = {"glow": 90, "bloom": 45, "final": 90}
-        frames = make(
-            {name: np.full((heights[name], 160, 3), colours[name], np.uint8) for name in colours}
-        )
-        sheet = decode(contact_sheet_png(frames, columns=2, width=160), tmp_path)
-        # Margins of 11 pixels, two lines of title, three of labels; "bloom" is half as high.
-        boxes = {"glow": (33, 11), "bloom": (33 + 22, 182), "final": (33 + 90 + 44, 11)}
-        for name, colour in colours.items():
-            rows, columns = np.nonzero((sheet == colour).all(axis=2))
-            assert len(rows) == heights[name] * 160
-            assert (rows.min(), columns.min()) == boxes[name]
-            assert (rows.max(), columns.max()) == (
-                boxes[name][0] + heights[name] - 1,
-                boxes[name][1] + 159,
-            )
-
-    def test_labels_are_drawn(
-        self, frames: Frames, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        labelled = decode(contact_sheet_png(frames), tmp_path)
-        monkeypatch.setitem(sys.modules, "OpenImageIO", None)
-        with pytest.warns(UserWarning, match=r"no labels.*vkbloom\[images\]"):
-            data = contact_sheet_png(frames)
-        monkeypatch.undo()
-        bare = decode(data, tmp_path)
-        changed = np.nonzero((labelled != bare).any(axis=(1, 2)))[0]
-        assert labelled.shape == bare.shape
-        # A title, then two lines below each of the two rows of pictures.
-        assert np.count_nonzero(np.diff(changed) > 50) == 2
-        assert labelled[changed].max() > 200
-
-    def test_missing_fonts_are_a_warning(
-        self, frames: Frames, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(oiio.ImageBufAlgo, "render_text", lambda *arguments: False)
-        with pytest.warns(UserWarning, match="no labels"):
-            assert contact_sheet_png(frames).startswith(b"\x89PNG")
-
-    @pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1)])
-    def test_strips_stay_within_bounds(self, size: tuple[int, int], tmp_path: Path) -> None:
-        frames = make(
-            {"glow": noise(4, 4, 4, dtype="uint8"), "final": noise(*size, 3, dtype="uint8")}
-        )
-        sheet = decode(contact_sheet_png(frames), tmp_path)
-        assert max(sheet.shape) < 1000
-
-    @pytest.mark.parametrize(
-        ("arguments", "error", "message"),
-        [
-            ({"columns": 0}, ValueError, "columns: 0 is outside 1 to 32"),
-            ({"width": 127}, ValueError, "width: 127 is outside 128 to 4096"),
-            ({"width": 320.0}, TypeError, "width: 320.0 is not an integer"),
-        ],
-    )
-    def test_arguments_out_of_range(
-        self, frames: Frames, arguments: dict[str, Any], error: type[Exception], message: str
-    ) -> None:
-        with pytest.raises(error, match=message):
-            contact_sheet_png(frames, **arguments)
-
-    def test_empty(self) -> None:
-        with pytest.raises(ValueError, match="frames"):
-            contact_sheet_png(make({}))
 
 
 @pytest.mark.parametrize("name", list(vkbloom.presets))

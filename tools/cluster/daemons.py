@@ -1,6 +1,6 @@
-"""Slurm, SSH and Ray with two nodes on this machine, which share nothing with an installed service.
+"""Slurm with two nodes on this machine, which share nothing with an installed service.
 
-Configuration, keys, logs and state are below one folder; the ports are free ones. A node is a
+Configuration, logs and state are below one folder; the ports are free ones. A node is a
 daemon and what it runs. `end` ends a node as if its machine failed.
 """
 
@@ -10,11 +10,8 @@ import contextlib
 import ctypes
 import getpass
 import os
-import shutil
 import socket
 import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +21,6 @@ import psutil
 
 NODES = ("node1", "node2")
 CORES = 4  # of each node, as the scripts ask for
-STORE_BYTES = 500_000_000  # for the objects of a node of Ray
 PR_SET_CHILD_SUBREAPER = 36
 
 
@@ -125,8 +121,7 @@ class Cluster:
         """Return the process of a node that renders; None if there is none yet."""
         for process in self.processes(name):
             with contextlib.suppress(psutil.Error):
-                line = process.cmdline()
-                if "--multiprocessing-fork" in line or line[:1] == ["ray::part"]:
+                if "--multiprocessing-fork" in process.cmdline():
                     return process
         return None
 
@@ -201,94 +196,3 @@ PartitionName=main Nodes=ALL Default=YES
             return len(asked.stdout.split()) == len(NODES)
 
         wait_until(idle, "idle nodes", 120)
-
-
-class Ssh(Cluster):
-    """An sshd for each node and for the scheduler, with keys of their own."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        self._client = folder / "home" / ".ssh"
-        self._client.mkdir(parents=True)
-        # asyncssh reads its configuration there.
-        self.environ = {"HOME": str(folder / "home")}
-        self._key = folder / "key"
-        output("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", self._key)
-        public = self._key.with_suffix(".pub").read_text()
-        (self._client / "known_hosts").write_text(f"* {public}[*]:* {public}")
-        # sshd does not start without this folder, which is empty.
-        Path("/run/sshd").mkdir(exist_ok=True)
-        self._ports = {name: free_port() for name in ("node0", *NODES)}
-        (self._client / "config").write_text(
-            "".join(
-                f"Host {name}\n  HostName 127.0.0.1\n  Port {port}\n  IdentityFile {self._key}\n"
-                for name, port in self._ports.items()
-            )
-        )
-        for name in self._ports:
-            self.start_node(name)
-        self.wait()
-
-    def start(self, name: str, **environ: str) -> psutil.Process:
-        """Start sshd, which gives its sessions the variables."""
-        variables = " ".join(f'"{key}={value}"' for key, value in environ.items())
-        config = self.folder / f"{name}.conf"
-        config.write_text(
-            f"""ListenAddress 127.0.0.1
-Port {self._ports[name]}
-HostKey {self._key}
-AuthorizedKeysFile {self._key}.pub
-PidFile none
-StrictModes no
-UsePAM no
-SetEnv {variables}
-"""
-        )
-        return self.daemon(name, str(shutil.which("sshd")), "-D", "-e", "-f", config, **environ)
-
-    def wait(self) -> None:
-        """Wait until all ports are open."""
-
-        def opened() -> bool:
-            with contextlib.suppress(OSError):
-                for port in self._ports.values():
-                    socket.create_connection(("127.0.0.1", port)).close()
-                return True
-            return False
-
-        wait_until(opened, "sshd")
-
-
-class Ray(Cluster):
-    """A head without work, and a raylet for each node."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        # Below it are sockets, whose paths must be short.
-        self._session = tempfile.TemporaryDirectory(prefix="ray", ignore_cleanup_errors=True)
-        address = f"127.0.0.1:{free_port()}"
-        # Without a token, which would be written to the home folder.
-        self.environ = {
-            "RAY_ADDRESS": address,
-            "RAY_AUTH_MODE": "disabled",
-            "RAY_USAGE_STATS_ENABLED": "0",
-        }
-        port = address.partition(":")[2]
-        head = ("--head", f"--port={port}", f"--temp-dir={self._session.name}", "--num-cpus=0")
-        self._start("head", *head, "--include-dashboard=false")
-        for name in NODES:
-            self.start_node(name)
-
-    def start(self, name: str, **environ: str) -> psutil.Process:
-        """Start a raylet, whose workers inherit its environment."""
-        options = (f"--address={self.environ['RAY_ADDRESS']}", f"--num-cpus={CORES}")
-        return self._start(name, *options, **environ)
-
-    def _start(self, name: str, *options: str, **environ: str) -> psutil.Process:
-        ray = Path(sys.executable).with_name("ray")
-        memory = f"--object-store-memory={STORE_BYTES}"
-        started = self.daemon(name, ray, "start", "--block", memory, *options, **environ)
-        # Two that start at the same time would take the same ports.
-        log = self.folder / f"{name}.log"
-        wait_until(lambda: "Ray runtime started" in log.read_text(), f"Ray's {name}", 90)
-        return started

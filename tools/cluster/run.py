@@ -1,9 +1,9 @@
 """Try the scripts of examples/cluster.
 
-Slurm, SSH and Ray, each with two nodes on this machine, render a grid of 2,000 points. A worker is
-killed, then a node with its daemon; the store must have the bytes of a local grid. Then a node has
-another version of vkbloom, then another driver if one is given; each engine must refuse it and name
-both. Prints the times.
+Slurm with two nodes on this machine renders a grid of 2,000 points. A worker is killed, then a node
+with its daemon; the store must have the bytes of a local grid. Then a node has another version of
+vkbloom, then another driver if one is given; the grid must refuse it and name both. Prints the
+times.
 """
 
 from __future__ import annotations
@@ -14,15 +14,13 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import psutil
-from daemons import NODES, Cluster, Ray, Slurm, Ssh, adopt, end, end_all, output, wait_until
+from daemons import NODES, Cluster, Slurm, adopt, end, end_all, output, wait_until
 from workload import IMAGE
 
 import vkbloom
 
 CHUNKS = 200
-IMAGES = 64
 KILLED_PARTS = ("3", "7")
 ORIGIN = "import vkbloom; print(vkbloom.Renderer().info.driver_info)"
 
@@ -127,7 +125,9 @@ class Trials:
         vkbloom.write(self.folder / "picture.exr", IMAGE)
         script = (self.folder / "parts.sbatch").read_text()
         # The number of parts sets the chunks, which must be equal.
-        each = script.replace("auto/16", "$part/16").replace("parts.zarr", "whole.zarr")
+        each = script.replace("$SLURM_ARRAY_TASK_ID/16", "$part/16").replace(
+            "parts.zarr", "whole.zarr"
+        )
         whole = f"SLURM_CPUS_PER_TASK=4; for part in $(seq 16); do\n{each}\ndone"
         begun = time.perf_counter()
         self.finish(self.start("sh", "-c", whole))
@@ -158,24 +158,6 @@ class Trials:
             self.start("sbatch", "--parsable", *options, "parts.sbatch", cluster=slurm)
         ).strip()
 
-    def images(self, cluster: Ray) -> None:
-        """Run the example with Ray Data, and compare its pictures with those of `map`."""
-        noise, inputs = np.random.default_rng(0), self.folder / "images"
-        inputs.mkdir()
-        paths = [inputs / f"{number:03}.exr" for number in range(IMAGES)]
-        for path in paths:
-            vkbloom.write(path, noise.random((360, 640, 3), np.float32) * 2)
-        begun = time.perf_counter()
-        words = ("images_on_ray.py", "images", "pictures")
-        self.finish(self.start(sys.executable, *words, cluster=cluster))
-        self.say("Ray Data", time.perf_counter() - begun)
-        with vkbloom.Renderer() as renderer:
-            expected = renderer.map(map(vkbloom.read, paths), framebuffers="final")
-            for path, frames in zip(paths, expected, strict=True):
-                found = vkbloom.read(self.folder / "pictures" / path.name)
-                if not np.array_equal(found, frames["final"]):
-                    raise RuntimeError(f"{path.name}: other pixels than those of map")
-
 
 def others(folder: Path, driver: str | None) -> list[tuple[tuple[str, str], dict[str, str]]]:
     """Return what is tried as another origin: the two names, and the environment that has it."""
@@ -196,35 +178,23 @@ def driver_of(manifest: str) -> dict[str, str]:
 
 def main() -> None:
     """Try all, and print the table."""
-    engines = {
-        "slurm": (Slurm, ("on_slurm.py",)),
-        "ssh": (Ssh, ("on_ssh.py", "node0", *NODES)),
-        "ray": (Ray, ("on_ray.py",)),
-    }
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("examples", type=Path)
     parser.add_argument("--driver", help="manifest of another driver")
-    parser.add_argument("--only", nargs="+", choices=engines, default=list(engines))
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     adopt()
     trials = Trials(folder / "work", asked.examples)
     try:
         trials.local()
-        for name in asked.only:
-            kind, command = engines[name]
-            begun = time.perf_counter()
-            cluster = kind(folder / "work" / f"{name}.daemons")
-            trials.say(f"{name}: daemons started", time.perf_counter() - begun)
-            trials.killed(cluster, name, *command)
-            if isinstance(cluster, Slurm):
-                trials.parts(cluster)
-            if isinstance(cluster, Ray):
-                trials.images(cluster)
-            for named, environ in others(folder, asked.driver):
-                trials.refused(cluster, name, *command, named=named, **environ)
-            end_all()
+        begun = time.perf_counter()
+        slurm = Slurm(folder / "work" / "slurm.daemons")
+        trials.say("slurm: daemons started", time.perf_counter() - begun)
+        trials.killed(slurm, "slurm", "on_slurm.py")
+        trials.parts(slurm)
+        for named, environ in others(folder, asked.driver):
+            trials.refused(slurm, "slurm", "on_slurm.py", named=named, **environ)
     finally:
         end_all()
     print("\n| | seconds |\n|---|---:|")

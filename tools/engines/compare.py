@@ -106,8 +106,7 @@ def differences(
                 )
             )
         kind = fields["format"] if name == "pygfx" else fields["type"]
-        quality = "" if name == "pygfx" else f", {fields['quality']}"
-        yield f"{kind}{quality}", *found
+        yield kind, *found
 
 
 def rows_of(name: str, table: list[Any], found: list[tuple[str, float, float]]) -> Iterator[Row]:

@@ -64,8 +64,6 @@ def _laid_out(grid: Grid) -> Layout:
         ranking=(0, 1),
         variables={"final": final, "mean": mean},
         coordinates={"rgba": (CHANNELS, {"long_name": "channel"})},
-        reference_size=0,
-        structural=(),
         ran=0,
         adapter="none",
         driver="none",

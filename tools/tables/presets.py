@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from statistics import median
 from typing import Any
 
@@ -51,8 +51,8 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
         )
         found = json.loads(done.stdout)
         verdicts = {law: verdict["held"] for law, verdict in found["laws"].items()}
-        broken = ", ".join(f"`{law}`" for law, held in verdicts.items() if held is False)
-        untested = ", ".join(f"`{law}`" for law, held in verdicts.items() if held is None)
+        broken = listed(law for law, held in verdicts.items() if held is False)
+        untested = listed(law for law, held in verdicts.items() if held is None)
         laws.append([f"`{name}`", broken, untested])
         spread, steady, near = found["psf"], found["stability"], found["nearest_preset"]
         figures.append(
@@ -126,6 +126,11 @@ def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
         )
     within = (f"{share:.0%} within" for share in SHARES)
     return table(["preset", "gain", "added", "light of a point", *within, "passes", "ms"], rows)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as code."""
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _bloom_of(
@@ -234,7 +239,20 @@ def derivatives(renderer: vkbloom.Renderer, quick: bool) -> str:
             [name for name in known if name not in linear],
             [name for name in fields_of(type(settings)) if name not in known],
         )
-        cells = (", ".join(f"`{name}`" for name in names) for names in columns)
         by_image = "device" if on_device(renderer, settings) else "reference"
-        rows.append([f"`{type(settings).__name__}`", by_image, *cells])
-    return table(["method", "by the image", "linear", "curved or piecewise", "none"], rows)
+        rows.append((f"`{type(settings).__name__}`", by_image, columns))
+    # Those of all methods are listed once.
+    always = [[n for n in rows[0][2][i] if all(n in row[2][i] for row in rows)] for i in range(3)]
+    cells = [
+        [
+            name,
+            by_image,
+            *(
+                listed(n for n in column if n not in every)
+                for column, every in zip(columns, always, strict=True)
+            ),
+        ]
+        for name, by_image, columns in rows
+    ]
+    cells.insert(0, ["every method", "", *map(listed, always)])
+    return table(["method", "by the image", "linear", "curved or piecewise", "none"], cells)

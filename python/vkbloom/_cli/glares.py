@@ -1,4 +1,4 @@
-"""``vkbloom glares``: list the stages and published names of glare, or draw a picture with each."""
+"""``vkbloom glares``: list the stages and published names of glare."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from vkbloom._cli.listing import Entry, listing_command
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._settings.glare import Glare, GlareLight
 from vkbloom._settings.registry import STAGES
-from vkbloom._settings.settings import Settings
 
 
 def entries() -> Iterator[Entry]:
@@ -29,14 +28,8 @@ def _entry(name: str, what: str, whose: str, stages: Sequence[Glare]) -> Entry:
     return Entry(name, what, whose, composite, needs_hdr, values)
 
 
-def _shown(entry: Entry, base: Settings) -> Settings:
-    stages = GLARES[entry.name].stages if entry.name in GLARES else (STAGES[entry.name](),)
-    return base.replace(glare=stages)
-
-
 command = listing_command(
     "List what --glare takes: stages and published glares, whose they are, and whether they need "
     "values above 1. Stages add their light to the bloom, dirt multiplies it.",
     entries,
-    _shown,
 )

@@ -57,8 +57,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     FIRST:LAST:COUNT:log, or A,B,... (A;B;... if values contain commas). Repeat --axis for more
     axes; the dimensions have the order of the options.
 
-    Other processes may render other parts at the same time. The part auto/N takes I, and auto also
-    N, from the environment of a job array, such as SLURM_ARRAY_TASK_ID.
+    Other processes may render other parts at the same time.
     """
     is_store = out.endswith(".zarr") or "://" in out
     suffix = f".{given['image_format'].lstrip('.')}"
@@ -89,14 +88,14 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     with opened_renderer(given["adapter"], given["validation"]) as renderer:
         if is_store:
             how |= {"store": out, "progress": not terminal.is_quiet()}
-            found = vkbloom.grid(source, settings, axes, renderer=renderer, **shared, **how).attrs
-            ran, saved = found["passes_run"], found["passes_saved"]
+            stored = vkbloom.grid(source, settings, axes, renderer=renderer, **shared, **how)
+            ran = stored.attrs["passes_run"]
         else:
             how |= {"suffix": suffix, "pictures": pictures, "expand": expand}
-            ran, saved = _write_images(grid, out, renderer, **how)
+            ran = _write_images(grid, out, renderer, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
     points = math.prod(grid.shape)
-    terminal.say(f"wrote {out}, {which}{points} points; passes run {ran}, saved {saved}")
+    terminal.say(f"wrote {out}, {which}{points} points; passes run {ran}")
 
 
 def _source(
@@ -150,10 +149,8 @@ def prepare(folder: Path, own: Mapping[str, Any], *, resume: bool) -> None:
         raise ValueError(f"{folder}: contains another grid; {'; '.join(found)}")
 
 
-def _write_images(
-    grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **how: Any
-) -> tuple[int, int]:
-    """Write a part's points as ``<index along each axis>_<framebuffer>``; return passes run, saved.
+def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **how: Any) -> int:
+    """Write a part's points as ``<index along each axis>_<framebuffer>``; return passes run.
 
     A framebuffer that the format cannot hold is written as ``.exr``.
     """
@@ -168,7 +165,6 @@ def _write_images(
     todo = [i for i in points if not {f"{stems[i]}{name}" for name in laid.variables} <= there]
     done = len(points) - len(todo)
     with progress.Progress(len(points), done, shown=not terminal.is_quiet()) as bar:
-        bar.add(filling.Tally(alone=sum(map(layout.PassCounter(grid, laid, renderer).alone, todo))))
         path = map(grid.point, todo)
         for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
             picture = pictures[int(grid.point(index).place)] if pictures else None
@@ -179,7 +175,7 @@ def _write_images(
                 how["expand"],
             )
             bar.add(filling.Tally(1, len(frames.timings)))
-    return bar.tally.ran, bar.tally.saved
+    return bar.tally.ran
 
 
 def _save(

@@ -1,4 +1,4 @@
-"""``vkbloom presets``: list the presets, or draw a picture with each."""
+"""``vkbloom presets``: list the presets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from vkbloom._cli.listing import Entry, listing_command
 from vkbloom._cli.settings_options import PRESET_OF_PHOTOS
 from vkbloom._presets.named_settings import PRESETS
-from vkbloom._settings.settings import Settings
 
 
 def entries() -> Iterator[Entry]:
@@ -20,13 +19,8 @@ def entries() -> Iterator[Entry]:
         yield Entry(name, one.what, one.whose, settings.composite, needs_hdr, values)
 
 
-def _shown(entry: Entry, _: Settings) -> Settings:
-    return PRESETS[entry.name].make()
-
-
 command = listing_command(
     "List the presets: what they look like, whose they are, whether they mix or add, and whether "
     "they need values above 1.",
     entries,
-    _shown,
 )

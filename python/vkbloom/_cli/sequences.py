@@ -17,7 +17,7 @@ from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import note
 from vkbloom._io.image_reading import readable_extensions
 
-__all__ = ["check_drawing", "check_targets", "is_terminal", "pairs"]
+__all__ = ["check_targets", "is_terminal", "pairs"]
 
 #: The most names in a note.
 _MAX_NAMES: Final = 5
@@ -57,10 +57,7 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
 
 
 def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
-    """Raise an error for files of `pairs` that cannot be written, or that are also read.
-
-    - `out`: The target that the files were made of.
-    """
+    """Raise an error for files of `pairs` that cannot be written, or that are also read."""
     read = [source for source, _ in work if os.path.isfile(source)]
     for _, target in work:
         if target == PIPE and sys.stdout is None:
@@ -151,16 +148,3 @@ def _filled(pattern: str, number: int | None) -> str:
     return _NUMBER.sub(
         lambda form: f"{number:{form[1]}{form[2]}d}", os.path.basename(pattern), count=1
     )
-
-
-def check_drawing(option: str, file: str | None, suffixes: tuple[str, ...]) -> None:
-    """Check that a drawing can be written, before what it shows is rendered."""
-    if file is None:
-        return
-    path = Path(file)
-    if path.suffix.lower() not in suffixes:
-        raise click.UsageError(f"{option}: {file} does not end in {', '.join(suffixes)}")
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), file)
-    if not path.absolute().parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file)

@@ -198,10 +198,7 @@ def _limits(
 def deviations(
     frames: Frames, image: NDArray[Any], settings: Settings, **given: NDArray[Any] | None
 ) -> Iterator[Deviation]:
-    """Compare names, dtypes, shapes, values and alpha of all framebuffers, in their order.
-
-    `given`: "mask" and "emission" of the image.
-    """
+    """Compare names, dtypes, shapes, values and alpha of all framebuffers, in their order."""
     expected = reference.apply(image, settings, **given)
     if list(frames) != list(expected):
         wrong = f"framebuffers: {', '.join(frames)}; not {', '.join(expected)}"

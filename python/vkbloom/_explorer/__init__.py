@@ -75,12 +75,8 @@ def explore(
 
     Raises
     ------
-    TypeError
-        An argument has another type.
     ValueError
         An argument is out of range, or the renderer is closed.
-    ModuleNotFoundError
-        anywidget is not installed: ``pip install vkbloom[notebook]``.
 
     Notes
     -----

@@ -139,12 +139,6 @@ def fit(
         A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
         target has another size or is black; an argument is out of range; or, with `gradient`, a
         field or the loss has no derivative, or the image is an `Image`.
-    TypeError
-        An argument has the wrong type.
-    ModuleNotFoundError
-        SciPy is missing: ``pip install vkbloom[fit]``.
-    OutOfMemoryError, DeviceLostError, ValidationError, Error
-        The device failed.
 
     See Also
     --------
@@ -284,10 +278,7 @@ def _stages(
 def _priced(
     renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
 ) -> tuple[Space, NDArray[np.int_]]:
-    """Return a space, and how many passes run after a change of each varied field alone.
-
-    `drop`: Whether to leave out fields without an effect; otherwise they are errors.
-    """
+    """Return a space, and how many passes run after a change of each varied field alone."""
     plan = renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
     shape = plan.framebuffers[framebuffer][0]
     if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:

@@ -148,10 +148,7 @@ def _applied(
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the picture of four lights.
-
-    - `size`: Width and height in pixels.
-    """
+    """Return the picture of four lights."""
     width, height = size
     image = np.zeros((height, width, 3), np.float32)
     side = max(_MIN_SIDE, round(_SIDE * height))

@@ -78,8 +78,6 @@ def check_grid(store: Any) -> GridReport:
         The store does not exist or is empty.
     ValueError
         The store is not a grid, or has another format version.
-    ModuleNotFoundError
-        zarr is missing.
 
     Examples
     --------

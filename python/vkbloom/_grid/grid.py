@@ -92,9 +92,8 @@ def grid(
         their dtypes.
     reduce : mapping of str to callable, optional
         Figures to keep, by name. Each callable gets the `Frames` of a point and returns a number
-        or a small array. `vkbloom.reductions` has several. With ``framebuffers=()`` only they are
-        kept. A callable gets the framebuffers that its attribute ``framebuffers`` names, or all
-        if it has no such attribute.
+        or a small array. With ``framebuffers=()`` only they are kept. A callable gets the
+        framebuffers that its attribute ``framebuffers`` names, or all if it has no such attribute.
     store : str, path-like or zarr.abc.store.Store, optional
         Where to write the grid instead: a folder ``name.zarr``, a URL that fsspec supports, or a
         store. With a `client`, all its workers must be able to write to it. It can be opened with
@@ -106,9 +105,8 @@ def grid(
     part : (int, int) or str, optional
         Render only part i of n of a store, from 1. Part 0 is part n. Each part is a run of chunks,
         about 1/n of the points. Processes may render parts at the same time, in any order and
-        repeatedly; `check_grid` names missing parts. Text is "3/16"; "auto/16" takes i from
-        SLURM_ARRAY_TASK_ID, and "auto" also n from SLURM_ARRAY_TASK_COUNT. The default of `chunks`
-        has at least n chunks; name `chunks` for the same bytes as without parts.
+        repeatedly; `check_grid` names missing parts. Text is "3/16". The default of `chunks` has at
+        least n chunks; name `chunks` for the same bytes as without parts.
     resume : bool
         Whether to continue an existing store. False: raise FileExistsError.
     verify : bool
@@ -129,9 +127,8 @@ def grid(
     xarray.Dataset
         One dimension for each axis, in the given order, then "y", "x" and "channel"; one variable
         for each framebuffer and each reduction. The attributes have the remaining settings (as
-        JSON), the adapter, the driver, the version, the number of passes that ran ("passes_run"),
-        and how many more would run if each point were rendered alone ("passes_saved"). A store is
-        opened lazily.
+        JSON), the adapter, the driver, the version and the number of passes that ran
+        ("passes_run"). A store is opened lazily.
 
     Raises
     ------
@@ -141,21 +138,14 @@ def grid(
         data. This is checked before anything is rendered or written.
     MemoryError
         The result does not fit into the free memory. Nothing was rendered.
-    TypeError
-        An argument has the wrong type.
     FileExistsError
         The store exists and `resume` is False.
     OSError
         Writing failed, for example because the disk is full. Completed points are kept.
-    ModuleNotFoundError
-        xarray is missing, or zarr and dask for a store.
-    OutOfMemoryError, DeviceLostError, ValidationError, Error
-        The device failed.
 
     See Also
     --------
     check_grid : Reads a store, and names missing and damaged data.
-    contact_sheet, response_curves : Pictures and plots of the result.
 
     Notes
     -----
@@ -216,7 +206,7 @@ def grid(
         tally = render_grid(asked, prepared, by, progress=progress)
     dataset: xarray.Dataset = xr.open_zarr(keys.store)
     dataset.attrs.pop(IDENTITY, None)
-    return dataset.assign_attrs(passes_run=tally.ran, passes_saved=tally.saved)
+    return dataset.assign_attrs(passes_run=tally.ran)
 
 
 def _keys(store: Any, client: Client | None) -> Keys:

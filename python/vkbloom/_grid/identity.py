@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-import numpy as np
-
 from vkbloom._grid.layout import Grid, Layout
 from vkbloom._grid.order import Index
-from vkbloom._grid.reductions import Reduction
-from vkbloom._grid.sources import digest
 from vkbloom._settings.fields import plain_value
 
 __all__ = ["FORMAT", "chunk_in", "differences", "fingerprint", "identity", "short"]
@@ -39,7 +34,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
             name: {"shape": variable.shape, "dtype": variable.dtype.name}
             for name, variable in layout.variables.items()
         },
-        "reduce": {name: _reduction(reduction) for name, reduction in grid.reduce.items()},
+        "reduce": {name: _named(reduction) for name, reduction in grid.reduce.items()},
         "chunk": chunk,
     }
     # The same conversion as by storing it in JSON, which turns tuples into lists.
@@ -70,16 +65,9 @@ def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
     return tuple(held)
 
 
-def _reduction(reduction: Any) -> str:
-    if not isinstance(reduction, Reduction):
-        kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
-        return f"{kind.__module__}.{kind.__qualname__}"
-    parts = []
-    for field in dataclasses.fields(reduction):
-        value = getattr(reduction, field.name)
-        text = f"sha256 {digest(value)}" if isinstance(value, np.ndarray) else repr(value)
-        parts.append(f"{field.name}={text}")
-    return f"{type(reduction).__name__}({', '.join(parts)})"
+def _named(reduction: Any) -> str:
+    kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
+    return f"{kind.__module__}.{kind.__qualname__}"
 
 
 def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:

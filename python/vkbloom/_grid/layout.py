@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +16,6 @@ from vkbloom._checks import check_framebuffers
 from vkbloom._framebuffers import dimensions, leading
 from vkbloom._grid.axes import Axis, image_axis, read_axes, settings_of
 from vkbloom._grid.order import Index, ranking_of, walk
-from vkbloom._grid.reductions import Comparing, Reduction
 from vkbloom._grid.sources import Point, Source, read_source, visit
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.plans import Framebuffer
@@ -25,7 +23,7 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, check_settings
 from vkbloom._version import installed_version
 
-__all__ = ["Grid", "Layout", "PassCounter", "Variable", "ask", "lay_out", "origin"]
+__all__ = ["Grid", "Layout", "Variable", "ask", "lay_out", "origin"]
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
@@ -90,22 +88,6 @@ class Grid:
         varied = {axis.name for axis in self.axes}
         return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
 
-    def references(self) -> dict[str, dict[int, int]]:
-        """Return the reference points of reductions: by name, indices by number of the axis."""
-        found: dict[str, dict[int, int]] = {}
-        for name, reduction in self.reduce.items():
-            against = getattr(reduction, "against", None)
-            if isinstance(reduction, Comparing) and isinstance(against, Mapping):
-                found[name] = {}
-                for key, value in against.items():
-                    numbers = [i for i, axis in enumerate(self.axes) if axis.name == key]
-                    if not numbers:
-                        raise ValueError(
-                            f"against: {key!r} is not an axis of the grid; use one of its axes"
-                        )
-                    found[name][numbers[0]] = self.axes[numbers[0]].find(value)
-        return found
-
 
 @dataclass(frozen=True)
 class Variable:
@@ -128,16 +110,12 @@ class Layout:
 
     - `ranking`: The axes from the slowest to the fastest.
     - `coordinates`: Coordinates of dimensions that are not axes.
-    - `reference_size`: Bytes of the reference frames of one point.
-    - `structural`: The axes that change which passes or framebuffers exist.
     - `ran`: Passes that ran to learn the shapes and dtypes of the reductions.
     """
 
     ranking: tuple[int, ...]
     variables: Mapping[str, Variable]
     coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
-    reference_size: int
-    structural: tuple[int, ...]
     ran: int
     adapter: str
     driver: str
@@ -146,7 +124,7 @@ class Layout:
     @property
     def point_size(self) -> int:
         """Bytes of memory per point."""
-        return sum(variable.size for variable in self.variables.values()) + self.reference_size
+        return sum(variable.size for variable in self.variables.values())
 
 
 def ask(
@@ -181,15 +159,13 @@ def ask(
             raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
         raise ValueError("framebuffers: there are no framebuffers and no reductions; request some")
-    grid = Grid(
+    return Grid(
         checked,
         check_settings(settings, of_image=not checked.has_time),
         found,
         "all" if names is None else names,
         reductions,
     )
-    grid.references()
-    return grid
 
 
 def lay_out(
@@ -198,30 +174,26 @@ def lay_out(
     check: Callable[[Mapping[str, Variable]], object] = lambda variables: None,
 ) -> Layout:
     """Determine the layout of a grid on a renderer before its points are rendered."""
-    framebuffers, structural = _survey(grid, renderer)
-    variables = _frame_variables(framebuffers)
+    variables = _frame_variables(_survey(grid, renderer))
     check(variables)
     coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
     for variable in variables.values():
         if len(variable.dims) == 3:
             labels = np.array(_CHANNELS[: variable.shape[2]])
             coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
-    reference_size = ran = 0
+    ran = 0
     if grid.reduce:
         sample = _sample(grid, renderer)
         ran = len(sample.timings)
         for name, reduction in grid.reduce.items():
-            value = _reduced(grid, name, sample)
-            variables[name], own = _reduction_variable(name, reduction, value)
-            coordinates.update(own)
-            if name in grid.references() and isinstance(reduction, Reduction):
-                reference_size += sample[reduction.framebuffer].nbytes
+            value = checked_value(name, reduction(sample))
+            dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
+            attributes = {"long_name": name, "units": "1"}
+            variables[name] = Variable(dims, value.shape, value.dtype, attributes)
     return Layout(
         ranking=ranking(grid),
         variables=variables,
         coordinates=coordinates,
-        reference_size=reference_size,
-        structural=structural,
         ran=ran,
         **origin(renderer),
     )
@@ -267,41 +239,13 @@ def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.P
     )
 
 
-class PassCounter:
-    """Counts the passes of a grid's points if each were rendered alone."""
-
-    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
-        self._grid = grid
-        self._structural = layout.structural
-        self._renderer = renderer
-        self._known: dict[Index, int] = {}
-
-    def alone(self, index: Index) -> int:
-        """Return the number of passes of a point on a new renderer.
-
-        As in `Frames.timings`, without fused passes.
-        """
-        key = tuple(index[number] for number in self._structural)
-        if key not in self._known:
-            self._known[key] = _graph_of(self._grid, self._renderer, index)[1]
-        return self._known[key]
-
-
-def _graph_of(
-    grid: Grid, renderer: Renderer, index: Index
-) -> tuple[Mapping[str, Framebuffer], int]:
-    """Return the framebuffers and the passes of a point that is rendered alone."""
+def _framebuffers_at(grid: Grid, renderer: Renderer, index: Index) -> Mapping[str, Framebuffer]:
     point = grid.point(index)
-    found = grid.source.plan(renderer, point.settings, point.place).framebuffers
-    wanted = grid.wanted
-    names = None if wanted == "all" else tuple(name for name in wanted if name in found)
-    source = grid.source.for_core(point.place)
-    alone = _core.plan(source, point.settings, names)
-    return found, len({name for name, *_ in alone.passes})
+    return grid.source.plan(renderer, point.settings, point.place).framebuffers
 
 
-def _survey(grid: Grid, renderer: Renderer) -> tuple[Mapping[str, Framebuffer], tuple[int, ...]]:
-    """Return the framebuffers to keep, and the axes that change the set of framebuffers or passes.
+def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
+    """Return the framebuffers to keep.
 
     Plans every value of every axis from the first and from the last corner of the grid, then every
     combination along the axes that change something. Nothing is rendered.
@@ -309,19 +253,19 @@ def _survey(grid: Grid, renderer: Renderer) -> tuple[Mapping[str, Framebuffer], 
     first = tuple(0 for _ in grid.axes)
     structural: set[int] = set()
     for corner in {first, tuple(count - 1 for count in grid.shape)}:
-        basis = _graph_of(grid, renderer, corner)
+        basis = _framebuffers_at(grid, renderer, corner)
         for number, axis in enumerate(grid.axes):
             for place in range(len(axis)):
                 index = (*corner[:number], place, *corner[number + 1 :])
-                if index != corner and _graph_of(grid, renderer, index) != basis:
+                if index != corner and _framebuffers_at(grid, renderer, index) != basis:
                     structural.add(number)
                     break
-    expected = _graph_of(grid, renderer, first)[0]
+    expected = _framebuffers_at(grid, renderer, first)
     names = tuple(expected) if grid.framebuffers == "all" else grid.framebuffers
     ranges = (range(len(axis)) if i in structural else (0,) for i, axis in enumerate(grid.axes))
     promoted: dict[str, Framebuffer] = dict(expected)
     for index in itertools.product(*ranges):
-        found = _graph_of(grid, renderer, index)[0]
+        found = _framebuffers_at(grid, renderer, index)
         if grid.framebuffers == "all" and set(found) != set(expected):
             names = tuple(sorted(set(found) ^ set(expected)))
         for name in (name for name in names if name in expected or name in found):
@@ -333,7 +277,7 @@ def _survey(grid: Grid, renderer: Renderer) -> tuple[Mapping[str, Framebuffer], 
     for name in names:
         if name not in expected:
             raise ValueError(f"framebuffers: there is no {name!r} here, only {', '.join(expected)}")
-    return {name: promoted[name] for name in names}, tuple(sorted(structural))
+    return {name: promoted[name] for name in names}
 
 
 def _common(one: Framebuffer | None, other: Framebuffer | None) -> Framebuffer | None:
@@ -397,14 +341,6 @@ def _sample(grid: Grid, renderer: Renderer) -> Frames:
     return frames
 
 
-def _reduced(grid: Grid, name: str, frames: Frames) -> NDArray[Any]:
-    """Return a reduction of frames. A comparing reduction compares them with themselves."""
-    reduction = grid.reduce[name]
-    if name in grid.references() and isinstance(reduction, Comparing):
-        reduction = dataclasses.replace(reduction, against=frames[reduction.framebuffer])
-    return checked_value(name, reduction(frames))
-
-
 def checked_value(name: str, value: Any) -> NDArray[Any]:
     """Convert the value of a reduction to an array of numbers."""
     array = np.asarray(value)
@@ -413,22 +349,6 @@ def checked_value(name: str, value: Any) -> NDArray[Any]:
     # One dtype per kind of number, so that all points of a variable have the same.
     widest = {"b": np.bool_, "i": np.int64, "u": np.uint64, "f": np.float64}[array.dtype.kind]
     return array.astype(widest)
-
-
-def _reduction_variable(
-    name: str, reduction: Callable[[Frames], Any], value: NDArray[Any]
-) -> tuple[Variable, dict[str, tuple[NDArray[Any], Mapping[str, str]]]]:
-    own = getattr(reduction, "dims", ())
-    if len(own) != value.ndim:
-        own = tuple(f"dim_{number}" for number in range(value.ndim))
-    dims = tuple(f"{name}_{dim}" for dim in own)
-    attributes = {"long_name": name, "units": str(getattr(reduction, "units", "1"))}
-    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
-    if isinstance(reduction, Reduction):
-        attributes["description"] = reduction.description
-        for dim, values in reduction.coordinates.items():
-            coordinates[f"{name}_{dim}"] = (values, {"long_name": dim, "units": "pixel"})
-    return Variable(dims, value.shape, value.dtype, attributes), coordinates
 
 
 def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:

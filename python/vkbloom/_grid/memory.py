@@ -25,20 +25,14 @@ __all__ = ["BLOCK_BYTES", "BLOCK_POINTS", "chunk_of", "in_memory"]
 #: Limits of a block: large enough for an efficient file, small enough to render again if lost.
 BLOCK_BYTES = 1 << 20
 BLOCK_POINTS = 1024
-# Reference frames may need more memory than the stored variables of a point.
-_REFERENCE_BYTES = 64 << 20
 # A grid may take all free memory but this part of its own size.
 _MARGIN = 10
 
 
 def chunk_of(grid: Grid, layout: Layout, parts: int = 1) -> tuple[int, ...]:
     """Return the number of points per block along each axis, with a block for each part."""
-    stored = layout.point_size - layout.reference_size
     most = min(
-        BLOCK_POINTS,
-        math.prod(grid.shape) // parts,
-        BLOCK_BYTES // max(stored, 1),
-        _REFERENCE_BYTES // max(layout.reference_size, 1),
+        BLOCK_POINTS, math.prod(grid.shape) // parts, BLOCK_BYTES // max(layout.point_size, 1)
     )
     return default_chunk(grid.shape, layout.ranking, max(most, 1))
 
@@ -80,7 +74,6 @@ def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.D
     attributes: dict[str, Any] = {
         **attributes_of(grid, layout),
         "passes_run": shown.tally.ran,
-        "passes_saved": shown.tally.saved,
     }
     dataset: xarray.Dataset = xr.Dataset(
         {

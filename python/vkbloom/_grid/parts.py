@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any, Final, TypeAlias
 
 __all__ = ["WHOLE", "Part", "read_part"]
@@ -12,13 +11,9 @@ Part: TypeAlias = tuple[int, int]
 
 WHOLE: Final[Part] = (1, 1)
 
-_AUTO: Final = "auto"
-_TASK: Final = "SLURM_ARRAY_TASK_ID"
-_TASKS: Final = "SLURM_ARRAY_TASK_COUNT"
-
 
 def read_part(part: Any) -> Part:
-    """Check a part: (i, n), or text such as "3/16", "auto/16" and "auto"; None is the whole.
+    """Check a part: (i, n), or text such as "3/16"; None is the whole.
 
     i is 1 to n. 0 is the same as n, so that arrays that count from 0 have all parts, too.
     """
@@ -26,20 +21,15 @@ def read_part(part: Any) -> Part:
         return WHOLE
     given = part
     if isinstance(part, str):
-        task, _, parts = part.partition("/")
-        if task == _AUTO:
-            if not (task := os.environ.get(_TASK, "")):
-                raise ValueError(f"part: {given!r} is not known without {_TASK}; write I/N")
-            parts = parts or os.environ.get(_TASKS, "")
-        if not all(word.isascii() and word.isdecimal() for word in (task, parts)):
-            raise ValueError(f"part: {given!r} is not I/N, such as 3/16 or auto/16")
-        part = (int(task), int(parts))
+        words = part.split("/")
+        if len(words) != 2 or not all(word.isascii() and word.isdecimal() for word in words):
+            raise ValueError(f"part: {given!r} is not I/N, such as 3/16")
+        part = tuple(map(int, words))
     if not isinstance(part, tuple | list) or len(part) != 2:
         raise TypeError(f"part: {given!r} is not a pair (i, n), such as (3, 16)")
     if any(isinstance(number, bool) or not hasattr(number, "__index__") for number in part):
         raise TypeError(f"part: {given!r} is not a pair of integers")
     number, count = (value.__index__() for value in part)
     if not 0 <= number <= count or count < 1:
-        hint = "; write auto/N if not all tasks of the array run" if given == _AUTO else ""
-        raise ValueError(f"part: {number} of {count} is not 1 to {max(count, 1)}{hint}")
+        raise ValueError(f"part: {number} of {count} is not 1 to {max(count, 1)}")
     return number or count, count

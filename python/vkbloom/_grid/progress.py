@@ -1,4 +1,4 @@
-"""A progress bar of a grid: rate, remaining time, and passes run and saved."""
+"""A progress bar of a grid: rate, remaining time, and passes run."""
 
 from __future__ import annotations
 
@@ -45,9 +45,7 @@ class Progress:
         """Add points and passes that are done."""
         self.tally.add(tally)
         if self._bar is not None:
-            self._bar.set_postfix_str(
-                f"passes run {self.tally.ran}, saved {self.tally.saved}", refresh=False
-            )
+            self._bar.set_postfix_str(f"passes run {self.tally.ran}", refresh=False)
             self._bar.update(tally.points)
 
     def __enter__(self) -> Progress:

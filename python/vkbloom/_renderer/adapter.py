@@ -118,14 +118,14 @@ def adapters() -> tuple[AdapterInfo, ...]:
     >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
     True
     """
-    found: list[_core.AdapterTuple] = []
+    found: list[_core._AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):
         with contextlib.suppress(_core.AdapterNotFoundError):
             found += _core.adapters(driver)
     return tuple(from_core(adapter) for adapter in found)
 
 
-def from_core(adapter: _core.AdapterTuple) -> AdapterInfo:
+def from_core(adapter: _core._AdapterTuple) -> AdapterInfo:
     """Make an AdapterInfo from the core's description of an adapter."""
     name, kind, driver, driver_info, api_version, _, bundled, uuid, pci, *_ = adapter
     return AdapterInfo(name, kind, driver, driver_info, api_version, bundled, uuid, pci)

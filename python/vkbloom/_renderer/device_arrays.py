@@ -434,12 +434,7 @@ def take(
     *,
     waits: bool = True,
 ) -> ImportedArray:
-    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
-
-    `sides`: The numbers of dimensions that it may have.
-    `waits`: Until the copy is complete. Otherwise the core's `run` does that, and the array must
-    not change before.
-    """
+    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
     _require_no_capture()
     try:
         core.cuda()

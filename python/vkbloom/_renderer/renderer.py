@@ -476,8 +476,6 @@ class Renderer:
         ValueError
             Raised by the call: the lengths of both sequences differ, or an argument is out of
             range. Raised by the iteration: an image is not valid for `apply`, or has no settings.
-        TypeError
-            `images` is not iterable, or an argument has another type.
 
         Notes
         -----

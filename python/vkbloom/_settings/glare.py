@@ -84,10 +84,7 @@ class GlareLight(Glare):
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:
-    """Return the stages of settings.
-
-    `glare`: A mapping is the result of `Glare.to_dict`.
-    """
+    """Return the stages of settings."""
     if isinstance(glare, Glare | Mapping):
         glare = (glare,)
     if isinstance(glare, str | bytes) or not isinstance(glare, Iterable):

@@ -115,11 +115,6 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     -------
     Diagnosis
 
-    Raises
-    ------
-    TypeError, ValueError
-        An image is not an array of one of these dtypes and shapes.
-
     Examples
     --------
     >>> from vkbloom import testing

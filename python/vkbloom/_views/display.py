@@ -46,10 +46,7 @@ def fields_html(settings: DataclassInstance) -> str:
 
 
 def scene_html(rows: Iterable[tuple[str, str]], faces: NDArray[Any] | None) -> str:
-    """Return a scene as a table, with the faces of its sky as a cross.
-
-    `faces`: ndarray, shape (6, N, N, C), or None; Faces of the sky: +x, -x, +y, -y, +z, -z.
-    """
+    """Return a scene as a table, with the faces of its sky as a cross."""
     return _block("Scene", _table(rows), *([] if faces is None else [_cross(faces)]))
 
 

@@ -1,37 +1,22 @@
-"""Viewable pictures of framebuffers: PNG, and contact sheets as HTML and PNG."""
+"""Viewable pictures of framebuffers: PNG, and contact sheets as HTML."""
 
 from __future__ import annotations
 
 import math
 import struct
-import warnings
 import zlib
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_index, import_extra
 from vkbloom._framebuffers import Framebuffers, leading
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 
-__all__ = [
-    "contact_sheet_html",
-    "contact_sheet_png",
-    "labelled",
-    "leading_png",
-    "picture",
-    "png",
-    "reduced",
-    "resized",
-    "scaled",
-    "sheet",
-    "sheet_png",
-]
+__all__ = ["contact_sheet_html", "leading_png", "picture", "png", "reduced"]
 
 _CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
@@ -117,98 +102,6 @@ def _timings_html(frames: Framebuffers) -> Markup:
     )
 
 
-def contact_sheet_png(frames: Framebuffers, columns: int = 3, width: int = 320) -> bytes:
-    """Return a labelled contact sheet of all framebuffers as PNG.
-
-    Pictures are shown as in a notebook, without alpha, fitted into cells with the aspect of
-    `final`; small ones are enlarged by repeating pixels. OpenImageIO draws the labels; if it or
-    its fonts are missing, they are left out with a warning.
-
-    `width`: Width of a picture in pixels, 128 to 4096.
-    """
-    columns = check_index("columns", columns, 1, 32)
-    width = check_index("width", width, 128, 4096)
-    if not frames:
-        raise ValueError("frames: a contact sheet needs at least one framebuffer")
-    height = round(width / _aspect(frames))
-    tiles = []
-    for name, array in frames.items():
-        fit = min(width / array.shape[1], height / array.shape[0])
-        picture = _picture(frames, name, scaled(array.shape[1], array.shape[0], fit))
-        note = _note(frames, name)
-        tiles.append((picture, f"{name}: {note}" if note else name, _described(array)))
-    version, adapter = frames.info.get("version", ""), frames.info.get("adapter", "")
-    title = f"vkbloom {version}".strip() + (f" on {adapter}" * bool(adapter))
-    return sheet_png(tiles, columns, (width, height), title)
-
-
-def sheet_png(
-    tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
-    columns: int,
-    cell: tuple[int, int],
-    title: str = "",
-) -> bytes:
-    """Return a `sheet` as PNG."""
-    return png(sheet(tiles, columns, cell, title))
-
-
-def sheet(
-    tiles: Sequence[tuple[NDArray[np.uint8], str, str]],
-    columns: int,
-    cell: tuple[int, int],
-    title: str = "",
-) -> NDArray[np.uint8]:
-    """Return pictures with two lines of text below each.
-
-    - `tiles`: Pictures that are not larger than a cell, with their lines.
-    - `cell`: Width and height in pixels.
-    """
-    width, height = cell
-    columns = min(columns, len(tiles))
-    text = max(11, width // 20)
-    gap, caption = text, 3 * text
-    heading = 2 * text * bool(title)
-    rows = -(-len(tiles) // columns)
-    drawn = np.full(
-        (gap + heading + rows * (height + caption + gap), gap + columns * (width + gap), 3),
-        24,
-        np.uint8,
-    )
-    labels = [(gap, gap + text, title)] if title else []
-    for index, (picture, *lines) in enumerate(tiles):
-        row, column = divmod(index, columns)
-        left = gap + column * (width + gap)
-        top = gap + heading + row * (height + caption + gap)
-        y = top + (height - picture.shape[0]) // 2
-        x = left + (width - picture.shape[1]) // 2
-        drawn[top : top + height, left : left + width] = 40
-        drawn[y : y + picture.shape[0], x : x + picture.shape[1]] = picture[:, :, :3]
-        baseline = top + height + text + text // 4
-        labels += [(left, baseline + i * (text + 2), line) for i, line in enumerate(lines)]
-    return labelled(drawn, labels, text)
-
-
-def labelled(
-    sheet: NDArray[np.uint8], labels: Iterable[tuple[int, int, str]], size: int
-) -> NDArray[np.uint8]:
-    """Draw light grey texts at (x, baseline y); leave them out if there is no font.
-
-    - `size`: Font size in pixels.
-    """
-    try:
-        oiio = import_extra("OpenImageIO", "images", "A labelled contact sheet")
-    except ModuleNotFoundError as error:
-        warnings.warn(f"the contact sheet has no labels: {error}", stacklevel=3)
-        return sheet
-    canvas = oiio.ImageBuf(sheet)
-    for x, y, label in labels:
-        if not oiio.ImageBufAlgo.render_text(canvas, x, y, label, size, "", (0.87, 0.87, 0.87)):
-            warnings.warn(f"the contact sheet has no labels: {canvas.geterror()}", stacklevel=3)
-            return sheet
-    drawn: NDArray[np.uint8] = canvas.get_pixels(oiio.UINT8)
-    return drawn
-
-
 def _picture(
     frames: Framebuffers, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
 ) -> NDArray[np.uint8]:
@@ -226,11 +119,7 @@ def picture(
     range_of: NDArray[Any] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
-
-    - `size`: Width and height of the picture: pixels are averaged or repeated.
-    - `stops`: Exposure of float colours in stops; other values do not change.
-    """
+    """Convert an image to a viewable 8-bit picture, as `leading_png` documents."""
     values = np.atleast_3d(array).astype(np.float32)
     ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
     linear = False
@@ -351,8 +240,6 @@ def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
 
     It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
     users save.
-
-    `pixels`: ndarray of uint8, shape (H, W, C); 1, 3 or 4 channels.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)

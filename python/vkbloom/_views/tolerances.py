@@ -60,8 +60,6 @@ class Tolerances:
     ------
     ValueError
         A number is out of its range; the message names the field, the value and the range.
-    TypeError
-        A field is not a number.
 
     Examples
     --------

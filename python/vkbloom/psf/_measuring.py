@@ -47,8 +47,6 @@ class measured(SampledPSF):
 
     Raises
     ------
-    TypeError
-        `settings` is not a Settings.
     ValueError
         The settings have a threshold, or `size` is not a pair of integers of at least 1.
 

@@ -68,9 +68,6 @@ def composite(
 
     Raises
     ------
-    TypeError
-        An image has another dtype, `bloom` is missing while the bloom is on, or `settings` is not
-        Settings.
     ValueError
         An image has another shape, or the sizes differ.
 

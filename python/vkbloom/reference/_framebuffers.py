@@ -70,8 +70,6 @@ def apply(
 
     Raises
     ------
-    TypeError
-        The image has another dtype, or `settings` is not Settings.
     ValueError
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
@@ -203,8 +201,6 @@ def passes(
 
     Raises
     ------
-    TypeError
-        The glow has another dtype, or `settings` is not Settings.
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
 
@@ -251,11 +247,6 @@ def blur(
     -------
     ndarray of float64, shape (height, width, C)
         "bloom" of `passes`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `passes`.
 
     Examples
     --------

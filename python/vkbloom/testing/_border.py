@@ -85,8 +85,6 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
     ------
     AssertionError
         A result is not finite, or the bloom of the light in the middle is black.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
@@ -123,9 +121,6 @@ def assert_border(
     ------
     AssertionError
         The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or a law of what is near the border cannot be tested, since
-        light from the middle reaches it.
     """
     __tracebackhide__ = True
     allowed = BORDER_LIMITS | dict(limits or {})
@@ -190,10 +185,7 @@ def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> li
 def _at_the_border(
     lights: _Lights, allowed: dict[str, float], law: str, *, complete: bool
 ) -> list[str]:
-    """Return what is wrong with lights in the outermost pixels.
-
-    `complete`: whether the frame holds the whole bloom of a light in the middle.
-    """
+    """Return what is wrong with lights in the outermost pixels."""
     __tracebackhide__ = True
     told = []
     for name, at in _places(lights.probe).items():
@@ -267,8 +259,6 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` takes no region, or returns an image of another size.
     """
     __tracebackhide__ = True
     if not takes(bloom, "region"):

@@ -215,11 +215,6 @@ def report(
     -------
     LawReport
 
-    Raises
-    ------
-    TypeError, ValueError
-        `bloom` is not such a callable, or a law is unknown.
-
     Examples
     --------
     >>> from vkbloom import reference, testing

@@ -346,11 +346,6 @@ def first_infected(
     str or None
         The name; None if no framebuffer is infected.
 
-    Raises
-    ------
-    TypeError, ValueError
-        The probe is of integers, or `bloom` returns no mapping.
-
     Examples
     --------
     >>> from vkbloom import testing

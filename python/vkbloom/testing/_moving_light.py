@@ -297,14 +297,7 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
 def area_sampled(
     size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
 ) -> Image:
-    """Return the share of each pixel that a rectangle covers.
-
-    - `size`: Width and height of the image in pixels.
-    - `centre`: x and y in pixels; the centre of the first pixel is (0, 0).
-    - `sides`: Width and height of the rectangle in pixels.
-    - Returns: ndarray of float64, shape (H, W): 0 to 1. Their sum is the rectangle's area, as far
-      as it is inside.
-    """
+    """Return the share of each pixel that a rectangle covers."""
     covered = []
     for count, place, side in zip(size, centre, sides, strict=True):
         edges = np.arange(count + 1) - 0.5

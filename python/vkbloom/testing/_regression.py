@@ -146,9 +146,6 @@ class FrameRegression:
         AssertionError
             The frames differ, or there is no reference. The message names the position and the
             remedy.
-        TypeError, ValueError
-            An argument is wrong, or a reference's file is damaged; with `exact`, the driver of the
-            frames has no hash, or no reference has the same one.
         OSError
             A file cannot be read or written.
         """
@@ -204,8 +201,6 @@ class FrameRegression:
         ------
         AssertionError
             The frames differ.
-        TypeError, ValueError
-            An argument is wrong.
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)

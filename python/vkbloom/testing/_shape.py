@@ -55,8 +55,6 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     ------
     AssertionError
         A result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     plane = point_spread(bloom, probe).mean(axis=2)
@@ -105,9 +103,6 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or all contours are smaller than three pixels or leave the
-        image.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
@@ -149,8 +144,6 @@ def assert_sizes(
     ------
     AssertionError
         The law does not hold, a result is black or not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or its figures differ where light reaches the border.
     """
     __tracebackhide__ = True
     allowed = SIZE_LIMITS | dict(limits or {})

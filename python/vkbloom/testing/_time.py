@@ -82,8 +82,6 @@ def assert_jitter(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     check_number("feedback", feedback, 0.0, 1.0)
@@ -214,8 +212,6 @@ def assert_history(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or the bloom is black.
     """
     __tracebackhide__ = True
     allowed = HISTORY_LIMITS | dict(limits or {})

@@ -42,8 +42,6 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or does not take alpha.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)

@@ -1,0 +1,317 @@
+// A Vulkan layer for tests: it writes how images may be used and are, and objects to acquires of
+// buffers from CUDA that nothing has released. test_usages.py and test_cuda_path.py use it.
+#define _GNU_SOURCE
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+// clang-format off: the second one leaves out what the first one has
+#include <vulkan/vulkan.h>
+#include <vulkan/vk_layer.h>
+// clang-format on
+
+#define DEVICE_FUNCTIONS(FUNCTION) \
+    FUNCTION(vkCreateImage) \
+    FUNCTION(vkDestroyImage) \
+    FUNCTION(vkCreateImageView) \
+    FUNCTION(vkCreateFramebuffer) \
+    FUNCTION(vkUpdateDescriptorSets) \
+    FUNCTION(vkCmdCopyImageToBuffer) \
+    FUNCTION(vkCmdCopyBufferToImage) \
+    FUNCTION(vkCmdPipelineBarrier) \
+    FUNCTION(vkCreateBuffer)
+
+// Of the first device, and good for all.
+static struct {
+    VkInstance instance;
+    PFN_vkGetInstanceProcAddr instance_proc;
+    PFN_vkGetDeviceProcAddr device_proc;
+    PFN_vkSubmitDebugUtilsMessageEXT message;
+    PFN_vkSetDebugUtilsObjectNameEXT set_name;
+#define MEMBER(name) PFN_##name name;
+    DEVICE_FUNCTIONS(MEMBER)
+#undef MEMBER
+} below;
+
+// Handles are reused, so that the latest is looked for first.
+static struct watched_image {
+    VkImage image;
+    char name[64];
+    VkImageUsageFlags usage, used;
+} images[1 << 14];
+static struct {
+    VkImageView view;
+    uint32_t image;
+} views[1 << 14];
+static struct {
+    VkBuffer buffer;
+    bool owned;  // by Vulkan; a new one belongs to whoever uses it first
+} buffers[1 << 14];
+static uint32_t image_count, view_count, buffer_count;
+
+static struct watched_image *find_image(VkImage image)
+{
+    uint32_t i = image_count;
+
+    while (i-- > 0)
+        if (images[i].image == image)
+            return &images[i];
+    return &images[0];
+}
+
+static void use_view(VkImageView view, VkImageUsageFlags usage)
+{
+    for (uint32_t i = view_count; i-- > 0;)
+        if (views[i].view == view) {
+            images[views[i].image].used |= usage;
+            return;
+        }
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_image(VkDevice device, const VkImageCreateInfo *info,
+                                                   const VkAllocationCallbacks *callbacks,
+                                                   VkImage *image)
+{
+    const VkResult result = below.vkCreateImage(device, info, callbacks, image);
+
+    // The first one is for handles that are not known.
+    if (result == VK_SUCCESS && ++image_count < 1 << 14)
+        images[image_count - 1] = (struct watched_image){.image = *image, .usage = info->usage};
+    return result;
+}
+
+static VKAPI_ATTR void VKAPI_CALL destroy_image(VkDevice device, VkImage image,
+                                                const VkAllocationCallbacks *callbacks)
+{
+    struct watched_image *watched = find_image(image);
+
+    if (image && watched->name[0] && getenv("VKBLOOM_USAGES")) {
+        FILE *file = fopen(getenv("VKBLOOM_USAGES"), "a");
+        fprintf(file, "%s %x %x\n", watched->name, watched->usage, watched->used);
+        fclose(file);
+    }
+    if (image)
+        watched->image = VK_NULL_HANDLE;
+    below.vkDestroyImage(device, image, callbacks);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_view(VkDevice device,
+                                                  const VkImageViewCreateInfo *info,
+                                                  const VkAllocationCallbacks *callbacks,
+                                                  VkImageView *view)
+{
+    const VkResult result = below.vkCreateImageView(device, info, callbacks, view);
+
+    if (result == VK_SUCCESS && view_count < 1 << 14) {
+        views[view_count].view = *view;
+        views[view_count++].image = (uint32_t)(find_image(info->image) - images);
+    }
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_framebuffer(VkDevice device,
+                                                         const VkFramebufferCreateInfo *info,
+                                                         const VkAllocationCallbacks *callbacks,
+                                                         VkFramebuffer *framebuffer)
+{
+    const VkImageUsageFlags targets =
+        VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT;
+
+    for (uint32_t i = 0; i < info->attachmentCount; ++i)
+        use_view(info->pAttachments[i], targets);
+    return below.vkCreateFramebuffer(device, info, callbacks, framebuffer);
+}
+
+static VKAPI_ATTR void VKAPI_CALL update_sets(VkDevice device, uint32_t count,
+                                              const VkWriteDescriptorSet *writes,
+                                              uint32_t copy_count,
+                                              const VkCopyDescriptorSet *copies)
+{
+    for (uint32_t i = 0; i < count; ++i)
+        if (writes[i].descriptorType == VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER)
+            use_view(writes[i].pImageInfo->imageView, VK_IMAGE_USAGE_SAMPLED_BIT);
+        else if (writes[i].descriptorType == VK_DESCRIPTOR_TYPE_STORAGE_IMAGE)
+            use_view(writes[i].pImageInfo->imageView, VK_IMAGE_USAGE_STORAGE_BIT);
+    below.vkUpdateDescriptorSets(device, count, writes, copy_count, copies);
+}
+
+static VKAPI_ATTR void VKAPI_CALL copy_to_buffer(VkCommandBuffer commands, VkImage image,
+                                                 VkImageLayout layout, VkBuffer buffer,
+                                                 uint32_t count, const VkBufferImageCopy *regions)
+{
+    find_image(image)->used |= VK_IMAGE_USAGE_TRANSFER_SRC_BIT;
+    below.vkCmdCopyImageToBuffer(commands, image, layout, buffer, count, regions);
+}
+
+static VKAPI_ATTR void VKAPI_CALL copy_to_image(VkCommandBuffer commands, VkBuffer buffer,
+                                                VkImage image, VkImageLayout layout, uint32_t count,
+                                                const VkBufferImageCopy *regions)
+{
+    find_image(image)->used |= VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+    below.vkCmdCopyBufferToImage(commands, buffer, image, layout, count, regions);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL set_name(VkDevice device,
+                                               const VkDebugUtilsObjectNameInfoEXT *info)
+{
+    if (info->objectType == VK_OBJECT_TYPE_IMAGE)
+        snprintf(find_image((VkImage)info->objectHandle)->name, 64, "%s", info->pObjectName);
+    return below.set_name ? below.set_name(device, info) : VK_SUCCESS;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_buffer(VkDevice device, const VkBufferCreateInfo *info,
+                                                    const VkAllocationCallbacks *callbacks,
+                                                    VkBuffer *buffer)
+{
+    const VkResult result = below.vkCreateBuffer(device, info, callbacks, buffer);
+
+    if (result == VK_SUCCESS && buffer_count < 1 << 14) {
+        buffers[buffer_count].buffer = *buffer;
+        buffers[buffer_count++].owned = false;
+    }
+    return result;
+}
+
+static void object(const char *text)
+{
+    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
+                  &(VkDebugUtilsMessengerCallbackDataEXT){
+                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
+                      .pMessage = text,
+                  });
+}
+
+// Commands run in the order in which they are recorded.
+static void change_owner(const VkBufferMemoryBarrier *barrier)
+{
+    const bool acquires = barrier->srcQueueFamilyIndex == VK_QUEUE_FAMILY_EXTERNAL;
+    uint32_t i = buffer_count;
+
+    if (acquires == (barrier->dstQueueFamilyIndex == VK_QUEUE_FAMILY_EXTERNAL))
+        return;
+    while (i > 0 && buffers[i - 1].buffer != barrier->buffer)
+        --i;
+    if (i == 0)
+        return;
+    if (acquires && buffers[i - 1].owned)
+        object("a buffer is acquired from EXTERNAL that was not released to it");
+    buffers[i - 1].owned = acquires;
+}
+
+static VKAPI_ATTR void VKAPI_CALL barrier(VkCommandBuffer commands, VkPipelineStageFlags from,
+                                          VkPipelineStageFlags to, VkDependencyFlags flags,
+                                          uint32_t memory_count, const VkMemoryBarrier *memory,
+                                          uint32_t count, const VkBufferMemoryBarrier *given,
+                                          uint32_t image_barriers,
+                                          const VkImageMemoryBarrier *of_images)
+{
+    for (uint32_t i = 0; i < count; ++i)
+        change_owner(&given[i]);
+    below.vkCmdPipelineBarrier(commands, from, to, flags, memory_count, memory, count, given,
+                               image_barriers, of_images);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
+                                                      const VkAllocationCallbacks *callbacks,
+                                                      VkInstance *created)
+{
+    VkLayerInstanceCreateInfo *link = (VkLayerInstanceCreateInfo *)info->pNext;
+
+    while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO
+           || link->function != VK_LAYER_LINK_INFO)
+        link = (VkLayerInstanceCreateInfo *)link->pNext;
+    below.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
+    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
+    PFN_vkCreateInstance create =
+        (PFN_vkCreateInstance)below.instance_proc(VK_NULL_HANDLE, "vkCreateInstance");
+    const VkResult result = create(info, callbacks, created);
+    if (result == VK_SUCCESS) {
+        below.instance = *created;
+        below.message = (PFN_vkSubmitDebugUtilsMessageEXT)below.instance_proc(
+            *created, "vkSubmitDebugUtilsMessageEXT");
+        below.set_name = (PFN_vkSetDebugUtilsObjectNameEXT)below.instance_proc(
+            *created, "vkSetDebugUtilsObjectNameEXT");
+    }
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
+                                                    const VkDeviceCreateInfo *info,
+                                                    const VkAllocationCallbacks *callbacks,
+                                                    VkDevice *created)
+{
+    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)info->pNext;
+
+    while (link->sType != VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO
+           || link->function != VK_LAYER_LINK_INFO)
+        link = (VkLayerDeviceCreateInfo *)link->pNext;
+    below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
+    PFN_vkCreateDevice create =
+        (PFN_vkCreateDevice)below.instance_proc(below.instance, "vkCreateDevice");
+    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
+    const VkResult result = create(physical, info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
+    if (result == VK_SUCCESS) {
+        DEVICE_FUNCTIONS(FETCH)
+    }
+#undef FETCH
+    return result;
+}
+
+static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
+static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
+
+static const struct entry {
+    const char *name;
+    PFN_vkVoidFunction function;
+    bool of_device;
+} entries[] = {
+#define ENTRY(name, function, of_device) {#name, (PFN_vkVoidFunction)function, of_device}
+    ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
+    ENTRY(vkCreateInstance, create_instance, false),
+    ENTRY(vkCreateDevice, create_device, false),
+    ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
+    ENTRY(vkCreateImage, create_image, true),
+    ENTRY(vkDestroyImage, destroy_image, true),
+    ENTRY(vkCreateImageView, create_view, true),
+    ENTRY(vkCreateFramebuffer, create_framebuffer, true),
+    ENTRY(vkUpdateDescriptorSets, update_sets, true),
+    ENTRY(vkCmdCopyImageToBuffer, copy_to_buffer, true),
+    ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
+    ENTRY(vkCmdPipelineBarrier, barrier, true),
+    ENTRY(vkSetDebugUtilsObjectNameEXT, set_name, true),
+    ENTRY(vkCreateBuffer, create_buffer, true),
+};
+
+static PFN_vkVoidFunction find(const char *name, bool of_device)
+{
+    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
+        if (strcmp(entries[i].name, name) == 0 && (entries[i].of_device || !of_device))
+            return entries[i].function;
+    return NULL;
+}
+
+static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
+{
+    PFN_vkVoidFunction found = find(name, false);
+
+    return found || !handle ? found : below.instance_proc(handle, name);
+}
+
+static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
+{
+    PFN_vkVoidFunction found = find(name, true);
+
+    return found ? found : below.device_proc(handle, name);
+}
+
+VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
+vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
+{
+    layer->loaderLayerInterfaceVersion = 2;
+    layer->pfnGetInstanceProcAddr = get_instance_proc;
+    layer->pfnGetDeviceProcAddr = get_device_proc;
+    layer->pfnGetPhysicalDeviceProcAddr = NULL;
+    return VK_SUCCESS;
+}
