@@ -97,6 +97,6 @@ def write(folder: Path) -> None:
             file = f"{name.replace(' ', '_')}.png"
             vkbloom.write(folder / file, sheet(tiles, 3, CELL))
             text.append(
-                f"![{name}: correct, with the fault, and the difference]({folder.name}/{file})\n"
+                f"![{name}: correct, with the fault, and the difference]({folder.parent.name}/{folder.name}/{file})\n"
             )
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
