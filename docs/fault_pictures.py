@@ -96,7 +96,7 @@ def write(folder: Path) -> None:
             ]
             file = f"{name.replace(' ', '_')}.png"
             vkbloom.write(folder / file, sheet(tiles, 3, CELL))
-            text.append(
-                f"![{name}: correct, with the fault, and the difference]({folder.parent.name}/{folder.name}/{file})\n"
-            )
+            place = f"{folder.parent.name}/{folder.name}/{file}"
+            text.append(f"![{name}: correct, with the fault, and the difference]({place})
+")
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
