@@ -97,6 +97,5 @@ def write(folder: Path) -> None:
             file = f"{name.replace(' ', '_')}.png"
             vkbloom.write(folder / file, sheet(tiles, 3, CELL))
             place = f"{folder.parent.name}/{folder.name}/{file}"
-            text.append(f"![{name}: correct, with the fault, and the difference]({place})
-")
+            text.append(f"![{name}: correct, with the fault, and the difference]({place})\n")
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
