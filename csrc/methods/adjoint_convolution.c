@@ -59,7 +59,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
     const float *prefilter = settings->kernel.prefilter;
     struct vkb_settings mirrored = *settings;
-    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_brought(adjoint, pass)};
+    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
     struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
@@ -71,7 +71,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.y, extended.height, size.height, above);
     if (!mirror_kernel(kernel, graph, &mirrored.kernel, error)
         || (edge_y
-            && !vkb_filter_apart(adjoint, &filter, source.glow, extended, &source.glow, error))
+            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error))
         || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
         return false;
     // The alpha is one of a cotangent, not 1.
@@ -80,8 +80,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
     if (prefilter[0] > prefilter[1])
-        return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
-    return vkb_filter_apart(adjoint, &filter, convolved, size, &convolved, error)
+        return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
+    return vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error)
         && vkb_transpose_bright(adjoint, prefilter, glow, convolved,
                                 (enum vkb_mode)pass->constants.alpha, error);
 }

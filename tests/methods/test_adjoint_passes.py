@@ -318,7 +318,7 @@ MASKED = (
 @pytest.mark.usefixtures("software")
 @pytest.mark.parametrize("variant", ["cpu", "gpu"])
 def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    """In blocks of texels; what a composite without a curve brings needs no image of its own."""
+    """In blocks of texels; cotangents through a composite without a curve need no image."""
     monkeypatch.setenv("VKBLOOM_VARIANT", variant)
     settings = Pyramid(levels=2, composite="mix", exposure=0.5, format="rgba32float")
     image = random_image(35, 62, seed=1).astype(np.float32)[..., :3].copy()

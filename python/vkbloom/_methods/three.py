@@ -85,7 +85,9 @@ class ThreeBloom(Settings):
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
-    tints: tuple[Tint, ...] = value_field(((1.0, 1.0, 1.0),) * 5, read=_read_tints)
+    tints: tuple[Tint, ...] = value_field(
+        ((1.0, 1.0, 1.0),) * 5, kind="pairs", read=_read_tints, option="level-tints"
+    )
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
