@@ -521,12 +521,13 @@ def dual_kawase_bloom() -> str:
 def test_a_dual_kawase_beside_bloom_node(tmp_path: Path) -> None:
     """It was removed after six days, since it looks square; one run of `check` says so."""
     words = ["--bloom-scale", "0.5", "--against", "threejs_node", "--require", "round"]
-    words += ["--measure-size", "128x128"]
+    words += ["--measure-size", "128x128", "--size", "640x360"]
     done, found = of_text(tmp_path, dual_kawase_bloom(), *words)
     assert (done.exit_code, found["newly_broken"]) == (1, ["round"])
     kawase, node = (found[side]["laws"]["round"]["figures"] for side in ("bloom", "against"))
     assert kawase["round_0.1"] > 1.9
     assert max(node.values()) < 1.05
-    # The energy is nearly the same, in fewer passes.
+    # The energy is nearly the same, in less time (0.6 times at 1280 x 720).
     assert found["bloom"]["gain"] == pytest.approx(found["against"]["gain"], rel=0.03)
-    assert len(found["bloom"]["passes"]) < len(found["against"]["passes"])
+    (time,) = (one for one in found["changes"] if one["name"] == "together")
+    assert time["after"] < time["before"]
