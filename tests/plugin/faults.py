@@ -236,9 +236,7 @@ FAULTS: dict[str, Fault] = {
         "border",
         "where the middle has none",
     ),
-    "stale margin": Fault(
-        stale_margin, lambda: gaussian, "border", "after a bright image that is larger"
-    ),
+    "stale margin": Fault(stale_margin, lambda: gaussian, "border", "after a bright, larger image"),
     "leaks between views": Fault(
         lambda: across_views, lambda: of_a_view, "views", "the other view changes the left one"
     ),
@@ -252,7 +250,7 @@ FAULTS: dict[str, Fault] = {
         lambda: lambda a: gaussian(doubled(above_one(halved(a)), a.shape)),
         lambda: lambda a: gaussian(doubled(halved(above_one(a)), a.shape)),
         "jitter",
-        "a lit pixel blooms from 4",
+        "a lit pixel blooms from 3.94",
     ),
     "box instead of tent": Fault(
         lambda: box, lambda: lambda a: box(box(a, 9), 9), "round", "1.37 times as far"

@@ -58,7 +58,7 @@ class CustomFiles:
             self._read[name] = stamp
             source = read_source(kind.file.source.name)
             if source != kind.file.source:
-                registered(name, source, kind.twin)
+                registered(name, source, kind.numpy_reference)
             self._errors.pop(name, None)
         except (_core.Error, OSError, ValueError) as error:
             self._errors[name] = str(error)

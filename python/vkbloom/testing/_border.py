@@ -13,7 +13,7 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
 __all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
 
@@ -35,8 +35,6 @@ _PERIOD: Final = 16
 # The largest share of the light in the outermost pixels with which the bloom of a light in the
 # middle counts as complete.
 _OUTERMOST: Final = 0.01
-# How much larger the image before is.
-_LARGER: Final = 32
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,40 +126,40 @@ def assert_border(
     dark, flat = _check_stale(bloom, probe, allowed["stale"])
     lights = _Lights(bloom, probe, dark)
     share = border_share(_expected(lights, probe.centre)[0])
-    told = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
-    told += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
-    told += _flat(flat, dark, probe, allowed["flat"], law)
-    if told:
-        fail("assert_border", law, "; ".join(told))
+    reasons = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
+    reasons += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
+    reasons += _flat(flat, dark, probe, allowed["flat"], law)
+    if reasons:
+        fail("assert_border", law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
 
 
 def _flat(flat: Image, dark: Image, probe: Probe, allowed: float, law: str) -> list[str]:
     """Return what is wrong with the outermost pixels of the blooms of a flat and a black image."""
     x, y = probe.centre
-    told = []
+    reasons = []
     rings = [
         np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]).mean(axis=1)
         for image in (flat, dark)
     ]
     glow = float(np.abs(rings[1] - dark[y, x].mean()).max()) / probe.value
     if not is_within(law, glow, allowed, "dark"):
-        told.append(f"a black image has {glow:.3g} of the light of a flat one at its border")
+        reasons.append(f"a black image has {glow:.3g} of the light of a flat one at its border")
     ring, middle = rings[0], float(flat[y, x].mean())
     if middle > 0:
         farthest = float(ring[np.abs(ring - middle).argmax()]) / middle
         if not is_within(law, abs(farthest - 1), allowed, "flat"):
-            told.append(
+            reasons.append(
                 f"a flat image has {farthest:.3g} times as much bloom in its outermost pixels as "
                 "in the middle"
             )
-    return told
+    return reasons
 
 
 def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> list[str]:
     """Return what is wrong with lights 1.5 standard deviations from an edge."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _near(lights).items():
         found, error = lights.spread(at)
         expected, energy = _expected(lights, at)
@@ -173,13 +171,13 @@ def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> li
         quarter = len(profile) // 4
         wrapped = profile[-quarter:].sum() - profile[-2 * quarter : -quarter].sum()
         shares = {"wrap": max(0.0, float(wrapped)), "inside": float(profile.sum())}
-        told += [
+        reasons += [
             f"{100 * share:.3g} % of the light of a square near the {name} edge is "
             + ("at the opposite side" if kind == "wrap" else "where the middle has none")
             for kind, share in shares.items()
             if not is_within(law, share, allowed[kind], kind)
         ]
-    return told
+    return reasons
 
 
 def _at_the_border(
@@ -187,7 +185,7 @@ def _at_the_border(
 ) -> list[str]:
     """Return what is wrong with lights in the outermost pixels."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _places(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
@@ -196,44 +194,45 @@ def _at_the_border(
         figure(f"energy_{name}", share)
         lost = max(0.0, inside - share)
         if complete and not is_within(law, lost, allowed["lost"], "lost"):
-            told.append(
+            reasons.append(
                 f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the frame"
             )
         if not is_within(law, share, allowed[kind], kind):
-            told.append(f"a light at the {name} swells to {share:.3g} times its energy")
+            reasons.append(f"a light at the {name} swells to {share:.3g} times its energy")
     x, height = _PERIOD * round(lights.probe.centre[0] / _PERIOD), lights.probe.size[1]
     outermost, inner = (float(lights.spread((left, 0), (1, height))[0].sum()) for left in (0, x))
     if inner > 0 and not is_within(law, max(0.0, 0.5 - outermost / inner), 0.25, "column"):
-        told.append(
+        reasons.append(
             f"a line in the outermost column has {outermost / inner:.3g} of the energy of one in "
             "the middle"
         )
-    return told
+    return reasons
 
 
 def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> tuple[Image, Image]:
     """Return the blooms of black and of a flat image; black is the same after bright images."""
     __tracebackhide__ = True
-    width, height = probe.size
-    larger = dataclasses.replace(probe, size=(width + _LARGER, height + _LARGER))
-    before = probe.apply(bloom, probe.flat(0.0))[0]
-    larger.apply(bloom, larger.flat(probe.value))
+    width, height = (beside_multiple(min(side, 144)) + 3 for side in probe.size)
+    smaller = dataclasses.replace(
+        probe, size=(min(width, probe.size[0]), min(height, probe.size[1]))
+    )
+    dark = probe.apply(bloom, probe.flat(0.0))[0]
+    flat = dark
     law = "the bloom of an image does not depend on the image before"
-    flat = after = before
-    for name in (" that is larger", ""):
-        if not name:
-            flat = probe.apply(bloom, probe.flat(probe.value))[0]
-        after = probe.apply(bloom, probe.flat(0.0))[0]
-        off = float(np.abs(after - before).max()) / probe.value
+    for name, used in ((", larger", smaller), ("", probe)):
+        flat = probe.apply(bloom, probe.flat(probe.value))[0]
+        after = used.apply(bloom, used.flat(0.0))[0]
+        rise = np.abs(after) - float(np.abs(dark).max()) if name else np.abs(after - dark)
+        off = float(rise.max()) / probe.value
         if not is_within(law, off, allowed, "stale"):
-            y, x, _ = np.unravel_index(int(np.abs(after - before).argmax()), after.shape)
+            y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
             fail(
                 "assert_border",
                 law,
-                f"after a bright image{name}, a black one has {off:.3g} of its light at "
-                f"x {x}, y {y}",
+                f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, "
+                f"y {y}",
             )
-    return after, flat
+    return dark, flat
 
 
 @checked

@@ -152,14 +152,14 @@ def _verdict(
 
 def summary(found: Sequence[Change]) -> str:
     """Return which laws, figures and times got better and worse, as a sentence for each verdict."""
-    told = []
+    reasons = []
     for verdict in ("broken", "mended", "worse", "better"):
         names = [one.name for one in found if one.verdict == verdict and one.name != "together"]
         times = [one for one in found if one.verdict == verdict and one.name == "together"]
         names += [f"time ({_ratio(one)})" for one in times]
         if names:
-            told.append(f"{verdict}: {', '.join(names)}")
-    return "; ".join(told) or "nothing got better or worse"
+            reasons.append(f"{verdict}: {', '.join(names)}")
+    return "; ".join(reasons) or "nothing got better or worse"
 
 
 def _ratio(change: Change) -> str:

@@ -87,16 +87,16 @@ def assert_jitter(
     check_number("feedback", feedback, 0.0, 1.0)
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
-    told = []
+    reasons = []
     small = small_probe(probe)
     for name, scene in _SCENES.items():
         frames = [scene(small, x, y) for x, y in halton(16)]
-        resolved = list(_taa(frames, feedback))[::4]
+        resolved = list(_taa(frames, feedback))[::6]
         lights, settled = (
             np.array([_light(bloom, small, frame) for frame in part]) for part in (frames, resolved)
         )
         if not lights.mean() > 0:
-            told.append(f"the bloom of a thin {name} is black in all frames")
+            reasons.append(f"the bloom of a thin {name} is black in all frames")
             is_within(law, math.inf, allowed["flicker"], "flicker")
             continue
         for kind, where, values in (
@@ -107,18 +107,18 @@ def assert_jitter(
             off = float(np.ptp(values) / values.mean())
             figure(f"{name}, {where}", off)
             if not is_within(law, off, allowed[kind], kind):
-                told.append(
+                reasons.append(
                     f"{name}, {where}: the light changes by {off:.3g} of its mean, "
                     f"{allowed[kind]:g} allowed"
                 )
     ratio = _threshold_ratio(bloom, small)
     if not is_within(law, ratio, allowed["threshold"], "threshold"):
-        told.append(
+        reasons.append(
             f"a lit pixel blooms from {ratio:.3g} times the value on that a flat image needs: the "
             "threshold reads an average"
         )
-    if told:
-        fail("assert_jitter", law, "; ".join(told))
+    if reasons:
+        fail("assert_jitter", law, "; ".join(reasons))
 
 
 def _point(probe: Probe, x: float, y: float) -> Image:
@@ -176,8 +176,8 @@ def _threshold_ratio(bloom: Bloom, probe: Probe) -> float:
         image = probe.point(probe.centre, value) if pixel else probe.flat(value)
         return bool(probe.apply(bloom, image)[0].max() > 1e-6 * value)
 
-    def least(pixel: bool) -> float:
-        low, high = _LEAST * probe.value, probe.value
+    def least(pixel: bool, low: float) -> float:
+        high = probe.value
         for _ in range(_HALVINGS):
             middle = math.sqrt(low * high)
             low, high = (low, middle) if blooms(middle, pixel) else (middle, high)
@@ -185,7 +185,8 @@ def _threshold_ratio(bloom: Bloom, probe: Probe) -> float:
 
     if blooms(_LEAST * probe.value, False) or not blooms(probe.value, True):
         return 1.0
-    return least(True) / least(False)
+    flat = least(False, _LEAST * probe.value)
+    return 1.0 if blooms(flat, True) else least(True, flat) / flat
 
 
 @checked
@@ -238,19 +239,19 @@ def assert_history(
     sums = np.array([image.sum() for image in images[count // 2 :]])
     steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
     figure("frames", float(sum(share > allowed["stays"] for share in left)))
-    told = []
+    reasons = []
     if not is_within(law, steady, allowed["steady"], "steady"):
-        told.append(
+        reasons.append(
             f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
         )
     if not is_within(law, left[0], allowed["stays"], "stays"):
-        told.append(
+        reasons.append(
             f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
             f"and {sum(share > allowed['stays'] for share in left)} frames are above "
             f"{allowed['stays']:g}"
         )
-    if told:
-        fail("assert_history", law, "; ".join(told))
+    if reasons:
+        fail("assert_history", law, "; ".join(reasons))
 
 
 def _square(probe: Probe, at: tuple[int, int]) -> Image:
