@@ -106,11 +106,6 @@ class UrpBloom(Settings):
     clamp: float = number_field("clamp_max", slider=(0, 100))
     version: Literal["17", "12"] = choice_field("version", ("17", "12"))
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.version == "12" and self.filter != "gaussian":
-            raise ValueError(f"filter: {self.filter!r} is not in URP 12, which has 'gaussian'")
-
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
         colour = [_linear(channel) for channel in self.tint]
