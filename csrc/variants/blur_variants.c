@@ -289,7 +289,7 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The pass that writes the cotangents of an image, if it has this block and nothing else brings
+// The pass that writes the cotangents of an image, if it has this block and nothing else adds
 // any; else NULL.
 static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, uint32_t image,
                                                enum vkb_block block)
@@ -313,7 +313,7 @@ static bool find_any_nest(const struct vkb_graph *graph, int radius, struct nest
 
 // The transposes of a nest, of which `pass` is the last one: that of the threshold, or of the
 // vertical blur, if there is no threshold. The nest's composite is its adjoint then, a factor.
-// What it brings to the scene is an image, or left to the last pass.
+// The cotangents of the scene are an image, or left to the last pass.
 static bool find_adjoint_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                               int radius, struct nest *nest)
 {

@@ -80,7 +80,7 @@ const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *ch
 struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
                                    const struct vkb_pass_row *pass, const struct vkb_pass_row *up);
 
-// Whether a pass brings a factor of the cotangents of its composite to the bloom.
+// Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
 
 // Whether the images that a pass reads are words of single floats.
