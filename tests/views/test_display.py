@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+import vkbloom
 from tests.framebuffers import decode
+from tests.images import noise_image
 from vkbloom import Renderer, Scene, Separable, Settings, presets
 from vkbloom._scene.skybox import Cubemap
 
@@ -106,3 +108,26 @@ def test_a_renderer_shows_its_adapter(new_renderer: Callable[[], Renderer]) -> N
     assert texts[texts.index("state") + 1] == "open"
     renderer.close()
     assert "closed" in read(renderer).texts
+
+
+def test_notebooks_get_plain_text_with_padded_cells() -> None:
+    """Some notebooks refuse a subclass of str, and have no padding of their own."""
+    image = noise_image(16, 16, 3)
+    with Renderer() as renderer:
+        shown = [
+            renderer,
+            renderer.apply(image),
+            renderer.plan(image, vkbloom.Pyramid(levels=2)),
+            vkbloom.Pyramid(levels=2),
+            Scene.ufo(),
+            presets,
+            vkbloom.testing.report(lambda given: given, size=(32, 32), laws=("gain",)),
+            vkbloom.fit(
+                image, image, vkbloom.Pyramid(), ["intensity"], renderer=renderer, max_calls=3
+            ),
+        ]
+    for one in shown:
+        page = one._repr_html_()
+        assert type(page) is str, one
+        cells = re.findall(r"<t[dh]\b[^>]*>", page)
+        assert all("padding" in cell for cell in cells), one

@@ -65,7 +65,7 @@ def renderer_html(info: AdapterInfo, *, closed: bool) -> str:
 
 def _block(title: str, *body: Markup) -> str:
     heading = element("div", title, style="font-weight:bold;margin-bottom:2px")
-    return element("div", heading, *body, style="color:inherit;font-size:13px")
+    return str(element("div", heading, *body, style="color:inherit;font-size:13px"))
 
 
 def _table(rows: Iterable[tuple[str, str]]) -> Markup:
