@@ -123,13 +123,6 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
     """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
 
     It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> def test_black_stays_black(bloom_renderer):
-    ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
-    ...     assert not frames["final"][..., :3].any()
     """
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 

@@ -25,6 +25,7 @@ from ._methods.blender import BlenderGlare
 from ._methods.convolution import Convolution
 from ._methods.filament import FilamentBloom
 from ._methods.godot import GodotBloom
+from ._methods.halation import Halation
 from ._methods.kino import KinoBloom
 from ._methods.mip_chain import DualKawase, Pyramid
 from ._methods.playcanvas import PlayCanvasBloom
@@ -66,6 +67,7 @@ __all__ = [
     "Glare",
     "GodotBloom",
     "GridReport",
+    "Halation",
     "Halo",
     "HdrpBloom",
     "Image",

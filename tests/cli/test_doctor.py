@@ -593,7 +593,7 @@ def test_caches(
     monkeypatch.setenv(variable, value.format(tmp=tmp_path))
     name = "VKBLOOM_CACHE_DIR" if variable == "XDG_CACHE_HOME" else variable
     finding = by_topic(installation.caches(), f"cache {name}")
-    status, told = expected
-    assert (finding.status, told.format(tmp=tmp_path) in finding.found) == (status, True)
+    status, message = expected
+    assert (finding.status, message.format(tmp=tmp_path) in finding.found) == (status, True)
     assert name in finding.advice or "not writable" not in finding.found
     assert list(tmp_path.iterdir()) == []

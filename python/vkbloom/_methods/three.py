@@ -66,11 +66,6 @@ class ThreeBloom(Settings):
     examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4,
     examples/jsm/tsl/display/BloomNode.js @ 07e4c12b3840, whose defaults these are, since the pass
     has none for radius and threshold.
-
-    Examples
-    --------
-    >>> vkbloom.ThreeBloom(radius=0.5, threshold=0.8).intensity
-    3.0
     """
 
     method: ClassVar[str] = "three"

@@ -88,15 +88,6 @@ class FrameRegression:
     mode : Mode
     records : list of dict
         Each check appends its result.
-
-    Examples
-    --------
-    A test in a module ``test_blur.py``, whose references are made by ``pytest --bloom-update``:
-
-    >>> def test_blur(bloom_renderer, frame_regression):
-    ...     image = np.full((16, 16, 4), 0.5, np.float32)
-    ...     frames = bloom_renderer.apply(image, vkbloom.Pyramid(levels=2))
-    ...     frame_regression.check(frames, atol=1e-3)
     """
 
     def __init__(
