@@ -565,10 +565,15 @@ class TestWidget:
         explorer._handle_custom_msg(opened, [])
         assert sent[-1][0]["name"] == "a.png"
 
-    def test_an_executed_notebook_has_the_first_picture(self, tmp_path: Path) -> None:
+    def test_an_executed_notebook_has_the_first_picture(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         """As nbclient runs it, and as nbconvert writes it for readers without scripts."""
         nbformat, nbclient = map(pytest.importorskip, ("nbformat", "nbclient"))
         nbconvert = pytest.importorskip("nbconvert")
+        # Its templates, also where this Python finds it in another environment.
+        templates = Path(nbconvert.__file__).parents[4] / "share" / "jupyter"
+        monkeypatch.setenv("JUPYTER_PATH", str(templates))
         cells = ["import vkbloom\nvkbloom.explore(size=(64, 36))", "vkbloom.Pyramid()"]
         new = nbformat.v4
         notebook = new.new_notebook(cells=[new.new_code_cell(one) for one in cells])
