@@ -65,9 +65,6 @@ ERRORS = """
 2 : render -o out.png --shading flat => '--shading': 'flat' is not one of 'forward', 'deferred'
 2 : render -o out.png --skybox a.png --skybox b.png => --skybox: given 2 times
 2 : render -o out.foo => '.foo'
-2 : render -o a.gif --frames 2 --framebuffers all => a GIF shows one framebuffer
-2 : render -o a.gif --frames 2 --framebuffers depth => is not a frame of an animation
-2 : render -o a.gif --fps 10 => --fps needs --frames and a GIF
 1 : render -o out.png --scene no.gltf => no.gltf: No such file
 1 : render -o out.png --scene bad.gltf => bad.gltf
 1 : render -o out.png --glow no.gltf => no.gltf: No such file
@@ -160,8 +157,6 @@ ERRORS = """
 2 : explore --no-open --size 0x3 => size
 1 : explore --no-open no.exr => no.exr
 2 : fit a.exr a.exr --vary scatter => vary: the method bevy has no field 'scatter'
-2 : fit a.exr a.exr --bounds threshold => --bounds: 'threshold' is not NAME=LOW:HIGH
-2 : fit a.exr a.exr --bounds threshold=1:x => --bounds: 'threshold=1:x' is not NAME=LOW:HIGH
 2 : fit a.exr a.exr --loss ssim => 'ssim' is not one of 'relative'
 2 : translate --to kino => give what to translate: --preset NAME, --method NAME
 2 : translate --preset kino => Missing option '--to'
