@@ -143,11 +143,11 @@ static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_r
 }
 
 // The columns of a tile; 0: none fits. Wide tiles compute fewer weights, but a workgroup of more
-// than 32 KiB leaves processors idle.
+// than 24 KiB leaves processors idle.
 static uint32_t tile_columns(const struct vkb_variant_choice *choice,
                              const struct vkb_pass_row *pass)
 {
-    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 32 << 10, VEC4 = 4 * sizeof(float) };
+    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 24 << 10, VEC4 = 4 * sizeof(float) };
     const uint32_t limit = choice->device->limits.maxComputeSharedMemorySize;
     const uint32_t window = (uint32_t)pass->constants.window;
     const uint32_t sums = (uint32_t)pass->constants.kernels * tile_rows(&choice->plain, pass);

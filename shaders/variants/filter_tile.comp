@@ -51,15 +51,12 @@ void keep_sums(int column, int row, int line)
 
 vec4 filtered(int column, int number, int first)
 {
-    vec4 sum = vec4(0.0);
+    vec4 of_kernels[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     [[unroll]] for (int i = 0; i < WINDOW; ++i)
-        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel) {
-            float weight = weights[i][GROUP_WIDTH + number][kernel];
-            // Sums are finite. Most rows have no weight in some kernel.
-            if (weight != 0.0)
-                sum += weight * sums[kernel * SOURCE_ROWS + first + i][column];
-        }
-    return sum;
+        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+            of_kernels[kernel] += weights[i][GROUP_WIDTH + number][kernel]
+                                * sums[kernel * SOURCE_ROWS + first + i][column];
+    return sum_of(of_kernels);
 }
 
 void main()
