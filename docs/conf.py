@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 from importlib.metadata import version as _version
 from pathlib import Path
@@ -30,6 +31,7 @@ _here = Path(__file__).parent
 (_here / "examples").mkdir(exist_ok=True)
 for _notebook in (_here.parent / "examples").glob("*.ipynb"):
     shutil.copy(_notebook, _here / "examples")
+runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 nb_execution_mode = "off"
 nb_merge_streams = True
 default_role = "py:obj"

@@ -220,12 +220,3 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({'; '.join(f'{name}: {value}' for name, value in self._rows())})"
-
-    def _repr_html_(self) -> str:
-        """Return the page of `display.scene_html`."""
-        # Imported here, since only notebooks need it.
-        from vkbloom._views import display  # noqa: PLC0415
-
-        return display.scene_html(
-            self._rows(), None if self.skybox is None else self.skybox.levels[0]
-        )

@@ -59,6 +59,7 @@ class Measured:
     report: LawReport
     spread: Spread
     veiling_glare_index: float
+    first_infected: str | None
     nearest: tuple[str, float]
 
 
@@ -164,6 +165,7 @@ def measured(
             patch=max(1, min(probe.size) // 8),
             value=probe.value,
         ),
+        first_infected=subject.first_infected,
         nearest=nearest_preset(name, subject.bloom, renderer),
     )
 
