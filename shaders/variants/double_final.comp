@@ -12,15 +12,9 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, smaller);
 READ_IMAGE(2, own);
-#ifdef MIXED
-READ_IMAGE(3, cotangents);
-WRITE_IMAGE(4);
-#define COTANGENT(pixel) \
-    load_floats(cotangents, read_shapes[2], min(pixel.x, read_shapes[2].x - 1), pixel.y)
-#else
-WRITE_IMAGE(3);
-#endif
+#define ENDED_BINDING 3
 #include "lib/ended.glsl"
+WRITE_IMAGE(ENDED_TARGET);
 
 #define HAS_OWN true
 #define WORDS_COLUMNS DOUBLE_FINAL_COLUMNS
