@@ -629,7 +629,8 @@
     NAME(BOUNDARY_ZERO, 0, zero) \
     NAME(BOUNDARY_EDGE, 1, edge) \
     NAME(BOUNDARY_WRAP, 2, wrap) \
-    NAME(BOUNDARY_WRAP_X, 3, wrap_x)
+    NAME(BOUNDARY_WRAP_X, 3, wrap_x) \
+    NAME(BOUNDARY_MIRROR, 4, mirror)
 
 #define TYPE_NAMES(NAME) \
     NAME(TYPE_BLOOM, 0, bloom) \
@@ -713,6 +714,7 @@
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \
     NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
+    NAME(GROUPS_UNREAL, 17, unreal) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \

@@ -91,6 +91,7 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
         return pass->constants.thresholded ? 4 : 1;
     case GROUPS_URP:
     case GROUPS_POST_PROCESSING:
+    case GROUPS_UNREAL:
     case GROUPS_THREE:
     case GROUPS_BABYLON:
     case GROUPS_PYGFX:

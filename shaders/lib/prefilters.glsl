@@ -121,6 +121,12 @@ float babylon_factor(vec4 value)
     return THRESHOLDED == 0 || dot(value.rgb, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2) ? 1.0 : 0.0;
 }
 
+// Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
+float unreal_share(vec4 value)
+{
+    return THRESHOLDED == 0 ? 1.0 : dot(value.rgb, LUMINANCE) + 1.0 - params.threshold;
+}
+
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 vec4 three_prefiltered(vec4 value)
@@ -144,6 +150,8 @@ int group_count()
     if (GROUPS == GROUPS_URP)
         return 1;
     if (GROUPS == GROUPS_POST_PROCESSING)
+        return 1;
+    if (GROUPS == GROUPS_UNREAL)
         return 1;
     if (GROUPS == GROUPS_THREE)
         return 1;
@@ -206,5 +214,7 @@ vec4 made(vec4 found[5], vec4 shares)
         return babylon_factor(found[0]) * found[0];
     if (GROUPS == GROUPS_THREE)
         return three_prefiltered(found[0]);
+    if (GROUPS == GROUPS_UNREAL)
+        return clamp(unreal_share(found[0]), 0.0, 1.0) * found[0];
     return unity_prefiltered(found[0]);
 }

@@ -146,6 +146,14 @@ vec4 back_three(vec4 value, vec4 cotangent)
     return t * t * (3.0 - 2.0 * t) * cotangent + vec4(weights, 0.0) * (slope * dot(cotangent, value));
 }
 
+vec4 back_unreal(vec4 value, vec4 cotangent)
+{
+    float share = unreal_share(value);
+    vec2 inside = vec2(larger(vec4(share), vec4(0.0)).x, larger(vec4(1.0), vec4(share)).x);
+    float slope = THRESHOLDED == 0 ? 0.0 : inside.x * inside.y * dot(cotangent, value);
+    return clamp(share, 0.0, 1.0) * cotangent + vec4(slope * LUMINANCE, 0.0);
+}
+
 // The cotangents of the three values of a median.
 vec4[3] back_middle(vec4 a, vec4 b, vec4 c, vec4 cotangent)
 {
@@ -241,6 +249,8 @@ vec4 back(vec4 found[5], vec4 cotangent, Place place)
         return babylon_factor(found[0]) * cotangent;
     if (GROUPS == GROUPS_THREE)
         return back_three(found[0], cotangent);
+    if (GROUPS == GROUPS_UNREAL)
+        return back_unreal(found[0], cotangent);
     if (GROUPS == GROUPS_PYGFX)
         return cotangent * larger(pygfx_mean(taps_of(place)), vec4(0.0));
     if (GROUPS == GROUPS_HIGHLIGHTS)

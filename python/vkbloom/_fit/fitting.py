@@ -208,7 +208,7 @@ def fit(
     for space, cost in priced:
         if not space.axes:
             continue
-        with _bar(progress, space.start.method, max_calls) as told:
+        with _bar(progress, space.start.method, max_calls) as on_loss:
             one = _fitted(
                 renderer,
                 stages,
@@ -216,7 +216,7 @@ def fit(
                 cost,
                 framebuffer,
                 max_calls=max_calls,
-                told=told,
+                on_loss=on_loss,
                 gradient=gradient,
             )
             found.append(one)
@@ -335,7 +335,7 @@ def _fitted(
     framebuffer: str,
     *,
     max_calls: int,
-    told: Callable[[float], None],
+    on_loss: Callable[[float], None],
     gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
@@ -361,7 +361,7 @@ def _fitted(
             render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
-            told=told,
+            on_loss=on_loss,
             close=_close(stage, framebuffer),
         )
         with _one_thread():
@@ -459,7 +459,7 @@ def _smaller(settings: Settings, factor: int) -> Settings:
 
 @contextlib.contextmanager
 def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
-    """Give the function that is told each loss, and shows it where asked for."""
+    """Give the function that gets each loss, and shows it where asked for."""
     if not progress:
         yield lambda loss: None
         return

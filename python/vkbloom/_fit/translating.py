@@ -36,6 +36,7 @@ _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "three": ("threshold", "radius"),
     "post_processing": ("threshold", "diffusion"),
     "unreal": ("size_scale",),
+    "halation": ("pixel_size",),
     "pmndrs": ("threshold", "radius"),
     "babylon": ("threshold", "kernel"),
     "playcanvas": ("threshold", "blur_level"),

@@ -92,7 +92,7 @@ def vjp(
     settings = check_settings(settings, of_image=True)
     renderer = renderer or default_renderer()
     renderer._pending.wait()
-    if hasattr(settings, "twin"):
+    if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )

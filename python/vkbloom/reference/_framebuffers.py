@@ -86,7 +86,7 @@ def apply(
     >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
     True
     """
-    if (function := getattr(settings, "twin", None)) is not None:
+    if (function := getattr(settings, "numpy_reference", None)) is not None:
         scene = as_float(image, "image", (3, 4))
         return custom.framebuffers(function, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
@@ -203,13 +203,6 @@ def passes(
     ------
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> glow = np.full((16, 16, 3), 0.5)
-    >>> list(reference.passes(glow, vkbloom.DualKawase(levels=2)))
-    ['down_0', 'down_1', 'up_0', 'bloom']
     """
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
@@ -247,13 +240,6 @@ def blur(
     -------
     ndarray of float64, shape (height, width, C)
         "bloom" of `passes`.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> glow = np.full((16, 16, 3), 0.5)
-    >>> float(reference.blur(glow, vkbloom.Pyramid(levels=2))[8, 8, 0])
-    0.5
     """
     return passes(glow, settings, size, format)["bloom"]
 

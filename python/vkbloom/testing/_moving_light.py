@@ -264,7 +264,7 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
             "allowed",
         )
     check_inside(found.at_border, probe.size)
-    told = {
+    shown = {
         "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
         "jitter": (
             np.hypot(found.shift[..., 0], found.shift[..., 1]),
@@ -279,13 +279,13 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
         "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
     }
     laws = {
-        name: f"{told[name][1]} stays the same while a light smaller than a pixel moves"
+        name: f"{shown[name][1]} stays the same while a light smaller than a pixel moves"
         for name in limits
     }
     off = {name: getattr(found, name) for name in limits}
     over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
     for name in over[:1]:
-        values, what, how = told[name]
+        values, what, how = shown[name]
         fail(
             "assert_stable",
             laws[name],
