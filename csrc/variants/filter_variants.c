@@ -167,7 +167,7 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
     FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);
     make_strips(choice, up, &row, pass->transposed ? mixed_shaders : final_shaders);
-    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
+    row.constants.format = vkb_storage_mode(plain->images[pass->reads[1]].format);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

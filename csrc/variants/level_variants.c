@@ -274,7 +274,7 @@ bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct
     row.block = VKB_BLOCK_filter_final;
     params->coarse = up->params.filter.coarse;
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);
-    row.constants.format = vkb_stored_as(choice->device, plain->images[pass->reads[1]].format);
+    row.constants.format = vkb_storage_mode(plain->images[pass->reads[1]].format);
     memcpy(params->taps, up->params.filter.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
