@@ -14,6 +14,7 @@
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
 # make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
 #   tries it in a fresh environment.
+# make test-pure: runs the tests that need no device with the wheel for all systems, which has no core.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
 # make test-aarch64: runs the fast part of the tests with the aarch64 wheels of dist/ under QEMU; as root.
@@ -51,7 +52,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views tests/grid/test_grid_order.py
 
 .PHONY: demo test test-devices exhaustive check docs tables bench engines engine-laws libplacebo cluster wheels lint \
-	freethreaded try-core try-wheels test-aarch64 format sanitize clean
+	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
 demo: build/stamp/core
@@ -101,6 +102,16 @@ freethreaded: build/stamp/core build/stamp/test
 
 try-core: build/stamp/core
 	packaging/try_core.sh $(PYTHON)
+
+# The wheel's files are found before those of the checkout.
+PURE := build/pure
+test-pure: build/stamp/core build/stamp/test
+	rm -rf $(PURE) && mkdir -p $(PURE)/site
+	VKBLOOM_PURE=1 $(PYTHON) setup.py --quiet egg_info --egg-base $(PURE) build --build-base \
+	    $(PURE)/build bdist_wheel --dist-dir $(PURE) 2>$(PURE)/log || { cat $(PURE)/log; exit 1; }
+	$(PYTHON) -m zipfile -e $(PURE)/*.whl $(PURE)/site
+	PYTHONPATH=$(PURE)/site $(PYTHON) -m pytest -q -p tests.no_core tests/core/test_settings.py \
+	    tests/psf tests/plugin/test_comparison.py tests/plugin/test_diagnosis.py tests/plugin/test_laws.py
 
 try-wheels:
 	packaging/try_bare.sh $(ROOTS)
@@ -153,13 +164,13 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
 	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
-	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
+	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h packaging/*/*.c tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 
 format: build/stamp/lint
 	$(VENV)/bin/ruff check --fix-only .
 	$(VENV)/bin/ruff format .
-	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h tests/*/*.c tools/*/*.c
+	$(VENV)/bin/clang-format -i csrc/*/*.c csrc/*/*.h packaging/*/*.c tests/*/*.c tools/*/*.c
 
 # Tests of the core with ASan, UBSan and LeakSanitizer; beside them, threads with ThreadSanitizer.
 # Their output is shown last, since a failure among the tests' lines is easily overlooked.

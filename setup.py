@@ -37,6 +37,8 @@ MADE = "made.json"
 STAGES = (".vert", ".frag", ".comp")
 # Python without the GIL has no stable ABI: a core for that version alone.
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
+# A wheel without the core, for systems that it is not built for.
+PURE = os.environ.get("VKBLOOM_PURE") == "1"
 LIMITED_API = [("Py_LIMITED_API", "0x030b0000")] if LIMITED else []
 # Of the package itself, which cannot be imported before its core is built.
 without_contraction = runpy.run_path("python/vkbloom/_custom/spirv.py")["without_contraction"]
@@ -416,7 +418,9 @@ def volk_folder() -> str:
 
 
 setup(
-    ext_modules=[
+    ext_modules=[]
+    if PURE
+    else [
         Extension(
             "vkbloom._core",
             sources=sorted(str(path) for path in Path("csrc").rglob("*.c")),
@@ -431,5 +435,5 @@ setup(
         )
     ],
     cmdclass={"build_ext": BuildCore, "sdist": DistributeSpirv},
-    options={"bdist_wheel": {"py_limited_api": "cp311"}} if LIMITED else {},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}} if LIMITED and not PURE else {},
 )

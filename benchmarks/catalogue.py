@@ -26,8 +26,6 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "forward": "the time that bloom adds to a forward frame, against the source's variant",
         "requests": "many requests with one image, against single calls",
         "cost": "cost against pixels, kernel length and levels",
-        "overhead": "the constant cost of a call",
-        "custom": "a custom method against the same rows built in, and loading it",
         "startup": "import, renderer and first frame, in fresh processes",
         "convolution": "convolution with large kernels against SciPy's transforms",
         "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import runpy
 import shutil
 from importlib.metadata import version as _version
 from pathlib import Path
 from typing import Any
 
-from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 project = "vkbloom"
@@ -19,6 +20,8 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx_copybutton",
+    "sphinxcontrib.mermaid",
 ]
 exclude_patterns = ["README.md", "evidence/*_table.md"]
 
@@ -28,12 +31,17 @@ _here = Path(__file__).parent
 (_here / "examples").mkdir(exist_ok=True)
 for _notebook in (_here.parent / "examples").glob("*.ipynb"):
     shutil.copy(_notebook, _here / "examples")
+runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 nb_execution_mode = "off"
 nb_merge_streams = True
 default_role = "py:obj"
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
+# The browser draws flowcharts. MERMAID: a file of mermaid, for pages without a network.
+myst_fence_as_directive = ["mermaid"]
+if _mermaid := os.environ.get("MERMAID"):
+    mermaid_use_local = _mermaid
 
 autosummary_generate = True
 autodoc_typehints = "none"
@@ -55,8 +63,7 @@ def _make_accessible(*arguments: Any) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Flowcharts are for GitHub and editors; here their text is shown."""
-    app.add_lexer("mermaid", TextLexer)
+    """Change pages when they are written."""
     # After the theme's own handler, which makes the navigation.
     app.connect("html-page-context", _make_accessible, priority=900)
 

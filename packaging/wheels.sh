@@ -93,6 +93,8 @@ check_glibc() {
 }
 mkdir -p dist
 cp "$sdist" dist/
+# The wheel for all systems.
+VKBLOOM_PURE=1 "$work/check/bin/python" -m pip wheel --quiet --no-deps --wheel-dir dist "$sdist"
 for MACHINE in $machines; do
     . packaging/machine.sh
     build=/build/$MACHINE

@@ -453,7 +453,7 @@
 // channel in bytes.
 #define HALVE_WORDS_COLUMNS           8
 #define HALVE_WORDS_ROWS              32
-#define REDUCE_COLUMNS                4
+#define PREFILTER_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
 #define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
 #define DOUBLE_FINAL_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
 #define DOUBLE_WORDS_ROWS             64
@@ -464,8 +464,7 @@
 #define SHRINK_ROWS                   32
 #define GATHER_COLUMNS                4
 #define GATHER_ROWS                   16
-#define GODOT_COLUMNS                 8
-#define HDRP_OUTPUTS                  8
+#define NINE_OUTPUTS                  8
 #define STREAK_COLUMNS                8
 #define STREAK_ROWS                   32
 #define TILE_LOADED                   64
@@ -630,7 +629,8 @@
     NAME(BOUNDARY_ZERO, 0, zero) \
     NAME(BOUNDARY_EDGE, 1, edge) \
     NAME(BOUNDARY_WRAP, 2, wrap) \
-    NAME(BOUNDARY_WRAP_X, 3, wrap_x)
+    NAME(BOUNDARY_WRAP_X, 3, wrap_x) \
+    NAME(BOUNDARY_MIRROR, 4, mirror)
 
 #define TYPE_NAMES(NAME) \
     NAME(TYPE_BLOOM, 0, bloom) \
@@ -714,6 +714,7 @@
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \
     NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
+    NAME(GROUPS_UNREAL, 17, unreal) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \

@@ -4,6 +4,7 @@ python tools/docs_pictures.py docs/pictures
 
 - gallery.jpg: the saucer with each preset
 - presets.png, profiles.png: how the light of a point spreads with each preset
+- hero.jpg: the saucer without bloom beside the saucer with bloom
 - the flowchart of docs/plans.md, from a plan
 """
 
@@ -25,8 +26,29 @@ from matplotlib import pyplot as plt
 
 SIZE = (640, 360)
 CELL = (480, 270)
+HERO = (1280, 640)
 # The square around a point in pixels, and the range of its logarithmic scale.
 SIDE, DECADES = 300, 5
+
+
+def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
+    """Draw the wipe of the first page; its words can be read on a telephone."""
+    scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
+    lit = vkbloom.presets["bevy_natural"].replace(intensity=0.5, tonemap="aces", encoding="srgb")
+    off, on = (
+        renderer.render(scene, one, HERO, shading="deferred", framebuffers="final")["final"]
+        for one in (lit.replace(intensity=0), lit)
+    )
+    width, half = HERO[0], HERO[0] // 2
+    figure = plt.figure(figsize=(width / 100, HERO[1] / 100))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.imshow(np.concatenate([off[:, :half, :3], on[:, half:, :3]], axis=1))
+    axes.axvline(half - 0.5, color="white", linewidth=3)
+    axes.text(24, 60, "no bloom", color="white", fontsize=34)
+    axes.text(width - 24, 60, "bloom", color="white", fontsize=34, ha="right")
+    figure.savefig(path, dpi=100, pil_kwargs={"quality": 88})
+    plt.close(figure)
 
 
 def write_sheet(path: Path, tiles: list[tuple[np.ndarray, str]], columns: int) -> None:
@@ -112,6 +134,7 @@ def main(folder: Path) -> None:
     """Write all pictures."""
     write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
+        draw_hero(renderer, folder / "hero.jpg")
         draw_gallery(renderer, folder / "gallery.jpg")
         draw_points(renderer, folder)
 

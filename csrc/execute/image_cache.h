@@ -39,13 +39,6 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
 
 void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache);
 
-// Checks that the device supports the graph's images, with the usage that the passes need.
-bool vkb_image_cache_check(const struct vkb_device *device, const struct vkb_graph *graph,
-                           struct vkb_error *error);
-
-// The same for one row.
-bool vkb_image_row_check(const struct vkb_device *device, const struct vkb_image_row *row,
-                         struct vkb_error *error);
 // Whether the image has the row's size, format and usage; and the creation of such an image outside
 // of the cache.
 bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row);

@@ -2,6 +2,7 @@
 
 #include "spirv/module.h"
 
+#include <math.h>
 #include <string.h>
 
 struct need {
@@ -131,9 +132,107 @@ static bool check_workgroup(const struct vkb_device *device, const struct vkb_pa
                  {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize), .needed = shared});
 }
 
-bool vkb_limits_check(const struct vkb_device *device, const struct vkb_pass_row *pass,
-                      struct vkb_error *error)
+static bool check_pass(const struct vkb_device *device, const struct vkb_pass_row *pass,
+                       struct vkb_error *error)
 {
     return check_bindings(device, pass, error)
         && (pass->geometry != VKB_GEOMETRY_DISPATCH || check_workgroup(device, pass, error));
+}
+
+bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,
+                            struct vkb_error *error)
+{
+    static const struct {
+        VkImageUsageFlags usage;
+        VkFormatFeatureFlags feature;
+        const char *words;
+    } rows[] = {
+        {VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT,
+         VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT, "render to"},
+        {VK_IMAGE_USAGE_SAMPLED_BIT, VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT, "sample"},
+        {VK_IMAGE_USAGE_STORAGE_BIT, VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT, "store"},
+    };
+
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
+        if ((row->usage & rows[i].usage)
+            && !vkb_device_supports(device, row->format, rows[i].feature))
+            return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter %s cannot %s %s images",
+                            device->adapter.name, rows[i].words, vkb_formats[row->format].name);
+    return true;
+}
+
+static bool check_format(const struct vkb_device *device, const struct vkb_graph *graph,
+                         uint32_t image, struct vkb_error *error)
+{
+    const enum vkb_format format = graph->images[image].format;
+
+    if (!vkb_limits_check_image(device, &graph->images[image], error))
+        return false;
+    if (vkb_graph_blends(graph, image)
+        && !vkb_device_supports(device, format, VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT))
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "the adapter %s cannot add up layers in %s images, but in %s it can",
+                        device->adapter.name, vkb_formats[format].name,
+                        vkb_formats[VKB_FORMAT_RGBA16_FLOAT].name);
+    return true;
+}
+
+// Dispatches that variants chose do not come here without them.
+static bool check_passes(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        if (pass->geometry == VKB_GEOMETRY_DISPATCH && !device->dispatch)
+            return vkb_fail(error, VKB_ERROR_GENERAL,
+                            "the compute shaders of %s cannot write images, which the pass %s "
+                            "needs",
+                            device->adapter.name, pass->name);
+        // Plans without a renderer know no limits.
+        if (pass->block == VKB_BLOCK_own && device->limits.maxPerStageResources
+            && !check_pass(device, pass, error))
+            return false;
+    }
+    return true;
+}
+
+// All images must fit the largest heap of the device together. Those of a convolution are many
+// times larger than the frame.
+static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
+                         struct vkb_error *error)
+{
+    const uint64_t needed = vkb_graph_size(graph);
+    uint64_t largest = 0;
+    bool convolves = false;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        convolves = convolves || graph->images[i].serial;
+    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
+        if (device->memory.memoryHeaps[i].size > largest)
+            largest = device->memory.memoryHeaps[i].size;
+    // Plans without a renderer know no heaps.
+    if (!largest || needed <= largest)
+        return true;
+    vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,
+             "memory is short: %llu MiB of images are needed, and the adapter %s has %llu",
+             (unsigned long long)(needed >> 20), device->adapter.name,
+             (unsigned long long)(largest >> 20));
+    const struct vkb_image_row *image = &graph->images[0];
+    const double share = sqrt((double)largest / (double)needed);
+    if (convolves)
+        vkb_add_words(error, "; use a smaller bloom_scale or kernel_size");
+    else
+        vkb_add_words(error, "; an image of %u x %u fits, or use a smaller bloom_scale",
+                      (uint32_t)(share * image->width), (uint32_t)(share * image->height));
+    return false;
+}
+
+bool vkb_limits_check_graph(const struct vkb_device *device, const struct vkb_graph *graph,
+                            struct vkb_error *error)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (!check_format(device, graph, i, error))
+            return false;
+    return check_passes(device, graph, error) && check_memory(device, graph, error);
 }

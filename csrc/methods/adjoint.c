@@ -23,7 +23,7 @@ static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_sun_beams] = vkb_transpose_sun_beams,
 };
 
-// The image of a framebuffer's cotangents, which the source brings.
+// The image of a framebuffer's cotangents, a level of the source.
 static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source *source,
                            const struct vkb_cotangents *cotangents, uint32_t number,
                            struct vkb_error *error)
@@ -33,7 +33,7 @@ static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source 
     const struct vkb_level *level = &source->image.levels[number];
 
     if (image == VKB_NO_IMAGE || number >= source->image.level_count
-        || adjoint->brought[image] != VKB_NO_IMAGE)
+        || adjoint->cotangents[image] != VKB_NO_IMAGE)
         return vkb_fail(error, VKB_ERROR_VALUE, "cotangents: unknown framebuffer '%s'", name);
     struct vkb_image_row row = {
         // Half floats come from arrays on the device.
@@ -48,7 +48,7 @@ static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source 
         || level->size.height != row.height)
         return vkb_fail(error, VKB_ERROR_VALUE,
                         "cotangents: %s is of another size or format than its framebuffer", name);
-    return vkb_graph_add_image(adjoint->graph, &row, &adjoint->brought[image], error);
+    return vkb_graph_add_image(adjoint->graph, &row, &adjoint->cotangents[image], error);
 }
 
 // The image of the weights, which are complete when all passes are there.
@@ -103,7 +103,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
         vkb_transpose *transpose = transposes[pass.block];
-        if (pass.target_count != 1 || vkb_brought(adjoint, &pass) == VKB_NO_IMAGE)
+        if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
         const bool convolved = pass.block == VKB_BLOCK_fft;
         *possible = convolved || transpose;
@@ -131,7 +131,7 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
         }
 }
 
-// Of the passes that bring to an image, one after the other, only the last one removes NaN and
+// Of the passes that accumulate an image's cotangents, only the last one removes NaN and
 // infinity.
 static void end_at_last(struct vkb_graph *graph, uint32_t first)
 {
@@ -160,10 +160,10 @@ static void show_results(struct vkb_adjoint *adjoint, uint32_t image_count)
 
     for (uint32_t i = 0; i < image_count; ++i) {
         const struct vkb_image_row *forward = &adjoint->graph->images[i];
-        const uint32_t brought = adjoint->brought[i];
-        if (forward->input == VKB_INPUT_NONE || brought == VKB_NO_IMAGE)
+        const uint32_t cotangents = adjoint->cotangents[i];
+        if (forward->input == VKB_INPUT_NONE || cotangents == VKB_NO_IMAGE)
             continue;
-        struct vkb_image_row *row = &adjoint->graph->images[brought];
+        struct vkb_image_row *row = &adjoint->graph->images[cotangents];
         snprintf(row->name, sizeof row->name, "%s", names[forward->input]);
         row->framebuffer = true;
         row->channels = forward->input == VKB_INPUT_MASK ? 1 : forward->channels;
@@ -188,10 +188,10 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         return false;
     find_glow(&adjoint, cotangents);
     const uint32_t image_count = *first = graph->image_count, pass_count = graph->pass_count;
-    adjoint.brought = vkb_alloc(error, image_count, sizeof *adjoint.brought);
-    bool done = adjoint.brought && add_table(&adjoint, error);
-    for (uint32_t i = 0; adjoint.brought && i < image_count; ++i)
-        adjoint.brought[i] = VKB_NO_IMAGE;
+    adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
+    bool done = adjoint.cotangents && add_table(&adjoint, error);
+    for (uint32_t i = 0; adjoint.cotangents && i < image_count; ++i)
+        adjoint.cotangents[i] = VKB_NO_IMAGE;
     for (uint32_t i = 0; done && i < cotangents->count; ++i)
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
@@ -200,6 +200,6 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (done && !cotangents->sums)
         show_results(&adjoint, image_count);
     vkb_free(adjoint.table.texels);
-    vkb_free(adjoint.brought);
+    vkb_free(adjoint.cotangents);
     return done;
 }

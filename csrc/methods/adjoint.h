@@ -6,7 +6,7 @@
 #include "graph/graph.h"
 #include "methods/source.h"
 
-// The framebuffers with cotangents, which the source brings as its levels.
+// The framebuffers with cotangents, which are the levels of the source.
 struct vkb_cotangents {
     vkb_image_name names[GATHERED_LEVELS];
     uint32_t count;

@@ -1,7 +1,7 @@
 // The adjoint of a convolution: a convolution of the cotangents with the mirrored kernel. With a
 // period, or zeros beyond the edges, it is one of the same size. Pixels beyond an edge that is
 // repeated have cotangents of their own, so the image is extended by them, with zeros; then these
-// fold back to the edge.
+// fold back to the edge. With a mirror, whose kernels are symmetric, it is the convolution itself.
 #include "methods/adjoint.h"
 #include "passes/adjoint.h"
 
@@ -35,7 +35,8 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// What is convolved: the glow, or in Blender's lower qualities the highlights before it.
+// What is convolved: the glow, or highlights, in Blender's lower qualities and above Unreal's
+// threshold.
 static uint32_t find_source(const struct vkb_graph *graph)
 {
     const uint32_t highlights = vkb_graph_find(graph, "highlights");
@@ -59,19 +60,20 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
     const float *prefilter = settings->kernel.prefilter;
     struct vkb_settings mirrored = *settings;
-    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_brought(adjoint, pass)};
+    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
     struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
     uint32_t convolved;
 
-    mirrored.choices[VKB_CHOICE_boundary] =
-        boundary == BOUNDARY_ZERO ? BOUNDARY_ZERO : BOUNDARY_WRAP;
+    if (boundary != BOUNDARY_MIRROR)
+        mirrored.choices[VKB_CHOICE_boundary] =
+            boundary == BOUNDARY_ZERO ? BOUNDARY_ZERO : BOUNDARY_WRAP;
     vkb_axis_move(&filter.x, extended.width, size.width, left);
     vkb_axis_move(&filter.y, extended.height, size.height, above);
-    if (!mirror_kernel(kernel, graph, &mirrored.kernel, error)
+    if ((boundary != BOUNDARY_MIRROR && !mirror_kernel(kernel, graph, &mirrored.kernel, error))
         || (edge_y
-            && !vkb_filter_apart(adjoint, &filter, source.glow, extended, &source.glow, error))
+            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error))
         || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
         return false;
     // The alpha is one of a cotangent, not 1.
@@ -80,8 +82,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
     if (prefilter[0] > prefilter[1])
-        return vkb_bring_filter(adjoint, &filter, convolved, glow, error);
-    return vkb_filter_apart(adjoint, &filter, convolved, size, &convolved, error)
+        return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
+    return vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error)
         && vkb_transpose_bright(adjoint, prefilter, glow, convolved,
                                 (enum vkb_mode)pass->constants.alpha, error);
 }

@@ -3,13 +3,6 @@
 #include "methods/methods.h"
 #include "passes/levels.h"
 
-#include <math.h>
-
-static uint32_t scaled(uint32_t side, double scale)
-{
-    return (uint32_t)fmax(1.0, floor(side * scale));
-}
-
 bool vkb_add_babylon(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
@@ -20,8 +13,8 @@ bool vkb_add_babylon(const struct vkb_settings *settings, const struct vkb_bloom
     const double scale = settings->values.scale_x;
     uint32_t bright;
 
-    levels.sizes[0] = (struct vkb_size){scaled(source->buffers.width, scale),
-                                        scaled(source->buffers.height, scale)};
+    levels.sizes[0] = (struct vkb_size){vkb_scaled(source->buffers.width, scale),
+                                        vkb_scaled(source->buffers.height, scale)};
     if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &bright, error))
         return false;
     struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_BABYLON, source->glow, bright);

@@ -5,8 +5,8 @@
 // Along an axis the glow has `extent` pixels, and of the kernel count the offsets from -before to
 // after: what reaches farther falls outside everywhere (zero), is added to the last offset (edge),
 // or to the one a period away (wrap). Transforms are periodic, so that the lines are padded by as
-// much as the kernel reaches: on both sides for an edge, whose pixels lie there; on the longer side
-// for zeros, which both sides share; not at all for a period that a transform can have.
+// much as the kernel reaches: on both sides for an edge or a mirror, whose pixels lie there; on the
+// longer side for zeros, which both sides share; not at all for a period that a transform can have.
 #include "methods/methods.h"
 #include "passes/fft.h"
 #include "passes/levels.h"
@@ -46,7 +46,7 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
     const uint32_t kernel = reach->kernel;
     struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
 
-    reach->before = least(kernel / 2, extent - 1);
+    reach->before = least(kernel / 2, boundary == BOUNDARY_MIRROR ? extent : extent - 1);
     reach->after = least(kernel - 1 - kernel / 2, extent - 1);
     uint32_t padding = reach->before + reach->after;
     if (boundary == BOUNDARY_WRAP && kernel >= extent) {
@@ -302,6 +302,13 @@ bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_b
         && (same || vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, *bloom, 1.0, bloom, error));
 }
 
+// Film's halation: the kernel is a sum of Gaussians, too.
+bool vkb_add_halation(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+{
+    return vkb_add_unreal(settings, source, graph, bloom, error);
+}
+
 // Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.
 bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
@@ -309,12 +316,11 @@ bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_
     const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     struct vkb_bloom_source masked = *source;
 
-    if (source->mask == VKB_NO_IMAGE)
+    if (source->mask == VKB_NO_IMAGE && !settings->thresholded)
         return vkb_add_convolution(settings, source, graph, bloom, error);
-    if (!vkb_levels_step(&levels, "masked", 0, source->buffers, &masked.glow, error))
+    if (!vkb_levels_step(&levels, "highlights", 0, source->buffers, &masked.glow, error))
         return false;
-    // Without a threshold these groups are the image itself.
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, masked.glow);
+    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_UNREAL, source->glow, masked.glow);
     vkb_mask_prefilter(&levels, &row);
     return vkb_graph_add_pass(graph, &row, error)
         && vkb_add_convolution(settings, &masked, graph, bloom, error);

@@ -1,7 +1,7 @@
 // Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
 // Assets/Kino/Bloom/Bloom.cs.
 #include "methods/methods.h"
-#include "passes/filter.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -19,19 +19,14 @@ static double choose_sizes(struct vkb_levels *levels)
     return 0.5 + lg - trunc(lg);
 }
 
-// A box of 4 x 4 texels, as four diagonal taps at a distance of one texel.
+// The first level's box may weight its taps against fireflies.
 static bool add_box(const struct vkb_levels *levels, bool firefly_filter, uint32_t from,
                     uint32_t to, struct vkb_error *error)
 {
-    const struct vkb_side_taps sides = {1.0, 0.5, 0.0};
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+    const struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BOX, from, to);
 
-    if (firefly_filter) {
-        row = vkb_groups_row(levels, GROUPS_BOX, from, to);
-        return vkb_graph_add_pass(levels->graph, &row, error);
-    }
-    vkb_filter_add(&row, 0, sides, sides);
-    return vkb_filter_end(levels, &row, error);
+    return firefly_filter ? vkb_graph_add_pass(levels->graph, &row, error)
+                          : vkb_levels_box(levels, from, to, error);
 }
 
 bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,

@@ -1,6 +1,6 @@
 #include "methods/methods.h"
+#include "passes/levels.h"
 
-#include <math.h>
 #include <string.h>
 
 static bool (*const methods[VKB_METHOD_COUNT])(const struct vkb_settings *,
@@ -22,12 +22,6 @@ bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_s
             || vkb_add_light(settings, source, stages, graph, bloom, error));
 }
 
-static uint32_t scaled(double scale, uint32_t side)
-{
-    double size = floor(scale * side);
-    return size < 1.0 ? 1 : (uint32_t)size;
-}
-
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,
                      uint32_t max_side, struct vkb_error *error)
 {
@@ -42,7 +36,7 @@ struct vkb_size vkb_bloom_size(const struct vkb_settings *settings, struct vkb_s
     if (settings->bloom_width)
         return (struct vkb_size){settings->bloom_width, settings->bloom_height};
     return (struct vkb_size){
-        .width = scaled(settings->values.bloom_scale, frame.width),
-        .height = scaled(settings->values.bloom_scale, frame.height),
+        .width = vkb_scaled(frame.width, settings->values.bloom_scale),
+        .height = vkb_scaled(frame.height, settings->values.bloom_scale),
     };
 }

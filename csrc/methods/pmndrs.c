@@ -3,13 +3,6 @@
 #include "methods/methods.h"
 #include "passes/filter.h"
 
-#include <math.h>
-
-static struct vkb_size rounded_half(struct vkb_size size)
-{
-    return (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
-}
-
 // The weights of the source are rounded: they add up to 1.00004.
 static bool add_down(struct vkb_levels *levels, uint32_t level, uint32_t from,
                      struct vkb_error *error)
@@ -42,7 +35,7 @@ bool vkb_add_pmndrs(const struct vkb_settings *settings, const struct vkb_bloom_
     if (!vkb_graph_add_pass(graph, &row, error))
         return false;
     for (; levels.count < (uint32_t)settings->values.levels; from = levels.downs[levels.count++]) {
-        levels.sizes[levels.count] = size = rounded_half(size);
+        levels.sizes[levels.count] = size = vkb_halved_up(size);
         if (!add_down(&levels, levels.count, from, error))
             return false;
     }

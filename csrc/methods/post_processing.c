@@ -1,7 +1,7 @@
 // The bloom of Unity's Post Processing Stack v2. Source: Unity-Technologies/PostProcessing
 // @ 32c3155207d3, PostProcessing/Runtime/Effects/Bloom.cs, Shaders/Builtins/Bloom.shader.
 #include "methods/methods.h"
-#include "passes/filter.h"
+#include "passes/levels.h"
 
 #include <math.h>
 
@@ -9,13 +9,8 @@
 static bool reduce(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                    struct vkb_error *error)
 {
-    const struct vkb_side_taps corners = {1.0, 0.5, 0.0};
-
-    if (!levels->settings->values.fast)
-        return vkb_levels_reduce(levels, 0.5, 0.5, from, to, error);
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
-    vkb_filter_add(&row, 0, corners, corners);
-    return vkb_filter_end(levels, &row, error);
+    return levels->settings->values.fast ? vkb_levels_box(levels, from, to, error)
+                                         : vkb_levels_reduce(levels, 0.5, 0.5, from, to, error);
 }
 
 static bool add_first(struct vkb_levels *levels, struct vkb_error *error)

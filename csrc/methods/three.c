@@ -22,8 +22,7 @@ static bool is_node(const struct vkb_settings *settings)
 // The pass rounds the half size, the node floors it.
 static struct vkb_size half_of(const struct vkb_settings *settings, struct vkb_size size)
 {
-    return is_node(settings) ? vkb_halved(size)
-                             : (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
+    return is_node(settings) ? vkb_halved(size) : vkb_halved_up(size);
 }
 
 // Of "bright" and of the first level.
@@ -33,8 +32,7 @@ static struct vkb_size first_of(const struct vkb_settings *settings, struct vkb_
 
     if (!is_node(settings))
         return half_of(settings, frame);
-    return (struct vkb_size){(uint32_t)fmax(1.0, floor(frame.width * scale)),
-                             (uint32_t)fmax(1.0, floor(frame.height * scale))};
+    return (struct vkb_size){vkb_scaled(frame.width, scale), vkb_scaled(frame.height, scale)};
 }
 
 // Two neighbouring taps become one sample between them. Returns the number of taps.

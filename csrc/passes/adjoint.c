@@ -6,9 +6,9 @@
 // A filter whose texels are read by no more pixels than this is one pass, not one for each axis.
 static const double MAX_IN_ONE_PASS = 20.0;
 
-uint32_t vkb_brought(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass)
+uint32_t vkb_cotangent_of(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass)
 {
-    return adjoint->brought[pass->targets[0]];
+    return adjoint->cotangents[pass->targets[0]];
 }
 
 struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
@@ -21,6 +21,23 @@ struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint3
         row.reads[row.read_count] = reads[row.read_count];
         ++row.read_count;
     }
+    return row;
+}
+
+struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
+                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader,
+                                  uint32_t images)
+{
+    struct vkb_pass_row row = vkb_adjoint_row(shader, pass->reads, images);
+
+    // In place of a mask that the pass does not read, its image.
+    for (uint32_t i = pass->read_count; i < images; ++i)
+        row.reads[i] = pass->reads[0];
+    row.reads[row.read_count++] = vkb_cotangent_of(adjoint, pass);
+    row.constants = pass->constants;
+    row.constants.dither = 0;
+    row.block = pass->block;
+    row.params = pass->params;
     return row;
 }
 
@@ -45,13 +62,13 @@ static void read_nothing(struct vkb_pass_row *row)
     row->reads[row->read_count++] = row->reads[0];
 }
 
-void vkb_bring_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
+void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
                      uint32_t image)
 {
     adjoint->scene = image;
     adjoint->share = share;
     adjoint->scene_row = *row;
-    adjoint->brought[image] = row->reads[3];
+    adjoint->cotangents[image] = row->reads[3];
 }
 
 bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
@@ -61,8 +78,8 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
     if (image == VKB_NO_IMAGE)
         return true;
     adjoint->scene = VKB_NO_IMAGE;
-    adjoint->brought[image] = VKB_NO_IMAGE;
-    return vkb_bring(adjoint, &adjoint->scene_row, image, error);
+    adjoint->cotangents[image] = VKB_NO_IMAGE;
+    return vkb_accumulate_cotangent(adjoint, &adjoint->scene_row, image, error);
 }
 
 // Has the row add what the composite has left to the next pass. Only filters have a factor for it.
@@ -77,26 +94,26 @@ static bool take_scene(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     return true;
 }
 
-bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given, uint32_t place,
-               struct vkb_error *error)
+bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                              uint32_t place, struct vkb_error *error)
 {
     const uint32_t image = place == adjoint->glow ? adjoint->image : place;
     struct vkb_pass_row row = *given;
-    uint32_t *brought = &adjoint->brought[image];
+    uint32_t *cotangent = &adjoint->cotangents[image];
 
     if (image == adjoint->scene && !take_scene(adjoint, &row, error))
         return false;
     const struct vkb_image_row *forward = &adjoint->graph->images[image];
     const struct vkb_size size = {forward->width, forward->height};
     read_nothing(&row);
-    row.constants.add_own = *brought != VKB_NO_IMAGE;
+    row.constants.add_own = *cotangent != VKB_NO_IMAGE;
     if (row.constants.add_own)
-        row.reads[row.read_count - 2] = *brought;
+        row.reads[row.read_count - 2] = *cotangent;
     row.constants.from_image =
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
     if (row.constants.from_image)
         row.reads[row.read_count - 1] = image;
-    return add_row(adjoint, &row, size, brought, error);
+    return add_row(adjoint, &row, size, cotangent, error);
 }
 
 static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
@@ -119,8 +136,9 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
-static bool bring_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter, bool rows,
-                        uint32_t cotangents, uint32_t image, struct vkb_error *error)
+static bool accumulate_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                             bool rows, uint32_t cotangents, uint32_t image,
+                             struct vkb_error *error)
 {
     struct vkb_pass_row row =
         filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
@@ -130,12 +148,12 @@ static bool bring_along(struct vkb_adjoint *adjoint, const struct vkb_filter *fi
     if (!vkb_axis_transpose(rows ? &filter->x : &filter->y, false, &adjoint->table, &start, error))
         return false;
     *(rows ? &params->start_x : &params->start_y) = (int)start;
-    return vkb_bring(adjoint, &row, image, error);
+    return vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // Along one axis to an image between, then along the other one.
-static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                        uint32_t cotangents, uint32_t image, struct vkb_error *error)
+static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                             uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
     const struct vkb_axis *x = &filter->x, *y = &filter->y;
     // Only the table of columns knows where the first row is.
@@ -154,23 +172,23 @@ static bool bring_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *fi
         return false;
     *(rows ? &params->start_x : &params->start_y) = (int)start;
     return add_row(adjoint, &row, size, &between, error)
-        && bring_along(adjoint, filter, !rows, between, image, error);
+        && accumulate_along(adjoint, filter, !rows, between, image, error);
 }
 
-// Whether the filter brings the cotangents themselves, to which nothing is added.
-static bool brings_same(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                        uint32_t image)
+// Whether the filter leaves the cotangents as they are, and nothing is added to them.
+static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                             uint32_t image)
 {
     return filter->kernels == 1 && filter->gain == 1.0 && vkb_axis_is_identity(&filter->x)
-        && vkb_axis_is_identity(&filter->y) && adjoint->brought[image] == VKB_NO_IMAGE
+        && vkb_axis_is_identity(&filter->y) && adjoint->cotangents[image] == VKB_NO_IMAGE
         && image != adjoint->glow && !vkb_is_given(&adjoint->graph->images[image]);
 }
 
-bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                      uint32_t cotangents, uint32_t image, struct vkb_error *error)
+bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                           uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
-    if (brings_same(adjoint, filter, image)) {
-        adjoint->brought[image] = cotangents;
+    if (keeps_cotangents(adjoint, filter, image)) {
+        adjoint->cotangents[image] = cotangents;
         return true;
     }
     struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
@@ -179,22 +197,22 @@ bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
 
     if (filter->kernels == 1) {
         if (vkb_axis_is_identity(&filter->y))
-            return bring_along(adjoint, filter, true, cotangents, image, error);
+            return accumulate_along(adjoint, filter, true, cotangents, image, error);
         if (vkb_axis_is_identity(&filter->x))
-            return bring_along(adjoint, filter, false, cotangents, image, error);
+            return accumulate_along(adjoint, filter, false, cotangents, image, error);
         if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
-            return bring_twice(adjoint, filter, cotangents, image, error);
+            return accumulate_twice(adjoint, filter, cotangents, image, error);
     }
     if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
         || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
         return false;
     params->start_x = (int)start_x;
     params->start_y = (int)start_y;
-    return vkb_bring(adjoint, &row, image, error);
+    return vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
-bool vkb_add_apart(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                   struct vkb_size size, uint32_t *image, struct vkb_error *error)
+bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
 
@@ -202,9 +220,9 @@ bool vkb_add_apart(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given
     return add_row(adjoint, &row, size, image, error);
 }
 
-bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
-                      struct vkb_error *error)
+bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                         uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                         struct vkb_error *error)
 {
     struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
     uint32_t start_x, start_y;
@@ -214,28 +232,29 @@ bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filt
         return false;
     row.params.adjoint_filter.start_x = (int)start_x;
     row.params.adjoint_filter.start_y = (int)start_y;
-    return vkb_add_apart(adjoint, &row, size, image, error);
+    return vkb_add_adjoint_image(adjoint, &row, size, image, error);
 }
 
-bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
-                       struct vkb_error *error)
+bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                            const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                            struct vkb_error *error)
 {
-    const uint32_t kept = adjoint->brought[target];
+    const uint32_t kept = adjoint->cotangents[target];
 
     if (vkb_axis_is_identity(&filter->x) && vkb_axis_is_identity(&filter->y))
-        return vkb_bring(adjoint, row, image, error);
+        return vkb_accumulate_cotangent(adjoint, row, image, error);
     // The cotangents of the target, complete, are replaced for a moment by those of what it
     // samples.
-    adjoint->brought[target] = VKB_NO_IMAGE;
-    const bool done = vkb_bring(adjoint, row, target, error)
-                   && vkb_bring_filter(adjoint, filter, adjoint->brought[target], image, error);
-    adjoint->brought[target] = kept;
+    adjoint->cotangents[target] = VKB_NO_IMAGE;
+    const bool done =
+        vkb_accumulate_cotangent(adjoint, row, target, error)
+        && vkb_accumulate_filter(adjoint, filter, adjoint->cotangents[target], image, error);
+    adjoint->cotangents[target] = kept;
     return done;
 }
 
-bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                    struct vkb_pass_row *row, struct vkb_error *error)
+bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                         struct vkb_pass_row *row, struct vkb_error *error)
 {
     const uint32_t target = pass->targets[0];
     struct vkb_filter filter;
@@ -244,7 +263,7 @@ bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass
         return true;
     row->constants.by = BY_MASK;
     vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
-    return vkb_bring_through(adjoint, row, &filter, pass->reads[1], target, error);
+    return vkb_accumulate_through(adjoint, row, &filter, pass->reads[1], target, error);
 }
 
 static struct vkb_size blocks_of(struct vkb_size size)
@@ -274,8 +293,8 @@ static bool add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *giv
     return true;
 }
 
-bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                    struct vkb_size size, const char *name, struct vkb_error *error)
+bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                  struct vkb_size size, const char *name, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
     char squares[VKB_NAME_SIZE];

@@ -11,13 +11,13 @@ struct vkb_adjoint {
     struct vkb_graph *graph;
     struct vkb_table table;  // of all filters
     uint32_t table_image;
-    uint32_t *brought;  // by image of the forward graph: its cotangents so far; VKB_NO_IMAGE: none
-    uint32_t added;     // images so far
+    uint32_t *cotangents;  // by forward image: its cotangents so far; VKB_NO_IMAGE: none
+    uint32_t added;        // images so far
     uint32_t max_side;
     bool sums;       // the derivatives by fields are wanted, not those by images
     bool too_large;  // a pass would need an image beyond max_side
-    // What a composite without a curve brings to its scene is `share` times the cotangents that it
-    // has, `brought` of the scene until another pass brings more. That pass adds them itself.
+    // The cotangents of the scene of a composite without a curve are `share` times those that the
+    // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
     double share;
     struct vkb_pass_row scene_row;  // the composite's own pass, for the case that none adds them
@@ -31,54 +31,60 @@ typedef bool vkb_transpose(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
                            struct vkb_error *error);
 
 // The cotangents of what the pass writes.
-uint32_t vkb_brought(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass);
+uint32_t vkb_cotangent_of(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass);
 
 // A row of a shader that includes adjoint.glsl and, before what that reads, has these images.
 struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
                                     uint32_t count);
 
-// Adds the row, whose result is added to the cotangents of a forward image.
-bool vkb_bring(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t image,
-               struct vkb_error *error);
+// The row of the slopes of a pass, whose shader has the pass's parameters, its first `images`, and
+// its cotangents.
+struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
+                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader,
+                                  uint32_t images);
 
-// Brings what the row computes, which is `share` times its cotangents, when another pass brings
-// more, or by vkb_end_scene().
-void vkb_bring_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
+// Adds the row, whose result is added to the cotangents of a forward image.
+bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                              uint32_t image, struct vkb_error *error);
+
+// Accumulates what the row computes, which is `share` times its cotangents, together with those of
+// the next pass, or by vkb_end_scene().
+void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
                      uint32_t image);
 bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 
-// Brings the transpose of a filter of an image.
-bool vkb_bring_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                      uint32_t cotangents, uint32_t image, struct vkb_error *error);
+// Accumulates the transpose of a filter of an image.
+bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                           uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
 // Adds the row, whose result is a new image of `size`, to which no other cotangents are added; the
 // same of the transpose of a filter.
-bool vkb_add_apart(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                   struct vkb_size size, uint32_t *image, struct vkb_error *error);
-bool vkb_filter_apart(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                      uint32_t cotangents, struct vkb_size size, uint32_t *image,
-                      struct vkb_error *error);
+bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                           struct vkb_size size, uint32_t *image, struct vkb_error *error);
+bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                         uint32_t cotangents, struct vkb_size size, uint32_t *image,
+                         struct vkb_error *error);
 
-// Brings the transpose of a filter of an image, of the row's result at the pixels of `target`.
-bool vkb_bring_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                       const struct vkb_filter *filter, uint32_t image, uint32_t target,
-                       struct vkb_error *error);
+// Accumulates the transpose of a filter of an image, of the row's result at the pixels of `target`.
+bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                            const struct vkb_filter *filter, uint32_t image, uint32_t target,
+                            struct vkb_error *error);
 
-// Brings, where samples are not on a grid, what the row brings to the samples of its pixels: those
-// of a halo, or of ghost number `levels`.
-bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t source,
-                     struct vkb_error *error);
+// Accumulates, where samples are not on a grid, the row's result at the samples of its pixels:
+// those of a halo, or of ghost number `levels`.
+bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                          uint32_t source, struct vkb_error *error);
 
-// If the pass reads a mask, its second image: brings the row's result by it, at the target's
-// pixels, to the mask.
-bool vkb_bring_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                    struct vkb_pass_row *row, struct vkb_error *error);
+// If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
+// pixels.
+bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                         struct vkb_pass_row *row, struct vkb_error *error);
 
 // If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
 // add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
 // values, which tell how exact the sum is.
-bool vkb_bring_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                    struct vkb_size size, const char *name, struct vkb_error *error);
+bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, struct vkb_size size,
+                  const char *name, struct vkb_error *error);
 
 // Makes both axes those of 3 x 3 taps, of which the outer ones have the share `side` along an axis;
 // or of the pyramid's 13 taps. These are those of two kernels: nine around the centre, and four
@@ -97,7 +103,7 @@ vkb_transpose vkb_transpose_groups;
 vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star,
     vkb_transpose_sun_beams;
 
-// Brings the cotangents of what a convolution's prefilter of bright colours makes of the glow.
+// Accumulates the cotangents of what a convolution's prefilter of bright colours makes of the glow.
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
                           uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error);
 

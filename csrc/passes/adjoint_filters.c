@@ -13,6 +13,8 @@ static void set_line(const struct vkb_blur_params *params, int radius, double st
     for (int tap = -radius; tap <= radius; ++tap) {
         const int weight = tap < 0 ? -tap : tap;
         const double place = placed ? params->offsets[weight / 4][weight % 4] : weight;
+        if (weight && params->weights[weight / 4][weight % 4] == 0.0f)
+            continue;
         axis->taps[axis->count++] = (struct vkb_tap){
             .offset = (tap < 0 ? -place : place) * step,
             .weights = {params->weights[weight / 4][weight % 4]},
@@ -36,7 +38,8 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
         set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
     if (pass->constants.upsample)
         filter.x.kind = VKB_KIND_INSET_LINEAR;
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
+                                 error);
 }
 
 // Taps at a distance on both sides, and in the middle, with the weights of one kernel.
@@ -91,30 +94,28 @@ bool vkb_transpose_hdrp_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
     set_nine(kernel + 4, pass->constants.first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST,
              rows ? &filter.x : &filter.y);
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
+                                 error);
 }
 
 // Of the blurs of the frame: weights by brightness are before the horizontal one, at the pixels of
 // the target, and after the vertical one.
-static bool bring_first_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                             struct vkb_filter *blur, struct vkb_error *error)
+static bool accumulate_first_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                  struct vkb_filter *blur, struct vkb_error *error)
 {
     const uint32_t target = pass->targets[0], source = pass->reads[0];
     const struct vkb_size size = {blur->x.to, blur->y.to};
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    uint32_t cotangents = vkb_brought(adjoint, pass);
+    uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
     struct vkb_filter filter;
 
-    if (rows && !vkb_filter_apart(adjoint, blur, cotangents, size, &cotangents, error))
+    if (rows && !vkb_filter_to_image(adjoint, blur, cotangents, size, &cotangents, error))
         return false;
-    const uint32_t reads[] = {source, pass->reads[pass->constants.masked ? 1 : 0], cotangents};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_godot_blur_frag, reads, 3);
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_prefilter;
-    row.params.prefilter = pass->params.prefilter;
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_blur_frag, 2);
+    row.reads[2] = cotangents;
     vkb_filter_begin(adjoint->graph, source, target, &filter);
-    return vkb_bring_through(adjoint, &row, rows ? &filter : blur, source, target, error)
-        && vkb_bring_mask(adjoint, pass, &row, error);
+    return vkb_accumulate_through(adjoint, &row, rows ? &filter : blur, source, target, error)
+        && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -129,9 +130,10 @@ bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass
     vkb_filter_begin(adjoint->graph, first ? target : pass->reads[0], target, &filter);
     set_nine(half, VKB_BORDER_PAIRS, rows ? &filter.x : &filter.y);
     if (first)
-        return bring_first_blur(adjoint, pass, &filter, error);
+        return accumulate_first_blur(adjoint, pass, &filter, error);
     filter.gain = rows ? 1.0 : pass->params.prefilter.strength;
-    return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0], error);
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
+                                 error);
 }
 
 // What the taps of a row sample, by UPSAMPLE_*.
@@ -159,7 +161,7 @@ bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 {
     const struct vkb_filter_params *params = &pass->params.filter;
     const struct vkb_constants *constants = &pass->constants;
-    const uint32_t cotangents = vkb_brought(adjoint, pass);
+    const uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
@@ -169,13 +171,13 @@ bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     memcpy(filter.up, params->taps[0], sizeof filter.up);
     set_taps(params->taps_x, constants->taps, (enum vkb_mode)constants->upsample, &filter.x);
     set_taps(params->taps_y, constants->taps, (enum vkb_mode)constants->upsample, &filter.y);
-    if (!vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[0], error))
+    if (!vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[0], error))
         return false;
     if (!constants->add_own)
         return true;
     vkb_filter_begin(adjoint->graph, pass->reads[1], pass->targets[0], &filter);
     filter.gain = params->own;
-    return vkb_bring_filter(adjoint, &filter, cotangents, pass->reads[1], error);
+    return vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[1], error);
 }
 
 bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -187,8 +189,8 @@ bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row
         vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
         filter.gain = pass->params.gather.shares[level / 4][level % 4];
         filter.x.kind = filter.y.kind = kinds[pass->constants.upsample];
-        if (!vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[level],
-                              error))
+        if (!vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
+                                   pass->reads[level], error))
             return false;
     }
     return true;

@@ -4,18 +4,18 @@
 
 #include <stdio.h>
 
-// What is brought to an image are the cotangents of another one.
-static bool bring_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
-                      struct vkb_error *error)
+// Accumulates the cotangents of another image as they are.
+static bool accumulate_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
+                           struct vkb_error *error)
 {
     struct vkb_filter filter;
 
-    if (adjoint->brought[image] == VKB_NO_IMAGE) {
-        adjoint->brought[image] = cotangents;
+    if (adjoint->cotangents[image] == VKB_NO_IMAGE) {
+        adjoint->cotangents[image] = cotangents;
         return true;
     }
     vkb_filter_begin(adjoint->graph, image, cotangents, &filter);
-    return vkb_bring_filter(adjoint, &filter, cotangents, image, error);
+    return vkb_accumulate_filter(adjoint, &filter, cotangents, image, error);
 }
 
 // Adds a row of a forward shader with a new image. Its alpha is one of a cotangent, not 1.
@@ -39,11 +39,11 @@ static bool add_forward(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, u
 bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
-    const uint32_t source = pass->reads[0], cotangents = vkb_brought(adjoint, pass);
+    const uint32_t source = pass->reads[0], cotangents = vkb_cotangent_of(adjoint, pass);
     struct vkb_pass_row row = *pass;
     uint32_t moved;
 
-    if (pass->constants.add_own && !bring_all(adjoint, cotangents, pass->reads[1], error))
+    if (pass->constants.add_own && !accumulate_all(adjoint, cotangents, pass->reads[1], error))
         return false;
     row.reads[0] = row.reads[1] = cotangents;
     row.constants.add_own = row.constants.first = 0;
@@ -53,13 +53,10 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     if (!add_forward(adjoint, &row, source, &moved, error))
         return false;
     if (!pass->constants.first)
-        return bring_all(adjoint, moved, source, error);
-    const uint32_t reads[] = {source, moved};
-    row = vkb_adjoint_row(&vkb_shader_adjoint_above_frag, reads, 2);
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_streaks;
-    row.params.streaks = pass->params.streaks;
-    return vkb_bring(adjoint, &row, source, error);
+        return accumulate_all(adjoint, moved, source, error);
+    row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag, 1);
+    row.reads[1] = moved;
+    return vkb_accumulate_cotangent(adjoint, &row, source, error);
 }
 
 // Multiplies the cotangents, as it does the light.
@@ -69,9 +66,9 @@ bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     struct vkb_pass_row row = *pass;
     uint32_t image;
 
-    row.reads[0] = vkb_brought(adjoint, pass);
+    row.reads[0] = vkb_cotangent_of(adjoint, pass);
     return add_forward(adjoint, &row, pass->reads[0], &image, error)
-        && bring_all(adjoint, image, pass->reads[0], error);
+        && accumulate_all(adjoint, image, pass->reads[0], error);
 }
 
 // An axis that is scaled about its centre.
@@ -88,18 +85,14 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 {
     const struct vkb_flare_params *params = &pass->params.flare;
     const uint32_t source = pass->reads[0], target = pass->targets[0];
-    const uint32_t reads[] = {source, vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_flare_frag, reads, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag, 1);
     struct vkb_filter filter;
 
-    if (pass->constants.add_own && !bring_all(adjoint, reads[1], pass->reads[1], error))
+    if (pass->constants.add_own && !accumulate_all(adjoint, row.reads[1], pass->reads[1], error))
         return false;
-    row.constants = pass->constants;
     row.constants.add_own = 0;
-    row.block = VKB_BLOCK_flare;
-    row.params.flare = *params;
     if (params->count == 0)
-        return vkb_bring_moved(adjoint, &row, source, error);
+        return vkb_accumulate_moved(adjoint, &row, source, error);
     for (int ghost = 0; ghost < params->count; ++ghost) {
         const float scale = params->ghosts[ghost][3];
         row.constants.levels = ghost;
@@ -108,8 +101,8 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
         scale_axis(scale, &filter.y);
         // What is sampled in the centre alone is not moved.
         if (params->aberration > 0.0f && scale != 0.0f
-                ? !vkb_bring_moved(adjoint, &row, source, error)
-                : !vkb_bring_through(adjoint, &row, &filter, source, target, error))
+                ? !vkb_accumulate_moved(adjoint, &row, source, error)
+                : !vkb_accumulate_through(adjoint, &row, &filter, source, target, error))
             return false;
     }
     return true;
@@ -120,15 +113,15 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {
-    const uint32_t cotangents = vkb_brought(adjoint, pass);
+    const uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
     struct vkb_pass_row row = *pass;
 
-    if (pass->constants.add_own && !bring_all(adjoint, cotangents, pass->reads[1], error))
+    if (pass->constants.add_own && !accumulate_all(adjoint, cotangents, pass->reads[1], error))
         return false;
     row.shader = &vkb_shader_adjoint_star_comp;
     row.reads[0] = cotangents;
     row.read_count = 1;
-    return vkb_bring(adjoint, &row, pass->reads[0], error);
+    return vkb_accumulate_cotangent(adjoint, &row, pass->reads[0], error);
 }
 
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
@@ -144,5 +137,5 @@ bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3],
         .prefilter_max = prefilter[1],
         .prefilter_factor = prefilter[2],
     };
-    return vkb_bring(adjoint, &row, glow, error);
+    return vkb_accumulate_cotangent(adjoint, &row, glow, error);
 }

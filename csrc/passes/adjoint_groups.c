@@ -91,6 +91,7 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
         return pass->constants.thresholded ? 4 : 1;
     case GROUPS_URP:
     case GROUPS_POST_PROCESSING:
+    case GROUPS_UNREAL:
     case GROUPS_THREE:
     case GROUPS_BABYLON:
     case GROUPS_PYGFX:
@@ -106,8 +107,8 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
 }
 
 // All groups from one pass, below each other in one image.
-static bool bring_stacked(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                          const struct vkb_pass_row *given, int count, struct vkb_error *error)
+static bool accumulate_stacked(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                               const struct vkb_pass_row *given, int count, struct vkb_error *error)
 {
     const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
     const uint32_t height = target->height;
@@ -117,13 +118,13 @@ static bool bring_stacked(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     uint32_t image;
 
     row.constants.radix_1 = count;
-    if (!vkb_add_apart(adjoint, &row, size, &image, error))
+    if (!vkb_add_adjoint_image(adjoint, &row, size, &image, error))
         return false;
     for (int group = 0; group < count; ++group) {
         vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
         set_group(&row, group, &filter);
         filter.y.first = (uint32_t)group * height;
-        if (!vkb_bring_filter(adjoint, &filter, image, pass->reads[0], error))
+        if (!vkb_accumulate_filter(adjoint, &filter, image, pass->reads[0], error))
             return false;
     }
     return true;
@@ -131,8 +132,8 @@ static bool bring_stacked(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 
 // Each group by a pass of its own: if there is one, or if an image of all would be too high, and
 // Blender's, since a driver takes long to compile one shader for its 13.
-static bool bring_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                       const struct vkb_pass_row *given, int count, struct vkb_error *error)
+static bool accumulate_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                            const struct vkb_pass_row *given, int count, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
     struct vkb_filter filter;
@@ -141,7 +142,8 @@ static bool bring_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *p
         row.constants.levels = group;
         vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
         set_group(&row, group, &filter);
-        if (!vkb_bring_through(adjoint, &row, &filter, pass->reads[0], pass->targets[0], error))
+        if (!vkb_accumulate_through(adjoint, &row, &filter, pass->reads[0], pass->targets[0],
+                                    error))
             return false;
     }
     return true;
@@ -162,25 +164,20 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     if (groups == GROUPS_FILAMENT && !pass->constants.thresholded && !pass->constants.masked) {
         vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
         vkb_filter_three(&filter, 1.0, 0.25);
-        return vkb_bring_filter(adjoint, &filter, vkb_brought(adjoint, pass), pass->reads[0],
-                                error);
+        return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
+                                     pass->reads[0], error);
     }
     const uint32_t height = adjoint->graph->images[pass->targets[0]].height;
     const bool stacked =
         count > 1 && groups != GROUPS_BLENDER && (uint64_t)count * height <= adjoint->max_side;
-    const uint32_t reads[] = {pass->reads[0], pass->reads[pass->constants.masked ? 1 : 0],
-                              vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_groups_frag, reads, 3);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_groups_frag, 2);
 
-    row.constants = pass->constants;
     row.constants.levels = 0;
     row.constants.radix_1 = 1;
-    row.block = VKB_BLOCK_prefilter;
-    row.params.prefilter = pass->params.prefilter;
     // Its groups are texels then. The shader reads the mask in the same way.
-    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, reads[0], pass->targets[0])
-        && vkb_same_size(adjoint->graph, reads[1], pass->targets[0]))
+    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, row.reads[0], pass->targets[0])
+        && vkb_same_size(adjoint->graph, row.reads[1], pass->targets[0]))
         row.constants.sampling = SAMPLING_TEXEL;
-    return (stacked ? bring_stacked : bring_each)(adjoint, pass, &row, count, error)
-        && vkb_bring_mask(adjoint, pass, &row, error);
+    return (stacked ? accumulate_stacked : accumulate_each)(adjoint, pass, &row, count, error)
+        && vkb_accumulate_mask(adjoint, pass, &row, error);
 }

@@ -71,9 +71,10 @@ static bool find_sums(const struct gathering *gathering, uint32_t max_side, stru
         && (uint64_t)sums->size.width * sums->size.height <= (uint64_t)size.width * size.height;
 }
 
-// Brings what the row gathers, for which another one adds up groups of rows, if there are sums.
-static bool bring_summed(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                         const struct sums *sums, uint32_t image, struct vkb_error *error)
+// Accumulates what the row gathers, for which another one adds up groups of rows, if there are
+// sums.
+static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                              const struct sums *sums, uint32_t image, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
 
@@ -81,12 +82,12 @@ static bool bring_summed(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
     if (sums->width > 0) {
         uint32_t partial;
         row.constants.stage = STAGE_FIRST;
-        if (!vkb_add_apart(adjoint, &row, sums->size, &partial, error))
+        if (!vkb_add_adjoint_image(adjoint, &row, sums->size, &partial, error))
             return false;
         row.constants.stage = STAGE_LAST;
         row.reads[row.read_count - 1] = partial;
     }
-    return vkb_bring(adjoint, &row, image, error);
+    return vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // What bounds the work of a halo or a ghost.
@@ -159,8 +160,8 @@ static struct flare flare_of(const struct vkb_pass_row *row, struct vkb_size siz
     };
 }
 
-bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, uint32_t source,
-                     struct vkb_error *error)
+bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                          uint32_t source, struct vkb_error *error)
 {
     const struct vkb_image_row *image = &adjoint->graph->images[source];
     const struct vkb_size size = {image->width, image->height};
@@ -180,14 +181,14 @@ bool vkb_bring_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row
         adjoint->too_large = true;
         return true;
     }
-    if (!vkb_add_apart(adjoint, row, size, &sampled, error))
+    if (!vkb_add_adjoint_image(adjoint, row, size, &sampled, error))
         return false;
     struct vkb_pass_row moved = vkb_adjoint_row(&vkb_shader_adjoint_moved_frag, &sampled, 1);
     moved.constants.levels = row->constants.levels;
     moved.block = row->block;
     moved.params = row->params;
     SET_SUMS(&moved.params.flare, &sums);
-    return bring_summed(adjoint, &moved, &sums, source, error);
+    return accumulate_summed(adjoint, &moved, &sums, source, error);
 }
 
 // Sun beams: four pixels of a strip behind the texel in an iteration.
@@ -207,7 +208,7 @@ static double beam_iterations(const struct gathering *gathering, double distance
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    const uint32_t source = pass->reads[0], cotangents = vkb_brought(adjoint, pass);
+    const uint32_t source = pass->reads[0], cotangents = vkb_cotangent_of(adjoint, pass);
     const struct vkb_image_row *image = &adjoint->graph->images[source];
     const struct vkb_sun_beams_params *params = &pass->params.sun_beams;
     const double left = params->left;
@@ -234,8 +235,8 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     struct vkb_pass_row first = row;
     first.constants.stage = STAGE_GREY;
     first.reads[first.read_count++] = cotangents;
-    if (!vkb_add_apart(adjoint, &first, gathering.size, &shares, error))
+    if (!vkb_add_adjoint_image(adjoint, &first, gathering.size, &shares, error))
         return false;
     row.reads[0] = shares;
-    return bring_summed(adjoint, &row, &sums, source, error);
+    return accumulate_summed(adjoint, &row, &sums, source, error);
 }

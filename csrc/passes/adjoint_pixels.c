@@ -41,8 +41,8 @@ static double share_of_scene(const struct vkb_pass_row *row)
 }
 
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
-static bool bring_composite(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                            struct vkb_error *error)
+static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                                 struct vkb_error *error)
 {
     const struct vkb_constants *constants = &row->constants;
     const uint32_t images[] = {row->reads[0], row->reads[1], row->reads[2]};
@@ -56,9 +56,9 @@ static bool bring_composite(struct vkb_adjoint *adjoint, struct vkb_pass_row *ro
         if ((by == BY_BLOOM && constants->composite == COMPOSITE_OFF)
             || (by == BY_MASK && !constants->masked))
             continue;
-        if (by == BY_SCENE && scales_scene(row) && adjoint->brought[images[0]] == VKB_NO_IMAGE)
-            vkb_bring_scene(adjoint, row, share_of_scene(row), images[0]);
-        else if (!vkb_bring(adjoint, row, images[by], error))
+        if (by == BY_SCENE && scales_scene(row) && adjoint->cotangents[images[0]] == VKB_NO_IMAGE)
+            vkb_delay_scene(adjoint, row, share_of_scene(row), images[0]);
+        else if (!vkb_accumulate_cotangent(adjoint, row, images[by], error))
             return false;
     }
     return true;
@@ -75,19 +75,6 @@ static bool is_clamped(const struct vkb_graph *graph)
     return false;
 }
 
-static struct vkb_pass_row composite_row(const struct vkb_adjoint *adjoint,
-                                         const struct vkb_pass_row *pass,
-                                         const struct vkb_shader *shader)
-{
-    const uint32_t reads[] = {pass->reads[0], pass->reads[1], pass->reads[2],
-                              vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(shader, reads, 4);
-
-    row.constants = pass->constants;
-    row.constants.dither = 0;
-    return row;
-}
-
 // Whether the picture before exposure and curves is a share of the scene and one of the bloom.
 static bool is_sum(const struct vkb_constants *constants)
 {
@@ -95,10 +82,10 @@ static bool is_sum(const struct vkb_constants *constants)
         && constants->alpha == ALPHA_KEEP && !constants->masked && !constants->groups;
 }
 
-// Brings the cotangents to the picture before exposure and curves, and makes `row` that of a
+// Adds the cotangents of the picture before exposure and curves, and makes `row` that of a
 // composite without these.
-static bool bring_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                         struct vkb_error *error)
+static bool add_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                       struct vkb_error *error)
 {
     struct vkb_pass_row curves = *row;
 
@@ -107,71 +94,60 @@ static bool bring_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     row->constants.encoding = ENCODING_NONE;
     row->params.composite.exposure = 0.0f;
     row->params.composite.limit = (float)SINGLE_LIMIT;
-    return vkb_add_apart(adjoint, &curves, size_of(adjoint, row->reads[0]), &row->reads[3], error);
+    return vkb_add_adjoint_image(adjoint, &curves, size_of(adjoint, row->reads[0]), &row->reads[3],
+                                 error);
 }
 
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_composite_frag);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_composite_frag, 3);
 
-    row.block = VKB_BLOCK_composite;
-    row.params.composite = pass->params.composite;
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
-    if (!vkb_bring_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error)
+    if (!vkb_add_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error)
         || (is_sum(&row.constants) && depends_on_bloom(&row.constants, row.params.composite.limit)
-            && !bring_curves(adjoint, &row, error)))
+            && !add_curves(adjoint, &row, error)))
         return false;
-    return bring_composite(adjoint, &row, error);
+    return accumulate_composite(adjoint, &row, error);
 }
 
 bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                                    struct vkb_error *error)
 {
-    struct vkb_pass_row row = composite_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag, 3);
 
-    row.block = VKB_BLOCK_godot_final;
-    row.params.godot_final = pass->params.godot_final;
-    return bring_composite(adjoint, &row, error);
+    return accumulate_composite(adjoint, &row, error);
 }
 
-// Brings what is at the pixels of the target to an image that these sample linearly.
-static bool bring_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                          uint32_t image, uint32_t target, struct vkb_error *error)
+// Accumulates what is at the pixels of the target for an image that these sample linearly.
+static bool accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                               uint32_t image, uint32_t target, struct vkb_error *error)
 {
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, image, target, &filter);
-    return vkb_bring_through(adjoint, row, &filter, image, target, error);
+    return vkb_accumulate_through(adjoint, row, &filter, image, target, error);
 }
 
 bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
     const uint32_t target = pass->targets[0];
-    const uint32_t reads[] = {pass->reads[0], pass->reads[1], vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_threshold_frag, reads, 3);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_threshold_frag, 2);
 
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_threshold;
-    row.params.threshold = pass->params.threshold;
     if (pass->constants.threshold_mode == THRESHOLD_KNEE
-        && !vkb_bring_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
+        && !vkb_add_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
-    return bring_sampled(adjoint, &row, pass->reads[0], target, error)
-        && vkb_bring_mask(adjoint, pass, &row, error);
+    return accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
+        && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                                struct vkb_error *error)
 {
-    const uint32_t reads[] = {pass->reads[0], vkb_brought(adjoint, pass)};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_blender_end_frag, reads, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
 
-    row.constants = pass->constants;
-    row.block = VKB_BLOCK_blender_end;
-    row.params.blender_end = pass->params.blender_end;
-    return bring_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
+    return accumulate_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
 }

@@ -43,9 +43,8 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     struct vkb_blur_params *params = &row.params.blur;
     struct vkb_blur moved = *blur;
 
-    // With a step of 0 all taps are at the same place, so all sizes fit.
     if (!blur->offsets && !blur->inset && blur->direction != DIRECTION_BOTH
-        && (step == 0.0 || (same_size && !is_integer(step)))
+        && (same_size || is_integer(step))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;
     row.reads[0] = from;
@@ -75,30 +74,13 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     return row;
 }
 
-bool vkb_is_line_blur(const struct vkb_pass_row *pass)
-{
-    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
-        && pass->constants.direction != DIRECTION_BOTH;
-}
-
-enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass)
-{
-    return (enum vkb_mode)pass->constants.direction;
-}
-
-bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel)
+bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int limit)
 {
     const struct vkb_blur_params *params = &pass->params.blur;
-    const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
-    const double step = vertical ? params->step_y : params->step_x;
-    const int taps = pass->constants.radius;
+    const bool vertical = direction == DIRECTION_VERTICAL;
 
-    if (pass->constants.taps || pass->constants.upsample || !is_integer(step) || step < 0.0
-        || taps * step > limit)
-        return false;
-    memset(kernel, 0, sizeof *kernel);
-    kernel->radius = taps * (int)step;
-    for (int tap = 0; tap <= taps; ++tap)
-        kernel->weights[tap * (int)step] = params->weights[tap / 4][tap % 4];
-    return true;
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
+        && pass->constants.direction == direction && !pass->constants.taps
+        && !pass->constants.upsample && (vertical ? params->step_y : params->step_x) == 1.0f
+        && pass->constants.radius <= limit;
 }

@@ -4,12 +4,6 @@
 
 #include "passes/pass.h"
 
-// A kernel whose taps lie on the texels of its source.
-struct vkb_texel_kernel {
-    float weights[LINE_RADIUS + 4];  // the half-kernel, then zeros, to a multiple of four
-    int radius;
-};
-
 struct vkb_blur {
     enum vkb_mode direction;
     double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
@@ -21,16 +15,14 @@ struct vkb_blur {
     bool filter;            // the sampler filters taps between texels; otherwise the shader does
 };
 
-// The row of a blur from one image to another. If all pixels of the target are on texel centres,
-// taps between texels are distributed to the two neighbours. Then no variant of the pass has to
-// filter.
+// The row of a blur from one image to another. Its block has the half-kernel of a line on the
+// texels of its source, a step of 1 apart, wherever the taps are there. If all pixels of the target
+// are on texel centres, taps between texels are distributed to the two neighbours, so that no
+// variant has to filter.
 struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
                                  const struct vkb_blur *blur, uint32_t from, uint32_t to);
 
-// Accessors of a row from vkb_blur_row.
-bool vkb_is_line_blur(const struct vkb_pass_row *pass);  // in one direction
-enum vkb_mode vkb_blur_direction(const struct vkb_pass_row *pass);
-// The kernel on texels. False if taps are between texels, or if it is longer than `limit`.
-bool vkb_blur_kernel(const struct vkb_pass_row *pass, int limit, struct vkb_texel_kernel *kernel);
+// Whether the row is a blur in one direction whose kernel is on texels and not longer than `limit`.
+bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int limit);
 
 #endif

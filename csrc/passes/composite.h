@@ -25,7 +25,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
 
 // Whether the row is a composite that adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);
-// The same, or the row that brings cotangents back through exposure and curves of one, its last
+// The same, or the row that takes cotangents back through exposure and curves of one, its last
 // image.
 bool vkb_ends_bloom(const struct vkb_pass_row *pass);
 

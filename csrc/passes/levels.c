@@ -37,6 +37,16 @@ static uint32_t half(uint32_t side)
     return side > 1 ? side / 2 : 1;
 }
 
+uint32_t vkb_scaled(uint32_t side, double scale)
+{
+    return (uint32_t)fmax(1.0, floor(scale * side));
+}
+
+struct vkb_size vkb_halved_up(struct vkb_size size)
+{
+    return (struct vkb_size){(size.width + 1) / 2, (size.height + 1) / 2};
+}
+
 struct vkb_size vkb_halved(struct vkb_size size)
 {
     return (struct vkb_size){half(size.width), half(size.height)};
@@ -98,6 +108,16 @@ static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t sma
 {
     return graph->images[large].width == 2 * graph->images[small].width
         && graph->images[large].height == 2 * graph->images[small].height;
+}
+
+bool vkb_levels_box(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                    struct vkb_error *error)
+{
+    const struct vkb_side_taps corners = {1.0, 0.5, 0.0};
+    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+
+    vkb_filter_add(&row, 0, corners, corners);
+    return vkb_filter_end(levels, &row, error);
 }
 
 bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,

@@ -32,8 +32,10 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
 // or the adapter's limit where that is lower.
 double vkb_widest_level(const struct vkb_levels *levels);
 
-// Half of a size, rounded down, at least 1 on each side.
+// A side times a scale, and half of a size, rounded down, at least 1; half of a size, rounded up.
+uint32_t vkb_scaled(uint32_t side, double scale);
 struct vkb_size vkb_halved(struct vkb_size size);
+struct vkb_size vkb_halved_up(struct vkb_size size);
 
 // Appends sizes, each half of the one before, until there are `count`. It stops before a level of 1
 // x 1, unless that is the first.
@@ -65,10 +67,6 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
 // Sets the factors of the colours. That of alpha is 1.
 void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
 
-// For a blur of nine taps, a pixel of the target apart, whose source may be twice as large. Borders
-// and pairs of samples are counted from the first row.
-void vkb_reach_nine(struct vkb_pass_row *row);
-
 // Makes a prefilter multiply its result by the mask of the source, if there is one.
 void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
 
@@ -77,6 +75,11 @@ void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *ro
 // texel.
 struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
                                    uint32_t from, uint32_t to);
+
+// A pass that downsamples with four diagonal taps at a distance of one texel: a box of 4 x 4
+// texels.
+bool vkb_levels_box(const struct vkb_levels *levels, uint32_t from, uint32_t to,
+                    struct vkb_error *error);
 
 // A pass that downsamples with the pyramid's 13 taps, whose inner ones are at these distances.
 bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,

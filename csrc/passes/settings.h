@@ -22,6 +22,7 @@
     METHOD(PYGFX, pygfx, true) \
     METHOD(POST_PROCESSING, post_processing, true) \
     METHOD(UNREAL, unreal, true) \
+    METHOD(HALATION, halation, true) \
     METHOD(PMNDRS, pmndrs, true) \
     METHOD(BABYLON, babylon, true) \
     METHOD(PLAYCANVAS, playcanvas, true) \
@@ -119,6 +120,7 @@ static inline bool vkb_needs_kernel(const struct vkb_settings *settings)
 
     return settings->values.bloom
         && (settings->method == VKB_METHOD_CONVOLUTION || settings->method == VKB_METHOD_UNREAL
+            || settings->method == VKB_METHOD_HALATION
             || (settings->method == VKB_METHOD_BLENDER
                 && (type == TYPE_FOG_GLOW || type == TYPE_KERNEL)));
 }

@@ -3,6 +3,7 @@
 #include "python/module.h"
 #include "python/values.h"
 
+#include "execute/limits.h"
 #include "graph/dry_run.h"
 #include "methods/adjoint.h"
 
@@ -192,7 +193,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
     if (!built)
         return false;
     vkb_graph_set_usages(graph);
-    return vkb_image_cache_check(device, graph, error)
+    return vkb_limits_check_graph(device, graph, error)
         && (!graph->layers || layer_graph(device, graph, error));
 }
 

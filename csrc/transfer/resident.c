@@ -1,5 +1,6 @@
 #include "transfer/resident.h"
 
+#include "execute/limits.h"
 #include "execute/list.h"
 
 struct vkb_residents {
@@ -97,7 +98,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
     struct vkb_cached_image *cached = &resident->inputs[kind].cached;
 
     if (!vkb_check_size(row.name, row.width, row.height, device->max_side, error)
-        || !vkb_image_row_check(device, &row, error))
+        || !vkb_limits_check_image(device, &row, error))
         return false;
     if (!vkb_image_fits(&cached->image, &row)) {
         vkb_image_destroy(device, &cached->image);

@@ -218,11 +218,11 @@ static void replace_read(struct vkb_pass_row *row, uint32_t from, uint32_t to)
         row->reads[i] = row->reads[i] == from ? to : row->reads[i];
 }
 
-// Reads the cotangents of a composite without a curve in place of what it brings to the bloom.
+// Reads the cotangents of a composite without a curve in place of those of its bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
-    const uint32_t brought = row->reads[0];
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, brought);
+    const uint32_t by_bloom = row->reads[0];
+    const struct vkb_pass_row *pass = vkb_writer_of(graph, by_bloom);
 
     if (!pass || !vkb_is_factor(pass))
         return;
@@ -230,7 +230,7 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     const float intensity = pass->constants.bloom == BLOOM_LIT ? 1.0f : params->intensity;
     row->params.adjoint_filter.gain *= intensity * exp2f(params->exposure);
     row->constants.by = BY_BLOOM;
-    replace_read(row, brought, pass->reads[3]);
+    replace_read(row, by_bloom, pass->reads[3]);
     row->reads[2] = pass->reads[0];
 }
 
@@ -250,27 +250,19 @@ bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct
                            bool *fits, struct vkb_error *error)
 {
     const bool filter = pass->block == VKB_BLOCK_adjoint_filter;
-    const bool blend = vkb_transposes(pass, VKB_BLOCK_composite);
-    const bool threshold = vkb_transposes(pass, VKB_BLOCK_threshold);
+    const bool threshold = vkb_transposes(pass, VKB_BLOCK_threshold) && !pass->constants.masked
+                        && pass->constants.by <= BY_BLOOM && pass->constants.alpha != ALPHA_BLUR
+                        && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0]);
     struct vkb_pass_row row;
 
-    *fits = (filter || blend || threshold) && vkb_are_floats(choice, pass)
-         && (filter ? fits_lists(choice->graph, pass, MAX_WORDS)
-                    : !pass->constants.masked
-                          && (pass->constants.by <= BY_BLOOM || pass->constants.by == BY_MIXED))
-         && (!threshold
-             || (pass->constants.alpha != ALPHA_BLUR
-                 && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0])));
+    *fits = (threshold || (filter && fits_lists(choice->graph, pass, MAX_WORDS)))
+         && vkb_are_floats(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    if (!filter)
-        drop_read(&row, threshold ? 1 : 2);  // the mask
-    if (blend) {
-        row.constants.levels = pass->reads[1] != pass->reads[0];
-        vkb_make_words(&row, &vkb_shader_adjoint_blend_words_rgba32float, ADJOINT_SIDE, TEXEL_ROWS);
-    } else if (threshold) {
+    if (threshold) {
+        drop_read(&row, 1);  // the mask
         row.constants.sampling = 0;
         vkb_make_words(&row, &vkb_shader_adjoint_threshold_words_rgba32float, ADJOINT_SIDE,
                        TEXEL_ROWS);

@@ -12,14 +12,12 @@ static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_WORD
 
 // The row of a line blur. `origin` is the position of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
-                                    const struct vkb_pass_row *blur,
-                                    const struct vkb_texel_kernel *kernel, uint32_t target,
-                                    int origin)
+                                    const struct vkb_pass_row *blur, uint32_t target, int origin)
 {
     const struct vkb_graph *graph = choice->graph;
     const struct vkb_image_row *image = &graph->images[target];
-    const enum vkb_mode direction = vkb_blur_direction(blur);
-    const bool vertical = direction == DIRECTION_VERTICAL;
+    const bool vertical = blur->constants.direction == DIRECTION_VERTICAL;
+    const int radius = blur->constants.radius;
     struct vkb_pass_row row;
 
     memcpy(&row, blur, sizeof row);
@@ -30,11 +28,11 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
                       vertical ? LINE_OUTPUTS : 1);
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
-    row.constants.radius = kernel->radius <= LINE_SHORT_RADIUS ? kernel->radius : 0;
+    row.constants.radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
     row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
                         && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
     if (!row.constants.rolled) {
-        row.constants.direction = direction;
+        row.constants.direction = blur->constants.direction;
     } else {
         const uint32_t across = vertical ? image->width : image->height;
         const uint32_t along = vertical ? image->height : image->width;
@@ -42,13 +40,16 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
         row.groups_height = (along + ROLLED_OUTPUTS - 1) / ROLLED_OUTPUTS;
     }
     row.block = VKB_BLOCK_line;
-    row.params.line.radius = kernel->radius;
+    row.params.line.radius = radius;
     row.params.line.origin = origin;
     row.params.line.vertical = vertical;
     row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
     row.params.line.limit = vkb_formats[image->format].limit;
-    for (int tap = 0; tap <= 2 * kernel->radius; ++tap)
-        row.params.line.kernel[tap / 4][tap % 4] = kernel->weights[abs(tap - kernel->radius)];
+    for (int tap = 0; tap <= 2 * radius; ++tap) {
+        const int weight = abs(tap - radius);
+        row.params.line.kernel[tap / 4][tap % 4] =
+            blur->params.blur.weights[weight / 4][weight % 4];
+    }
     return row;
 }
 
@@ -66,15 +67,13 @@ static bool add_line_row(struct vkb_graph *graph, const struct vkb_pass_row *row
 bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                   bool *fits, struct vkb_error *error)
 {
-    struct vkb_texel_kernel kernel;
-
-    *fits = vkb_is_line_blur(pass)
+    *fits = (vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
+             || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
          && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-         && vkb_is_written_once(&choice->plain, pass->targets[0])
-         && vkb_blur_kernel(pass, LINE_RADIUS, &kernel);
+         && vkb_is_written_once(&choice->plain, pass->targets[0]);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = line_row(choice, pass, &kernel, pass->targets[0], 0);
+    struct vkb_pass_row row = line_row(choice, pass, pass->targets[0], 0);
     return add_line_row(choice->graph, &row, error);
 }
 
@@ -90,14 +89,12 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
                                              VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
-    struct vkb_texel_kernel kernel;
     uint32_t lines;
 
-    *fits = vkb_is_line_blur(pass) && vkb_blur_direction(pass) == DIRECTION_HORIZONTAL
+    *fits = vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS)
          && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
          && vkb_is_written_once(&choice->plain, pass->targets[0])
-         && source->width + 2 <= choice->device->max_side && (filters || !unorm)
-         && vkb_blur_kernel(pass, LINE_RADIUS, &kernel);
+         && source->width + 2 <= choice->device->max_side && (filters || !unorm);
     if (!*fits)
         return true;
     // The lines are floats, since rounding them would change the filtered values. The border has
@@ -107,7 +104,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
     if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
         return false;
-    struct vkb_pass_row line = line_row(choice, pass, &kernel, lines, -1);
+    struct vkb_pass_row line = line_row(choice, pass, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
     row.constants.bloom = BLOOM_LINES;
@@ -121,66 +118,63 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
-// The chain of passes that adds a bloom to an image, all at the image's size.
-struct chain {
+// A composite of two lines of a threshold, all at the size of the image.
+struct nest {
     const struct vkb_pass_row *threshold, *vertical, *horizontal, *composite;
-    struct vkb_texel_kernel vertical_kernel, horizontal_kernel;
 };
 
-// The only pass that writes the image, if it is a blur in this direction; else NULL.
-static const struct vkb_pass_row *blur_of(const struct vkb_graph *graph, uint32_t image,
-                                          enum vkb_mode direction)
+// The only pass that writes the image, if it is such a line; else NULL.
+static const struct vkb_pass_row *line_of(const struct vkb_graph *graph, uint32_t image,
+                                          enum vkb_mode direction, int radius)
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
-    return pass && vkb_is_line_blur(pass) && vkb_blur_direction(pass) == direction
-                && vkb_is_written_once(graph, image) && vkb_same_size(graph, pass->reads[0], image)
+    return pass && vkb_is_line(pass, direction, radius) && vkb_is_written_once(graph, image)
+                && vkb_same_size(graph, pass->reads[0], image)
              ? pass
              : NULL;
 }
 
 // `threshold_of` finds the threshold pass of a bloom buffer.
-static bool find_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
-                       const struct vkb_pass_row *(*threshold_of)(const struct vkb_graph *graph,
-                                                                  uint32_t image),
-                       struct chain *chain)
+static bool find_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
+                      const struct vkb_pass_row *(*threshold_of)(const struct vkb_graph *graph,
+                                                                 uint32_t image),
+                      struct nest *nest)
 {
-    *chain = (struct chain){.composite = pass};
+    *nest = (struct nest){.composite = pass};
     if (!vkb_ends_bloom(pass) || !graph->images[pass->reads[0]].input)
         return false;
-    chain->horizontal = blur_of(graph, pass->reads[1], DIRECTION_HORIZONTAL);
-    if (chain->horizontal)
-        chain->vertical = blur_of(graph, chain->horizontal->reads[0], DIRECTION_VERTICAL);
-    if (chain->vertical)
-        chain->threshold = threshold_of(graph, chain->vertical->reads[0]);
-    return chain->threshold && vkb_is_threshold(chain->threshold)
-        && chain->threshold->reads[0] == pass->reads[0]
-        && vkb_blur_kernel(chain->vertical, radius, &chain->vertical_kernel)
-        && vkb_blur_kernel(chain->horizontal, radius, &chain->horizontal_kernel);
+    nest->horizontal = line_of(graph, pass->reads[1], DIRECTION_HORIZONTAL, radius);
+    if (nest->horizontal)
+        nest->vertical = line_of(graph, nest->horizontal->reads[0], DIRECTION_VERTICAL, radius);
+    if (nest->vertical)
+        nest->threshold = threshold_of(graph, nest->vertical->reads[0]);
+    return nest->threshold && vkb_is_threshold(nest->threshold)
+        && nest->threshold->reads[0] == pass->reads[0];
 }
 
 static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
-                                     const struct chain *chain)
+                                     const struct nest *nest)
 {
     const struct vkb_graph *graph = &choice->plain;
-    const enum vkb_format format = graph->images[chain->horizontal->targets[0]].format;
+    const enum vkb_format format = graph->images[nest->horizontal->targets[0]].format;
     struct vkb_pass_row row;
     struct vkb_fused_bloom_params *params = &row.params.fused_bloom;
 
-    memcpy(&row, chain->composite, sizeof row);
+    memcpy(&row, nest->composite, sizeof row);
     memset(&row.params, 0, sizeof row.params);
     vkb_drop_reads(&row, 1);
     if (row.transposed)
-        row.reads[row.read_count++] = chain->composite->reads[3];
+        row.reads[row.read_count++] = nest->composite->reads[3];
     row.fused = true;
     row.block = VKB_BLOCK_fused_bloom;
-    VKB_TAKE_COMPOSITE(&row, fused_bloom, chain->composite);
-    VKB_TAKE_THRESHOLD(&row, fused_bloom, chain->threshold);
+    VKB_TAKE_COMPOSITE(&row, fused_bloom, nest->composite);
+    VKB_TAKE_THRESHOLD(&row, fused_bloom, nest->threshold);
     row.constants.format = vkb_storage_mode(format);
-    params->vertical_radius = chain->vertical_kernel.radius;
-    params->horizontal_radius = chain->horizontal_kernel.radius;
-    memcpy(params->vertical, chain->vertical_kernel.weights, sizeof params->vertical);
-    memcpy(params->horizontal, chain->horizontal_kernel.weights, sizeof params->horizontal);
+    params->vertical_radius = nest->vertical->constants.radius;
+    params->horizontal_radius = nest->horizontal->constants.radius;
+    memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
+    memcpy(params->horizontal, nest->horizontal->params.blur.weights, sizeof params->horizontal);
     return row;
 }
 
@@ -221,13 +215,13 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
     const bool vertical = format == VKB_FORMAT_RGBA32_FLOAT
                        && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4;
-    struct chain chain;
+    struct nest nest;
 
-    *fits = find_chain(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &chain)
+    *fits = find_nest(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &nest)
          && vkb_fits_words(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
-    struct vkb_pass_row row = fused_row(choice, &chain);
+    struct vkb_pass_row row = fused_row(choice, &nest);
     make_strips(choice, &row,
                 pass->transposed ? &vkb_shader_strip_mixed_words_rgba32float
                                  : strip_shaders[format],
@@ -267,11 +261,11 @@ static bool fits_tiles(const struct vkb_device *device)
 
 // For kernels of up to TILE_RADIUS in three steps.
 static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader,
-                       const struct chain *chain)
+                       const struct nest *nest)
 {
     int radius = TILE_RADIUS / 4;
 
-    while (radius < chain->vertical_kernel.radius || radius < chain->horizontal_kernel.radius)
+    while (radius < nest->vertical->constants.radius || radius < nest->horizontal->constants.radius)
         radius *= 2;
     vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row->constants.radius = radius;
@@ -281,21 +275,20 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
 bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
-    struct chain chain;
+    struct nest nest;
 
     *fits = fits_tiles(choice->device)
-         && find_chain(&choice->plain, pass, TILE_RADIUS,
-                       pass->transposed ? vkb_writer_of : vkb_threshold_of, &chain);
+         && find_nest(&choice->plain, pass, TILE_RADIUS,
+                      pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = fused_row(choice, &chain);
-    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
-               &chain);
+    struct vkb_pass_row row = fused_row(choice, &nest);
+    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp, &nest);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// The pass that writes the cotangents of an image, if it has this block and nothing else brings
+// The pass that writes the cotangents of an image, if it has this block and nothing else adds
 // any; else NULL.
 static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, uint32_t image,
                                                enum vkb_block block)
@@ -308,50 +301,50 @@ static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, ui
              : NULL;
 }
 
-// The graph's chain. The formats of image and bloom may differ.
-static bool find_any_chain(const struct vkb_graph *graph, int radius, struct chain *chain)
+// The graph's nest. The formats of image and bloom may differ.
+static bool find_any_nest(const struct vkb_graph *graph, int radius, struct nest *nest)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (find_chain(graph, &graph->passes[i], radius, vkb_writer_of, chain))
+        if (find_nest(graph, &graph->passes[i], radius, vkb_writer_of, nest))
             return true;
     return false;
 }
 
-// The transposes of a chain, of which `pass` is the last one: that of the threshold, or of the
-// vertical blur, if there is no threshold. The chain's composite is its adjoint then, a factor.
-// What it brings to the scene is an image, or left to the last pass.
-static bool find_adjoint_chain(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                               int radius, struct chain *chain)
+// The transposes of a nest, of which `pass` is the last one: that of the threshold, or of the
+// vertical blur, if there is no threshold. The nest's composite is its adjoint then, a factor.
+// The cotangents of the scene are an image, or left to the last pass.
+static bool find_adjoint_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                              int radius, struct nest *nest)
 {
     const enum vkb_block filter = VKB_BLOCK_adjoint_filter, composite = VKB_BLOCK_composite;
     const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
                          && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
     if (!(thresholds || (pass->block == filter && pass->constants.from_image))
-        || !pass->constants.add_own || !find_any_chain(graph, radius, chain))
+        || !pass->constants.add_own || !find_any_nest(graph, radius, nest))
         return false;
     const struct vkb_pass_row *first =
         thresholds ? sole_adjoint(graph, pass->reads[2], filter) : pass;
     const struct vkb_pass_row *second = first ? sole_adjoint(graph, first->reads[0], filter) : NULL;
     const uint32_t added = pass->reads[3];
     const struct vkb_pass_row *by_scene = sole_adjoint(graph, added, composite);
-    chain->composite = second ? vkb_writer_of(graph, second->reads[0]) : NULL;
-    return chain->composite && vkb_is_factor(chain->composite)
-        && (added == chain->composite->reads[3] || (by_scene && by_scene->constants.by == BY_SCENE))
-        && chain->threshold->reads[0] == pass->reads[4];
+    nest->composite = second ? vkb_writer_of(graph, second->reads[0]) : NULL;
+    return nest->composite && vkb_is_factor(nest->composite)
+        && (added == nest->composite->reads[3] || (by_scene && by_scene->constants.by == BY_SCENE))
+        && nest->threshold->reads[0] == pass->reads[4];
 }
 
 // A fused row of the derivatives by the image, which replaces the composite's passes, the blurs'
 // and the threshold's. It reads the image and the composite's cotangents. Nothing is rounded
 // between the passes, whatever the formats are.
 static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
-                                       const struct vkb_pass_row *pass, const struct chain *chain)
+                                       const struct vkb_pass_row *pass, const struct nest *nest)
 {
-    struct vkb_pass_row row = fused_row(choice, chain);
+    struct vkb_pass_row row = fused_row(choice, nest);
 
     memcpy(row.name, pass->name, sizeof row.name);
-    row.reads[0] = chain->composite->reads[3];
-    row.reads[1] = chain->composite->reads[0];
+    row.reads[0] = nest->composite->reads[3];
+    row.reads[1] = nest->composite->reads[0];
     row.targets[0] = pass->targets[0];
     // Its sums have another order, so it is taken always: all runs have the same bits.
     row.fused = false;
@@ -362,27 +355,27 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
 bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    struct chain chain;
+    struct nest nest;
 
     *fits =
-        fits_tiles(choice->device) && find_adjoint_chain(&choice->plain, pass, TILE_RADIUS, &chain);
+        fits_tiles(choice->device) && find_adjoint_nest(&choice->plain, pass, TILE_RADIUS, &nest);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = adjoint_row(choice, pass, &chain);
-    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &chain);
+    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
+    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
-    struct chain chain;
+    struct nest nest;
 
-    *fits = find_adjoint_chain(&choice->plain, pass, STRIP_RADIUS, &chain)
-         && vkb_are_floats(choice, chain.composite);
+    *fits = find_adjoint_nest(&choice->plain, pass, STRIP_RADIUS, &nest)
+         && vkb_are_floats(choice, nest.composite);
     if (!*fits)
         return true;
-    struct vkb_pass_row row = adjoint_row(choice, pass, &chain);
+    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
     make_strips(choice, &row, &vkb_shader_adjoint_strip_words_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -129,32 +129,38 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
     memcpy(&row, pass, sizeof row);
     make_strips(choice, pass, &row, strip_shaders);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_thresholded(choice, pass, &row, error);
+        && vkb_add_from_image(choice, pass, &row, error);
 }
 
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
 #define TAKE_VEC4S(B, name, count) \
     memcpy(params->name, up->params.filter.name, sizeof params->name);
 
-// Adds the composite, and after it a fused pass that also filters the last level.
-bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *choice,
+                                             const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up = NULL;
+    const struct vkb_pass_row *up =
+        vkb_ends_bloom(pass) ? vkb_writer_of(plain, pass->reads[1]) : NULL;
+    const uint32_t target = pass->targets[0];
+
+    // The shaders are compiled for one format. The levels of a published method may have their own.
+    return up && vkb_is_filter(up) && !up->constants.add_own && !pass->constants.masked
+                && vkb_has_format_of(plain, up->reads[0], target)
+                && vkb_has_format_of(plain, pass->reads[0], target)
+                && plain->images[pass->reads[1]].format == plain->images[target].format
+                && vkb_same_size(plain, pass->reads[1], target)
+             ? up
+             : NULL;
+}
+
+struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
+                                   const struct vkb_pass_row *pass, const struct vkb_pass_row *up)
+{
+    const enum vkb_format format = choice->plain.images[pass->reads[1]].format;
     struct vkb_pass_row row;
     struct vkb_filter_final_params *params = &row.params.filter_final;
 
-    if (vkb_ends_bloom(pass))
-        up = vkb_writer_of(plain, pass->reads[1]);
-    *fits = up && fits_strips(plain, up) && !up->constants.add_own && !pass->constants.masked
-         && vkb_has_format_of(plain, up->reads[0], pass->targets[0])
-         && vkb_has_format_of(plain, pass->reads[0], pass->targets[0])
-         && plain->images[pass->reads[1]].format == plain->images[pass->targets[0]].format
-         && vkb_same_size(plain, pass->reads[1], pass->targets[0]) && vkb_fits_words(choice, pass)
-         && (!pass->transposed || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
     row.fused = true;
@@ -166,8 +172,22 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
     PLACE_ROWS(filter_final, TAKE_INPUT)
     FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);
+    row.constants.format = vkb_storage_mode(format);
+    return row;
+}
+
+// Adds the composite, and after it a fused pass that also filters the last level.
+bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+{
+    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
+
+    *fits = up && fits_strips(&choice->plain, up) && vkb_fits_words(choice, pass)
+         && (!pass->transposed || vkb_are_floats(choice, pass));
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
     make_strips(choice, up, &row, pass->transposed ? mixed_shaders : final_shaders);
-    row.constants.format = vkb_storage_mode(plain->images[pass->reads[1]].format);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

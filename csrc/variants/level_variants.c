@@ -9,14 +9,12 @@ static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_F
 static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
 static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(halve_taps);
-static const struct vkb_shader *const reduce_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(reduce);
+static const struct vkb_shader *const prefilter_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(prefilter);
 static const struct vkb_shader *const shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
-static const struct vkb_shader *const godot_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(godot_rows);
-static const struct vkb_shader *const hdrp_rows_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(hdrp_rows);
-static const struct vkb_shader *const hdrp_columns_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(hdrp_columns);
+static const struct vkb_shader *const rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(nine_rows);
+static const struct vkb_shader *const columns_words[VKB_FORMAT_COUNT] =
+    VKB_WORDS_BY_FORMAT(nine_columns);
 static const struct vkb_shader *const double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
 static const struct vkb_shader *const double_final_words[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(double_final);
@@ -82,7 +80,7 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     vkb_drop_reads(&row, 1);
     make_halving(choice, &row, plain->images[pass->reads[0]].format);
     return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_thresholded(choice, pass, &row, error);
+        && vkb_add_from_image(choice, pass, &row, error);
 }
 
 // What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
@@ -129,20 +127,6 @@ static bool add_words(const struct vkb_variant_choice *choice, const struct vkb_
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-bool vkb_add_godot_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        bool *fits, struct vkb_error *error)
-{
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-
-    *fits = groups_of(pass) == GROUPS_GODOT_BLUR
-         && pass->constants.direction == DIRECTION_HORIZONTAL && is_half(&choice->plain, pass)
-         && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
-         && vkb_fits_words(choice, pass);
-    return !*fits
-        || add_words(choice, pass, godot_words[source->format], GODOT_COLUMNS, GATHER_ROWS, error);
-}
-
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                          bool *fits, struct vkb_error *error)
 {
@@ -169,18 +153,26 @@ static bool add_prefilter(const struct vkb_variant_choice *choice, const struct 
         && vkb_add_from_image(choice, pass, &row, error);
 }
 
-bool vkb_add_reduced(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                     bool *fits, struct vkb_error *error)
+bool vkb_add_prefiltered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         bool *fits, struct vkb_error *error)
 {
     const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
     const enum vkb_mode groups = groups_of(pass);
+    const bool same = vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0]);
+    struct vkb_pass_row row;
 
     *fits = (groups == GROUPS_FILAMENT || groups == GROUPS_HDRP || groups == GROUPS_URP
-             || groups == GROUPS_THREE)
-         && !pass->constants.masked && is_half(&choice->plain, pass) && loads(choice, pass);
-    return !*fits
-        || add_prefilter(choice, pass, reduce_words[format], REDUCE_COLUMNS, HALVE_WORDS_ROWS,
-                         error);
+             || groups == GROUPS_POST_PROCESSING || groups == GROUPS_THREE
+             || groups == GROUPS_BABYLON || (same && groups == GROUPS_KINO)
+             || (same && groups == GROUPS_HIGHLIGHTS && pass->constants.radius <= 1))
+         && !pass->constants.masked && (same || is_half(&choice->plain, pass))
+         && loads(choice, pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    row.constants.exact = same ? EXACT_SAME : EXACT_HALF;
+    return add_prefilter(choice, &row, prefilter_words[format],
+                         PREFILTER_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS, error);
 }
 
 bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -201,20 +193,30 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
                          4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
 }
 
-bool vkb_add_hdrp_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       bool *fits, struct vkb_error *error)
+// HDRP's blurs of images of the same size, and of twice the size along the line; Godot's horizontal
+// one of an image of twice the size.
+bool vkb_add_nine(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                  bool *fits, struct vkb_error *error)
 {
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    const uint32_t word = 4 / vkb_formats[format].channel_size;
+    struct vkb_pass_row row;
 
     *fits = groups_of(pass) == GROUPS_HDRP_BLUR
-         && (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-         && loads(choice, pass);
+              ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
+                    && loads(choice, pass)
+              : groups_of(pass) == GROUPS_GODOT_BLUR && rows && is_half(&choice->plain, pass)
+                    && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
+                    && vkb_fits_words(choice, pass);
     if (!*fits)
         return true;
-    return rows ? add_words(choice, pass, hdrp_rows_words[format], HDRP_OUTPUTS, GATHER_ROWS, error)
-                : add_words(choice, pass, hdrp_columns_words[format], word, HDRP_OUTPUTS, error);
+    memcpy(&row, pass, sizeof row);
+    row.constants.exact =
+        pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
+    return rows ? add_words(choice, &row, rows_words[format], NINE_OUTPUTS, GATHER_ROWS, error)
+                : add_words(choice, &row, columns_words[format],
+                            4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
 }
 
 bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -241,41 +243,20 @@ bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_p
 bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up = NULL;
-    struct vkb_pass_row row;
-    struct vkb_filter_final_params *params = &row.params.filter_final;
-    const enum vkb_format format = plain->images[pass->targets[0]].format;
+    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     const bool mixed = pass->transposed;
 
-    if (vkb_ends_bloom(pass))
-        up = vkb_writer_of(plain, pass->reads[1]);
-    // The shader is compiled for one format. The levels of a published method may have their own.
-    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && !up->constants.add_own
-         && !pass->constants.masked && plain->images[pass->reads[0]].format == format
-         && plain->images[pass->reads[1]].format == format
-         && vkb_formats[plain->images[up->reads[0]].format].vk == vkb_formats[format].vk
-         && loads_to_double(choice, pass)
+    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && loads_to_double(choice, pass)
          && (!mixed || choice->variants != VKB_VARIANTS_CPU || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
-    memcpy(&row, pass, sizeof row);
-    memset(&row.params, 0, sizeof row.params);
+    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
     make_doubling(choice, &row,
                   mixed ? &vkb_shader_double_tile_final_mixed_comp
                         : &vkb_shader_double_tile_final_comp,
                   mixed ? double_mixed_words : double_final_words,
                   DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
-    row.fused = true;
-    row.reads[0] = up->reads[0];
-    row.reads[1] = pass->reads[0];
-    row.reads[2] = pass->reads[3];
-    vkb_drop_reads(&row, mixed ? 3 : 2);
-    row.block = VKB_BLOCK_filter_final;
-    params->coarse = up->params.filter.coarse;
-    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
-    row.constants.format = vkb_storage_mode(plain->images[pass->reads[1]].format);
-    memcpy(params->taps, up->params.filter.taps, sizeof params->taps);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }

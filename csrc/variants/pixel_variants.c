@@ -7,10 +7,6 @@
 static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
 static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
     VKB_WORDS_BY_FORMAT(threshold);
-static const struct vkb_shader *const kino_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(kino_bright);
-static const struct vkb_shader *const highlights_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(highlights);
 
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -28,20 +24,6 @@ static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass
     return vkb_is_threshold(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// The shaders for a pass from an image of the target's size and format; NULL: it is none of those
-// that need no filter then.
-static const struct vkb_shader *const *unfiltered_shaders(const struct vkb_graph *graph,
-                                                          const struct vkb_pass_row *pass)
-{
-    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || pass->constants.masked
-        || !vkb_same_size(graph, pass->reads[0], pass->targets[0])
-        || !vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
-        return NULL;
-    return pass->constants.groups == GROUPS_KINO       ? kino_shaders
-         : pass->constants.groups == GROUPS_HIGHLIGHTS ? highlights_shaders
-                                                       : NULL;
-}
-
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first
 // `read_count` images.
 static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
@@ -56,7 +38,6 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
 {
     const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
-    const struct vkb_shader *const *unfiltered = unfiltered_shaders(graph, pass);
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
@@ -66,8 +47,6 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
         load_pixels(&row, blend_shaders[format], format, 2);
     else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
         load_pixels(&row, threshold_shaders[format], format, 1);
-    else if (vkb_fits_words(choice, pass) && unfiltered)
-        load_pixels(&row, unfiltered[format], format, 1);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 

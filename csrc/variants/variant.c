@@ -66,38 +66,24 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 }
 
 bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *reducing, struct vkb_error *error)
+                        const struct vkb_pass_row *variant, struct vkb_error *error)
 {
     const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    const bool is_filter = pass->block == VKB_BLOCK_filter;
     struct vkb_pass_row row;
 
-    if (!threshold || threshold->constants.threshold_mode != THRESHOLD_NONE)
+    if (!threshold || (!is_filter && threshold->constants.threshold_mode != THRESHOLD_NONE))
         return true;
-    memcpy(&row, reducing, sizeof row);
+    memcpy(&row, variant, sizeof row);
     // Also in place of a mask, if there is none.
     for (uint32_t i = 0; i < row.read_count; ++i)
         if (row.reads[i] == pass->reads[0])
             row.reads[i] = threshold->reads[0];
     row.fused = true;
     row.constants.from_image = true;
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-bool vkb_add_thresholded(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                         const struct vkb_pass_row *filtering, struct vkb_error *error)
-{
-    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
-    struct vkb_pass_row row;
-
-    if (!threshold)
-        return true;
-    memcpy(&row, filtering, sizeof row);
-    for (uint32_t i = 0; i < row.read_count; ++i)
-        if (row.reads[i] == pass->reads[0])
-            row.reads[i] = threshold->reads[0];
-    row.fused = true;
-    row.constants.from_image = true;
-    row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);
-    VKB_TAKE_THRESHOLD(&row, filter, threshold);
+    if (is_filter) {
+        row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);
+        VKB_TAKE_THRESHOLD(&row, filter, threshold);
+    }
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

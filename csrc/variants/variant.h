@@ -29,13 +29,14 @@ vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
 // Levels of exactly half and exactly twice the size.
 vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
 // The first of these with taps that are weighted by brightness.
-vkb_variant_add vkb_add_halved_taps, vkb_add_godot_rows;
-// First passes of published methods, with taps among 4 x 4 texels of an image of twice the size.
-vkb_variant_add vkb_add_reduced;
+vkb_variant_add vkb_add_halved_taps;
+// First passes of published methods, with taps among 4 x 4 texels of an image of twice the size, or
+// of the same size.
+vkb_variant_add vkb_add_prefiltered;
 // The same of an image of any larger size.
 vkb_variant_add vkb_add_shrunk;
-// HDRP's blurs, of images of the same size and of twice the size along the line.
-vkb_variant_add vkb_add_hdrp_line;
+// Blurs of nine taps, of images of the same size and of twice the size.
+vkb_variant_add vkb_add_nine;
 // Filters in strips, also fused with the composite; the sum of several levels that are filtered.
 vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
 // Iterations of streaks.
@@ -63,18 +64,20 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
 // pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
 
-// If a threshold pass that only removes NaN and infinity, as that of a published method does,
-// writes what `pass` reads, adds a fused pass that reads the image itself. It may replace
-// `reducing`, the variant of `pass`.
+// If a threshold pass writes what `pass` reads, adds a fused pass that reads the image itself and
+// may replace `variant`, that of `pass`. A pass that is no filter does so only if the threshold
+// pass just removes NaN and infinity, as that of a published method does.
 bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *reducing, struct vkb_error *error);
+                        const struct vkb_pass_row *variant, struct vkb_error *error);
 
-// If a threshold pass writes what the filter `pass` reads, adds a fused pass that reads the image
-// itself. It may replace `filtering`, the variant of `pass`.
-bool vkb_add_thresholded(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                         const struct vkb_pass_row *filtering, struct vkb_error *error);
+// The filter that makes the bloom which `pass` ends, if a fused pass may nest it; NULL: none. The
+// row of this pass, without a shader.
+const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *choice,
+                                             const struct vkb_pass_row *pass);
+struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
+                                   const struct vkb_pass_row *pass, const struct vkb_pass_row *up);
 
-// Whether a pass brings a factor of the cotangents of its composite to the bloom.
+// Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
 
 // Whether the images that a pass reads are words of single floats.

@@ -90,6 +90,11 @@ cp -r "$package" "$work"
 cd "$work"
 cp "$build/mesa/$library" vkbloom_lavapipe/
 "${cross}strip" --strip-unneeded vkbloom_lavapipe/libvulkan_lvp.so
+# Without start files, so that it is of its own source alone.
+mkdir vkbloom_lavapipe/loader
+"${cross}gcc" -O2 -Wall -Wextra -Werror -shared -fPIC -s -nostartfiles "-ffile-prefix-map=$build=." \
+    -Wl,-Bsymbolic,-soname,libvulkan.so.1,-rpath,'$ORIGIN/..' loader.c \
+    vkbloom_lavapipe/libvulkan_lvp.so -o vkbloom_lavapipe/loader/libvulkan.so.1
 cat >vkbloom_lavapipe/_build.py <<END
 MESA = "$(cat "$source/VERSION")"
 LLVM = "$($llvm/bin/llvm-config --version)"

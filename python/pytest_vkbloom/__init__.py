@@ -49,6 +49,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="let checks without a reference pass",
     )
     group.addoption(
+        "--bloom-hash",
+        action="store_true",
+        help="references are hashes, for drivers that draw equal bits; every value must be equal",
+    )
+    group.addoption(
         "--bloom-adapter",
         metavar="NAME",
         default="auto",
@@ -104,6 +109,11 @@ def pytest_runtest_makereport(
     if records:
         setattr(report, _CHECKS, list(records))
         records.clear()
+        if report.failed and (parts := item.config.stash[_RUN].parts) is not None:
+            # A property of the JUnit report, and the line that CI systems read as an attachment.
+            page = parts.parent / "index.html"
+            item.user_properties.append(("bloom_report", str(page)))
+            item.add_report_section("call", "stdout", f"[[ATTACHMENT|{page}]]\n")
     setattr(report, _MODULE, item.config.stash[_RUN].describe(item))
     return report
 
@@ -113,13 +123,6 @@ def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
     """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
 
     It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> def test_black_stays_black(bloom_renderer):
-    ...     frames = bloom_renderer.apply(np.zeros((16, 16, 4), np.uint8))
-    ...     assert not frames["final"][..., :3].any()
     """
     from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
 
@@ -162,6 +165,7 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
             update=config.getoption("bloom_update"),
             add=config.getoption("bloom_add"),
             allow_missing=config.getoption("bloom_allow_missing"),
+            hashed=config.getoption("bloom_hash"),
             expect_adapter=config.getoption("bloom_expect_adapter"),
             parts=config.stash[_RUN].parts,
         ),
@@ -244,8 +248,10 @@ class _Run:
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """List written, missing and unused references, and the report's path."""
+        suffix = ".hashes" if self._config.getoption("bloom_hash") else ".json"
         lines = [
-            f"{record['outcome']}: {self._relative(Path(record['folder']) / record['name'])}.json"
+            f"{record['outcome']}: "
+            f"{self._relative(Path(record['folder']) / record['name'])}{suffix}"
             for record in self._records
             if record["outcome"] in ("written", "missing")
         ]

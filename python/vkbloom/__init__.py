@@ -21,6 +21,13 @@ from typing import Any
 
 import lazy_loader
 
+try:
+    from vkbloom import _core
+except ImportError as error:
+    from vkbloom._no_core import stand_in
+
+    # (Of the package, since other modules import it from here.)
+    _core = stand_in(error)
 # These supply the registries of methods, stages of glare and presets.
 from vkbloom import _glare, _methods, _presets  # noqa: F401
 from vkbloom._version import installed_version

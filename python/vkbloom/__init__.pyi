@@ -15,7 +15,7 @@ from ._fit import FitResult, fit, fit_pyramid, translate
 from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
-from ._gradients import vjp
+from ._gradients import deglare, vjp
 from ._grid.checking import GridReport, check_grid
 from ._grid.grid import grid
 from ._io.array_files import read, write
@@ -25,6 +25,7 @@ from ._methods.blender import BlenderGlare
 from ._methods.convolution import Convolution
 from ._methods.filament import FilamentBloom
 from ._methods.godot import GodotBloom
+from ._methods.halation import Halation
 from ._methods.kino import KinoBloom
 from ._methods.mip_chain import DualKawase, Pyramid
 from ._methods.playcanvas import PlayCanvasBloom
@@ -66,6 +67,7 @@ __all__ = [
     "Glare",
     "GodotBloom",
     "GridReport",
+    "Halation",
     "Halo",
     "HdrpBloom",
     "Image",
@@ -92,6 +94,7 @@ __all__ = [
     "capture",
     "check_grid",
     "default_renderer",
+    "deglare",
     "explore",
     "fit",
     "fit_pyramid",

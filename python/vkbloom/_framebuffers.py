@@ -51,10 +51,7 @@ class Framebuffers(Protocol):
 
 
 def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
-    """Return the name of the framebuffer that represents all of them.
-
-    `arrays`: At least one image of shape (H, W, C) or depth of shape (H, W).
-    """
+    """Return the name of the framebuffer that represents all of them."""
     if "final" in arrays:
         return "final"
     images = [name for name, array in arrays.items() if array.ndim == 3]
@@ -69,8 +66,6 @@ def dimensions(arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, ...]]
     framebuffer of that size. Likewise "channel" is the dimension of `final`'s number of
     channels and "<first>_channel" of another number. With shared dimensions, xarray computes
     `glow - blur_vertical` pixel by pixel; otherwise it would broadcast to six dimensions.
-
-    `arrays`: At least one image of shape (H, W, C) or depth of shape (H, W).
     """
     shape = arrays[leading(arrays)].shape
     # Keys are (H, W) and (C,), which differ in length and cannot collide.

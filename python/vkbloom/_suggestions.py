@@ -40,11 +40,7 @@ def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
 def lacking(
     owner: str, names: Sequence[str], own: Iterable[str], others: Mapping[str, Iterable[str]]
 ) -> str:
-    """Return a text that something lacks fields: what was meant, or what has them.
-
-    - `own`: The fields that it has.
-    - `others`: The fields of others by their names.
-    """
+    """Return a text that something lacks fields: what was meant, or what has them."""
     own = list(own)
     text = f"{owner} has no {', '.join(map(repr, names))}"
     if near := did_you_mean(names[0], own):

@@ -65,8 +65,6 @@ def bloom(
 
     Raises
     ------
-    ValueError, TypeError
-        As for `Renderer.apply` and `vjp`.
     RuntimeError
         From a backward pass: a second derivative was asked for.
 

@@ -1,5 +1,5 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
-// last two images are what other readers of the image have brought, and the image itself. ADDED_SHARE
+// last two images are what other readers of the image have accumulated, and the image itself. ADDED_SHARE
 // is a factor of the colours of the former. Include finite.glsl before this file.
 #include "lib/where_finite.glsl"
 

@@ -4,7 +4,7 @@
 
 // A pixel, and the cotangents of the picture before exposure and curves.
 struct Pixel {
-    vec4 scene, bloom, brought;
+    vec4 scene, bloom, cotangent;
     float share;
     vec3 mixed, by_mixed;
     // By exposure and reference white.
@@ -17,9 +17,9 @@ vec3 stored(vec3 value)
     return inside(value, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
 }
 
-vec3 back_through_encoding(vec3 toned, vec3 brought)
+vec3 back_through_encoding(vec3 toned, vec3 cotangent)
 {
-    vec3 kept = brought * stored(apply_encoding(toned, ENCODING, params.reference_white));
+    vec3 kept = cotangent * stored(apply_encoding(toned, ENCODING, params.reference_white));
     return kept * encoding_slope(toned, ENCODING, params.reference_white);
 }
 
@@ -45,14 +45,14 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.scene = finite_or_zero(given);
     p.bloom = bloom;
     p.share = share;
-    p.brought = where_finite(cotangent, given);
-    p.brought.a *= stored(vec3(mixed_alpha(p.scene, bloom))).r;
+    p.cotangent = where_finite(cotangent, given);
+    p.cotangent.a *= stored(vec3(mixed_alpha(p.scene, bloom))).r;
     p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
     // As exactly_toned(): without a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
         p.mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
     vec3 exposed = p.mixed * exp2(params.exposure), toned = exactly_toned(exposed, TONEMAP);
-    vec3 by_toned = back_through_encoding(toned, p.brought.rgb);
+    vec3 by_toned = back_through_encoding(toned, p.cotangent.rgb);
     vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
     p.by_mixed = by_exposed * exp2(params.exposure);
     p.by_curves.x = log(2.0) * dot(by_exposed, exposed);
@@ -69,7 +69,7 @@ vec3 screened(vec3 other, vec3 product)
                                  + vec3(lessThanEqual(product, vec3(1.0)))));
 }
 
-// What one unit of light, i b, brings.
+// By the light, i b.
 vec3 by_light(Pixel p)
 {
     vec3 light = light_of(p.bloom.rgb);
@@ -87,13 +87,13 @@ vec4 by_alpha_light(Pixel p)
         return vec4(0.0);
     if (ALPHA == ALPHA_BLUR) {
         float light = light_of(p.bloom.aaa).r;
-        return vec4(vec3(0.0), p.brought.a * (1.0 - p.scene.a) * inside(vec3(light), 0.0, 1.0).r);
+        return vec4(vec3(0.0), p.cotangent.a * (1.0 - p.scene.a) * inside(vec3(light), 0.0, 1.0).r);
     }
     float brightest = max(p.bloom.r, max(p.bloom.g, p.bloom.b)), light = light_of(vec3(brightest)).r;
     float held = clamp(light, 0.0, 1.0);
     float share = held > p.scene.a ? 1.0 : held == p.scene.a ? 0.5 : 0.0;
     share *= inside(vec3(light), 0.0, 1.0).r;
-    return vec4(p.brought.a * share * equal_shares(p.bloom.rgb, brightest), 0.0);
+    return vec4(p.cotangent.a * share * equal_shares(p.bloom.rgb, brightest), 0.0);
 }
 
 // Of the picture's alpha by that of the scene.
@@ -116,7 +116,7 @@ vec4 by_scene(Pixel p)
         colour *= screened(light_of(p.bloom.rgb), p.scene.rgb * light_of(p.bloom.rgb));
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
         colour *= above(p.scene.rgb, 0.0);
-    return vec4(colour, p.brought.a * alpha_slope(p));
+    return vec4(colour, p.cotangent.a * alpha_slope(p));
 }
 
 vec4 by_bloom(Pixel p)
@@ -140,7 +140,7 @@ vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by, b
     growing = side;
     Pixel p = pixel_of(given, bloom, share, cotangent);
     if (by == BY_MIXED)
-        return vec4(p.by_mixed, p.brought.a);
+        return vec4(p.by_mixed, p.cotangent.a);
     if (by >= BY_VALUES)
         return by_values(p);
     if (by == BY_MASK)

@@ -25,6 +25,8 @@ vec4 load_padded(int along, int across)
     int place = along;
     if (BOUNDARY == BOUNDARY_WRAP)
         place = behind ? along - params.extent : along - params.padded + params.extent;
+    else if (BOUNDARY == BOUNDARY_MIRROR)
+        place = behind ? 2 * params.extent - 1 - along : params.padded - 1 - along;
     else
         place = behind ? params.extent - 1 : 0;
     place = inside ? along : clamp(place, 0, params.extent - 1);

@@ -1,5 +1,8 @@
-// What the first passes of published methods make of their bilinear taps.
+// What downsamplings that are not linear, and the first passes of published methods, make of their bilinear taps,
+// by GROUPS.
 #include "lib/groups.glsl"
+#include "lib/highlights.glsl"
+#include "lib/kino.glsl"
 
 float brightest(vec3 value)
 {
@@ -118,6 +121,12 @@ float babylon_factor(vec4 value)
     return THRESHOLDED == 0 || dot(value.rgb, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2) ? 1.0 : 0.0;
 }
 
+// Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
+float unreal_share(vec4 value)
+{
+    return THRESHOLDED == 0 ? 1.0 : dot(value.rgb, LUMINANCE) + 1.0 - params.threshold;
+}
+
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 vec4 three_prefiltered(vec4 value)
@@ -129,4 +138,83 @@ vec4 three_prefiltered(vec4 value)
                                    : vec3(0.2126729, 0.7151522, 0.0721750);
     float luminance = dot(value.rgb, weights);
     return value * smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
+}
+
+// Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
+int group_count()
+{
+    if (GROUPS == GROUPS_BOX)
+        return 4;
+    if (GROUPS == GROUPS_FILAMENT)
+        return 4;
+    if (GROUPS == GROUPS_URP)
+        return 1;
+    if (GROUPS == GROUPS_POST_PROCESSING)
+        return 1;
+    if (GROUPS == GROUPS_UNREAL)
+        return 1;
+    if (GROUPS == GROUPS_THREE)
+        return 1;
+    if (GROUPS == GROUPS_BABYLON)
+        return 1;
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return 1;
+    if (GROUPS == GROUPS_KINO)
+        return ANTI_FLICKER != 0 ? 5 : 1;
+    return 5;
+}
+
+bool are_of_thirteen()
+{
+    if (GROUPS == GROUPS_PYGFX)
+        return true;
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return true;
+    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
+}
+
+// The place of a tap that is a group of its own, in texels.
+vec2 place_of(int group, FilamentTaps pairs)
+{
+    if (GROUPS == GROUPS_BOX)
+        return 2.0 * vec2(group & 1, group >> 1) - 1.0;
+    if (GROUPS == GROUPS_FILAMENT)
+        return mix(pairs.left, pairs.right, bvec2((group & 1) != 0, (group & 2) != 0));
+    if (GROUPS == GROUPS_HDRP)
+        return HDRP_OFFSETS[group];
+    const vec2 cross[5] = vec2[](vec2(0, 0), vec2(-1, 0), vec2(1, 0), vec2(0, -1), vec2(0, 1));
+    return cross[group];
+}
+
+// Whether each group is a tap of its own.
+bool has_own_taps()
+{
+    if (GROUPS == GROUPS_PYRAMID)
+        return false;
+    if (GROUPS == GROUPS_BLENDER)
+        return false;
+    return !are_of_thirteen();
+}
+
+// What the method makes of groups that are one tap each, and of Filament's shares.
+vec4 made(vec4 found[5], vec4 shares)
+{
+    vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
+    if (GROUPS == GROUPS_BOX)
+        return box_of(four);
+    if (GROUPS == GROUPS_KINO)
+        return kino_bright(found[0], found[1], found[2], found[3], found[4]);
+    if (GROUPS == GROUPS_FILAMENT)
+        return filament_prefiltered(four, shares);
+    if (GROUPS == GROUPS_HDRP)
+        return hdrp_prefiltered(found);
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return highlights(found[0]);
+    if (GROUPS == GROUPS_BABYLON)
+        return babylon_factor(found[0]) * found[0];
+    if (GROUPS == GROUPS_THREE)
+        return three_prefiltered(found[0]);
+    if (GROUPS == GROUPS_UNREAL)
+        return clamp(unreal_share(found[0]), 0.0, 1.0) * found[0];
+    return unity_prefiltered(found[0]);
 }

@@ -1,18 +1,18 @@
 // Gathers from pixels that are about on one line through a centre with a texel, between two radii. The
 // including shader defines CENTRE, the centre in texels, STRIP_IMAGE, whose pixels these are, AT_ONCE,
-// the pixels of an iteration, and brought_by(), what one of them brings to the texel.
+// the pixels of an iteration, and cotangent_from(), the part of the texel's cotangents that is one pixel's.
 
 // A sample is part of a texel that is less than this distance away along both axes. Rounding is less
 // than 1 / 16 of a texel in a sample's place, and less than a pixel in the radii of pixels.
 const float NEAR = 1.0 + 1.0 / 16.0, MARGIN = 1.0;
 
 // Part of the pixels. `facing` is 1 for pixels on the texel's side of the centre, -1 for the others, 0
-// for both. The rest is for brought_by().
+// for both. The rest is for cotangent_from().
 struct Part {
     float side, outwards, facing;
 };
 
-vec4 brought_by(ivec2 pixel, Part part, ivec2 texel);
+vec4 cotangent_from(ivec2 pixel, Part part, ivec2 texel);
 
 // The distances from the centre of what is around a texel, the least and the largest.
 vec2 distances_around(vec2 here)
@@ -69,7 +69,7 @@ vec4 gather_part(Part part, ivec2 texel, vec2 radii, int first_row, int last_row
             for (; x <= last; x += AT_ONCE)
                 [[unroll]] for (int i = 0; i < AT_ONCE; ++i)
                     if (x + i <= last)
-                        sum += brought_by(ivec2(x + i, y), part, texel);
+                        sum += cotangent_from(ivec2(x + i, y), part, texel);
         }
     }
     return sum;

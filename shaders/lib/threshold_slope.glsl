@@ -23,22 +23,22 @@ vec3 shares_of_brightest(vec3 colour)
     return share / (share.r + share.g + share.b);
 }
 
-vec4 back_through_soft(vec4 colour, vec4 brought, float threshold, float width, float divisor,
+vec4 back_through_soft(vec4 colour, vec4 cotangent, float threshold, float width, float divisor,
                        float least)
 {
     float brightness = max(colour.r, max(colour.g, colour.b));
     vec2 slope = soft_slope(brightness, threshold, width, divisor, least);
-    return slope.x * brought
-         + vec4(shares_of_brightest(colour.rgb), 0.0) * (slope.y * dot(brought, colour));
+    return slope.x * cotangent
+         + vec4(shares_of_brightest(colour.rgb), 0.0) * (slope.y * dot(cotangent, colour));
 }
 
 // Through apply_threshold().
-vec4 back_through_threshold(vec4 colour, vec4 brought, int mode, float threshold, float knee)
+vec4 back_through_threshold(vec4 colour, vec4 cotangent, int mode, float threshold, float knee)
 {
     if (mode == THRESHOLD_NONE)
-        return brought;
+        return cotangent;
     if (mode == THRESHOLD_HARD)
-        return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > threshold ? brought : vec4(0.0);
+        return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > threshold ? cotangent : vec4(0.0);
     float width = threshold * knee;
-    return back_through_soft(colour, brought, threshold, width, 4.0 * width + 1e-5, 1e-5);
+    return back_through_soft(colour, cotangent, threshold, width, 4.0 * width + 1e-5, 1e-5);
 }

@@ -28,10 +28,10 @@ vec3 equal_shares(vec3 value, float extreme)
     return share / (share.r + share.g + share.b);
 }
 
-vec3 back_aces(vec3 c, vec3 brought)
+vec3 back_aces(vec3 c, vec3 cotangent)
 {
     vec3 divisor = c * (2.43 * c + 0.59) + 0.14, value = c * (2.51 * c + 0.03) / divisor;
-    return brought * inside(value, 0.0, 1.0) * (5.02 * c + 0.03 - value * (4.86 * c + 0.59)) / divisor;
+    return cotangent * inside(value, 0.0, 1.0) * (5.02 * c + 0.03 - value * (4.86 * c + 0.59)) / divisor;
 }
 
 // The tone map without its differences near 0, since encodings are so steep there that the rounding of
@@ -44,13 +44,13 @@ vec3 exactly_toned(vec3 c, int tonemap)
     return khronos_compressed(min(c, 1e30) - low + low * low / (4.0 * F90));
 }
 
-vec3 back_khronos_neutral(vec3 c, vec3 brought)
+vec3 back_khronos_neutral(vec3 c, vec3 cotangent)
 {
     const float START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
     float low = min(c.r, min(c.g, c.b));
     bool dark = low <= 2.0 * F90;
     float offset = dark ? low - low * low / (4.0 * F90) : F90;
-    vec3 colour = c - offset, by_colour = brought;
+    vec3 colour = c - offset, by_colour = cotangent;
     float peak = max(colour.r, max(colour.g, colour.b));
     if (peak > START) {
         float apart = peak + ROOM - START, top = 1.0 - ROOM * ROOM / apart;
@@ -58,21 +58,21 @@ vec3 back_khronos_neutral(vec3 c, vec3 brought)
         float kept = 1.0 / (DESATURATION * (peak - top) + 1.0);
         float by_kept = -kept * kept * DESATURATION * (1.0 - by_top);
         float ratio = top / peak, by_ratio = (by_top - ratio) / peak;
-        float by_peak = dot(brought, colour) * (by_ratio * kept + ratio * by_kept)
-                      + dot(brought, vec3(1.0)) * (by_top * (1.0 - kept) - top * by_kept);
-        by_colour = ratio * kept * brought + equal_shares(colour, peak) * by_peak;
+        float by_peak = dot(cotangent, colour) * (by_ratio * kept + ratio * by_kept)
+                      + dot(cotangent, vec3(1.0)) * (by_top * (1.0 - kept) - top * by_kept);
+        by_colour = ratio * kept * cotangent + equal_shares(colour, peak) * by_peak;
     }
     float slope = dark ? 1.0 - low / (2.0 * F90) : 0.0;
     return by_colour - equal_shares(c, low) * (slope * dot(by_colour, vec3(1.0)));
 }
 
 // Step by step, from the last one to the first.
-vec3 back_agx(vec3 c, vec3 brought)
+vec3 back_agx(vec3 c, vec3 cotangent)
 {
     vec3 mixed = AGX_INSET * (REC709_TO_REC2020 * c), held = max(mixed, 1e-10);
     vec3 stops = (log2(held) - AGX_LOW) / (AGX_HIGH - AGX_LOW), x = clamp(stops, 0.0, 1.0);
     vec3 outset = AGX_OUTSET * agx_contrast(x), base = max(outset, 0.0);
-    vec3 by = brought * inside(REC2020_TO_REC709 * pow(base, vec3(2.2)), 0.0, 1.0);
+    vec3 by = cotangent * inside(REC2020_TO_REC709 * pow(base, vec3(2.2)), 0.0, 1.0);
     by = (by * REC2020_TO_REC709) * 2.2 * pow(base, vec3(1.2)) * vec3(greaterThan(outset, vec3(0.0)));
     vec3 x2 = x * x, x3 = x2 * x;
     vec3 slope = 93.0 * x3 * x2 - 200.7 * x2 * x2 + 127.84 * x3 - 20.604 * x2 + 0.8596 * x + 0.1191;
@@ -81,21 +81,21 @@ vec3 back_agx(vec3 c, vec3 brought)
     return (by * AGX_INSET) * REC709_TO_REC2020;
 }
 
-vec3 back_through_tonemap(vec3 c, vec3 brought, int tonemap)
+vec3 back_through_tonemap(vec3 c, vec3 cotangent, int tonemap)
 {
     if (tonemap == TONEMAP_NONE)
-        return brought;
+        return cotangent;
     c = clamp(c, -1e30, 1e30);
     // Where the result is infinite, the derivative is 0.
     if (tonemap == TONEMAP_REINHARD)
-        return mix(vec3(0.0), brought / (c + 1.0) / (c + 1.0), notEqual(c, vec3(-1.0)));
+        return mix(vec3(0.0), cotangent / (c + 1.0) / (c + 1.0), notEqual(c, vec3(-1.0)));
     if (tonemap == TONEMAP_ACES)
-        return back_aces(clamp(c, -65504.0, 65504.0), brought);
+        return back_aces(clamp(c, -65504.0, 65504.0), cotangent);
     if (tonemap == TONEMAP_EXPONENTIAL)
-        return mix(vec3(0.0), brought * exp(-c), greaterThan(c, vec3(-88.0)));
+        return mix(vec3(0.0), cotangent * exp(-c), greaterThan(c, vec3(-88.0)));
     if (tonemap == TONEMAP_KHRONOS_NEUTRAL)
-        return back_khronos_neutral(c, brought);
-    return back_agx(c, brought);
+        return back_khronos_neutral(c, cotangent);
+    return back_agx(c, cotangent);
 }
 
 // The derivative of the power, 0 at a base of 0.

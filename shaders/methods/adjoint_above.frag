@@ -17,8 +17,8 @@ layout(set = 0, binding = 2) uniform sampler2D cotangents;
 
 vec4 shade()
 {
-    vec4 brought = texelFetch(cotangents, PIXEL, 0);
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
-        brought.a = 0.0;
-    return gathered(back_above_threshold(texelFetch(source, PIXEL, 0), brought));
+        cotangent.a = 0.0;
+    return gathered(back_above_threshold(texelFetch(source, PIXEL, 0), cotangent));
 }

@@ -56,7 +56,7 @@ float share_of(vec2 place, ivec2 texel)
 const int MAX_SAMPLES = 5;
 const float MIN_STEP = 0.5;
 
-vec4 brought_by(ivec2 pixel, Part part, ivec2 texel)
+vec4 cotangent_from(ivec2 pixel, Part part, ivec2 texel)
 {
     ivec2 size = textureSize(cotangents, 0);
     vec2 here = vec2(texel) - CENTRE;

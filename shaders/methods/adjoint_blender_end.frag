@@ -31,21 +31,21 @@ vec3 settled(vec3 value)
 
 // Through most - scale (most - value) with the scale min(saturation, most / spread). Around a grey the
 // scale is the saturation, around black at most 1/2 (reference/blender.py).
-vec3 back_saturated(vec3 value, vec3 brought)
+vec3 back_saturated(vec3 value, vec3 cotangent)
 {
     float most = max(value.r, max(value.g, value.b)), least = min(value.r, min(value.g, value.b));
-    float spread = most - least, sum = dot(brought, vec3(1.0));
+    float spread = most - least, sum = dot(cotangent, vec3(1.0));
     vec3 at_most = shares_of_brightest(value), at_least = shares_of_brightest(-value);
     if (most < 0.0)
         return at_most * sum;
     float scale = most > 0.0 ? params.saturation : min(params.saturation, 0.5);
     if (scale * spread < most || spread == 0.0)
-        return scale * brought + at_most * ((1.0 - scale) * sum);
+        return scale * cotangent + at_most * ((1.0 - scale) * sum);
     // Where both scales are equal, or the largest channel is 0, half of the derivative of one.
     float share = (scale * spread == most ? 0.5 : 1.0) * (most == 0.0 ? 0.5 : 1.0);
     scale = most / spread;
-    float by_scale = share * (dot(brought, value) - most * sum) / (spread * spread);
-    return scale * brought + at_most * ((1.0 - scale) * sum)
+    float by_scale = share * (dot(cotangent, value) - most * sum) / (spread * spread);
+    return scale * cotangent + at_most * ((1.0 - scale) * sum)
          + (at_least * most - at_most * least) * by_scale;
 }
 
@@ -53,6 +53,6 @@ vec4 shade()
 {
     Place place = PLACE_IN(source);
     vec4 value = fetch_bilinear(source, place.texel, place.part);
-    vec4 brought = params.factors[0] * texelFetch(cotangents, PIXEL, 0);
-    return gathered(vec4(back_saturated(settled(value.rgb), brought.rgb), ALPHA == ALPHA_BLUR ? brought.a : 0.0));
+    vec4 cotangent = params.factors[0] * texelFetch(cotangents, PIXEL, 0);
+    return gathered(vec4(back_saturated(settled(value.rgb), cotangent.rgb), ALPHA == ALPHA_BLUR ? cotangent.a : 0.0));
 }

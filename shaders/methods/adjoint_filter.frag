@@ -23,7 +23,7 @@ vec4 entry(int place)
     return texelFetch(table, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH), 0);
 }
 
-vec4 cotangent(ivec2 place)
+vec4 cotangent_at(ivec2 place)
 {
     vec4 value = texelFetch(cotangents, place, 0);
     return BY == BY_BLOOM ? vec4(where_finite(value, texelFetch(scene, place, 0)).rgb, 0.0) : value;
@@ -46,7 +46,7 @@ vec4 along(int start, ivec2 pixel, bool vertical)
         [[unroll]] for (int k = 0; k < 4; ++k) {
             int at = row.x + i + k;
             ivec2 place = vertical ? ivec2(pixel.x, at) : ivec2(at, pixel.y);
-            sum += weights[k] * cotangent(min(place, last));
+            sum += weights[k] * cotangent_at(min(place, last));
         }
     }
     return sum;
@@ -61,7 +61,7 @@ vec4 across(ivec2 pixel)
         vec4 shares = entry(rows.z + y);
         for (int x = 0; x < columns.y; ++x)
             sum += dot(shares, entry(columns.z + x))
-                 * cotangent(ivec2(columns.x + x, rows.x + y));
+                 * cotangent_at(ivec2(columns.x + x, rows.x + y));
     }
     return sum;
 }

@@ -21,10 +21,10 @@ vec4 shade()
 {
     vec2 place = FROM_CENTRE;
     vec4 value = colours_from_centre(flare_offset(LEVELS, place));
-    vec4 brought = texelFetch(cotangents, PIXEL, 0);
-    brought *= is_halo() ? vec4(halo_factor(place)) : ghost_factor(LEVELS, place) * vignette(place);
-    brought.rgb *= larger(vec4(params.maximum), above_threshold(value)).rgb;
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    cotangent *= is_halo() ? vec4(halo_factor(place)) : ghost_factor(LEVELS, place) * vignette(place);
+    cotangent.rgb *= larger(vec4(params.maximum), above_threshold(value)).rgb;
     if (ALPHA != ALPHA_BLUR)
-        brought.a = 0.0;
-    return gathered(back_above_threshold(value, brought));
+        cotangent.a = 0.0;
+    return gathered(back_above_threshold(value, cotangent));
 }

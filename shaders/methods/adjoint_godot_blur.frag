@@ -19,28 +19,28 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 #include "lib/adjoint.glsl"
 
 // Through value / (1 + L) or, with a sign of -1, value / (1 - L).
-vec4 back_weighted(vec4 value, vec4 brought, float sign)
+vec4 back_weighted(vec4 value, vec4 cotangent, float sign)
 {
     float divisor = 1.0 + sign * luminance(value);
     float slope = larger(vec4(dot(value.rgb, GODOT_LUMINANCE)), vec4(0.0)).x * sign
                 / max(params.luminance_cap, 6.0);
-    float by_divisor = -dot(brought, value) / (divisor * divisor);
-    return brought / divisor + vec4(slope * by_divisor * GODOT_LUMINANCE, 0.0);
+    float by_divisor = -dot(cotangent, value) / (divisor * divisor);
+    return cotangent / divisor + vec4(slope * by_divisor * GODOT_LUMINANCE, 0.0);
 }
 
-vec4 back_glowing(vec4 sum, vec4 brought)
+vec4 back_glowing(vec4 sum, vec4 cotangent)
 {
     vec4 value = exposed(sum);
     float kept = THRESHOLDED != 0 ? feedback(value) : 1.0, t = transition(value);
-    brought.rgb *= larger(vec4(params.luminance_cap), kept * value).rgb;
+    cotangent.rgb *= larger(vec4(params.luminance_cap), kept * value).rgb;
     float slope = THRESHOLDED != 0
                     ? larger(vec4(t * t * (3.0 - 2.0 * t)), vec4(params.glow_bloom)).x * 6.0 * t
                           * (1.0 - t) / max(params.threshold_scale, 1e-6)
                     : 0.0;
-    brought = kept * brought
-            + vec4(shares_of_brightest(value.rgb), 0.0) * (slope * dot(brought, value));
-    brought.rgb *= exp2(params.exposure);
-    return back_weighted(sum, params.strength * brought, -1.0);
+    cotangent = kept * cotangent
+            + vec4(shares_of_brightest(value.rgb), 0.0) * (slope * dot(cotangent, value));
+    cotangent.rgb *= exp2(params.exposure);
+    return back_weighted(sum, params.strength * cotangent, -1.0);
 }
 
 vec4 blurred_column(int height)
@@ -54,15 +54,15 @@ vec4 blurred_column(int height)
 
 vec4 shade()
 {
-    vec4 brought = texelFetch(cotangents, PIXEL, 0);
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
-        brought.a = 0.0;
+        cotangent.a = 0.0;
     if (DIRECTION == DIRECTION_HORIZONTAL) {
         vec4 value = sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING);
-        return gathered(back_weighted(value, brought, 1.0));
+        return gathered(back_weighted(value, cotangent, 1.0));
     }
     vec4 sum = blurred_column(params.target_height);
     if (BY == BY_MASK)
-        return gathered(vec4(dot(glowing(sum), brought), 0.0, 0.0, 0.0));
-    return gathered(back_glowing(sum, mask_value() * brought));
+        return gathered(vec4(dot(glowing(sum), cotangent), 0.0, 0.0, 0.0));
+    return gathered(back_glowing(sum, mask_value() * cotangent));
 }

@@ -24,24 +24,24 @@ struct Parts {
     vec3 scene, light;
 };
 
-Parts back_soft_light(vec3 s, vec3 light, vec3 brought)
+Parts back_soft_light(vec3 s, vec3 light, vec3 cotangent)
 {
     vec3 toned = apply_tonemap(s, TONEMAP), toned_light = apply_tonemap(light, TONEMAP);
     vec3 low = max(toned, -1e6), dark = (48.0 * low - 24.0) * low + 4.0;
     vec3 slope = mix(0.5 / sqrt(max(toned, 0.25)), dark, lessThanEqual(toned, vec3(0.25)));
     vec3 lit = 1.0 - above(toned, 1.0);
-    vec3 by_toned = brought * (1.0 + lit * clamp(toned_light, 0.0, 1.0) * (slope - 1.0));
-    vec3 by_light = brought * lit * (soft_full(toned) - toned) * inside(toned_light, 0.0, 1.0);
+    vec3 by_toned = cotangent * (1.0 + lit * clamp(toned_light, 0.0, 1.0) * (slope - 1.0));
+    vec3 by_light = cotangent * lit * (soft_full(toned) - toned) * inside(toned_light, 0.0, 1.0);
     return Parts(back_through_tonemap(s, by_toned, TONEMAP),
                  back_through_tonemap(light, by_light, TONEMAP));
 }
 
-Parts back_blend(vec3 s, vec3 bloom_light, float share, vec3 brought)
+Parts back_blend(vec3 s, vec3 bloom_light, float share, vec3 cotangent)
 {
     vec3 light = light_of(bloom_light);
     if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
-        return back_soft_light(s, light, brought);
-    vec3 by_sum = back_through_tonemap(blended_sum(s, bloom_light, share), brought, TONEMAP);
+        return back_soft_light(s, light, cotangent);
+    vec3 by_sum = back_through_tonemap(blended_sum(s, bloom_light, share), cotangent, TONEMAP);
     if (COMPOSITE == COMPOSITE_MIX)
         return Parts((1.0 - params.intensity * share) * by_sum, by_sum);
     if (COMPOSITE == COMPOSITE_REPLACE)
@@ -61,15 +61,15 @@ vec4 to_one_side(vec4 pixel, bool side)
     p.scene = finite_or_zero(pixel);
     p.bloom = texelFetch(bloom, PIXEL, 0);
     p.share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
-    p.brought = where_finite(texelFetch(cotangents, PIXEL, 0), pixel);
-    p.brought.a *= stored(vec3(mixed_alpha(p.scene, p.bloom))).r;
+    p.cotangent = where_finite(texelFetch(cotangents, PIXEL, 0), pixel);
+    p.cotangent.a *= stored(vec3(mixed_alpha(p.scene, p.bloom))).r;
     vec3 s = p.scene.rgb * exp2(params.exposure);
-    vec3 by_toned = back_through_encoding(blend(s, p.bloom.rgb, p.share), p.brought.rgb);
+    vec3 by_toned = back_through_encoding(blend(s, p.bloom.rgb, p.share), p.cotangent.rgb);
     Parts parts = back_blend(s, p.bloom.rgb, p.share, by_toned);
     if (BY == BY_MASK)
         return vec4(-params.intensity * dot(parts.light, s), 0.0, 0.0, 0.0);
     if (BY == BY_SCENE)
-        return vec4(parts.scene * exp2(params.exposure), p.brought.a * alpha_slope(p));
+        return vec4(parts.scene * exp2(params.exposure), p.cotangent.a * alpha_slope(p));
     float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
     return gain * (vec4(parts.light, 0.0) + by_alpha_light(p));
 }

@@ -26,7 +26,7 @@ layout(set = 0, binding = 3) uniform sampler2D cotangents;
 // The group whose cotangents are wanted, what the groups are, and the cotangents of the pixel.
 int own_group;
 Place place;
-vec4 found[5], brought;
+vec4 found[5], cotangent;
 
 // A group's share without the weight by brightness.
 float share_of(int group, Place place)
@@ -53,32 +53,32 @@ float weight_of(vec4 mean, float share, out vec3 slope)
 }
 
 // The mean of Filament's taps, above the threshold.
-vec4 back_filament(vec4 mean, vec4 brought)
+vec4 back_filament(vec4 mean, vec4 cotangent)
 {
     vec3 above = max(mean.rgb - params.threshold, vec3(0.0));
     float brightness = brightest(above), divisor = 1.0 + brightness / params.highlight;
     float value = max(mean.r, max(mean.g, mean.b));
     float factor = value > 0.0 ? brightness / (divisor * value) : 0.0;
-    float by_factor = brought.a * mean.a;
-    float by_brightness = -dot(brought.rgb, above) / params.highlight
+    float by_factor = cotangent.a * mean.a;
+    float by_brightness = -dot(cotangent.rgb, above) / params.highlight
                         + (value > 0.0 ? by_factor / value : 0.0);
-    vec3 by_above = brought.rgb / divisor
+    vec3 by_above = cotangent.rgb / divisor
                   + shares_of_brightest(mean.rgb) * (by_brightness / (divisor * divisor));
     vec3 by_value = shares_of_brightest(mean.rgb) * (value > 0.0 ? -by_factor * factor / value : 0.0);
-    return vec4(by_above * larger(mean, vec4(params.threshold)).rgb + by_value, brought.a * factor);
+    return vec4(by_above * larger(mean, vec4(params.threshold)).rgb + by_value, cotangent.a * factor);
 }
 
 // The weighted mean, and what a method makes of it.
-vec4 back_end(vec4 mean, vec4 brought)
+vec4 back_end(vec4 mean, vec4 cotangent)
 {
     if (GROUPS == GROUPS_FILAMENT)
-        return back_filament(mean, brought);
+        return back_filament(mean, cotangent);
     if (GROUPS == GROUPS_PYGFX_KARIS)
-        return brought * larger(usual(mean), vec4(0.0));
-    return brought;
+        return cotangent * larger(usual(mean), vec4(0.0));
+    return cotangent;
 }
 
-vec4 back_weighted(vec4 found[5], vec4 brought, Place place)
+vec4 back_weighted(vec4 found[5], vec4 cotangent, Place place)
 {
     vec3 slope, own_slope = vec3(0.0);
     vec4 sum = vec4(0.0), own = vec4(0.0);
@@ -93,13 +93,13 @@ vec4 back_weighted(vec4 found[5], vec4 brought, Place place)
             own_slope = slope;
         }
     }
-    vec4 mean = sum / total, by_mean = back_end(mean, brought);
+    vec4 mean = sum / total, by_mean = back_end(mean, cotangent);
     if (by_mean == vec4(0.0))
         return by_mean;
     return (own_weight * by_mean + vec4(own_slope, 0.0) * dot(by_mean, own - mean)) / total;
 }
 
-vec4 back_bevy(vec4 found[5], vec4 brought)
+vec4 back_bevy(vec4 found[5], vec4 cotangent)
 {
     vec4 sum = vec4(0.0), own = vec4(0.0);
     float own_share = 0.0;
@@ -113,50 +113,58 @@ vec4 back_bevy(vec4 found[5], vec4 brought)
     }
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee;
-        brought = back_through_soft(vec4(max(sum.rgb, vec3(1e-4)), sum.a), brought, params.threshold,
+        cotangent = back_through_soft(vec4(max(sum.rgb, vec3(1e-4)), sum.a), cotangent, params.threshold,
                                     width, 4.0 * (width + 1e-5), 1e-5);
     }
-    brought.rgb *= larger(sum, vec4(1e-4)).rgb;
+    cotangent.rgb *= larger(sum, vec4(1e-4)).rgb;
     float divisor = 1.0 + 0.25 * group_luminance(own);
-    float slope = larger(vec4(dot(own.rgb, LUMINANCE)), vec4(0.0)).x * 0.25 * dot(brought, own)
+    float slope = larger(vec4(dot(own.rgb, LUMINANCE)), vec4(0.0)).x * 0.25 * dot(cotangent, own)
                 / (divisor * divisor);
-    return own_share * (brought / divisor - vec4(slope * LUMINANCE, 0.0));
+    return own_share * (cotangent / divisor - vec4(slope * LUMINANCE, 0.0));
 }
 
-vec4 back_unity(vec4 value, vec4 brought)
+vec4 back_unity(vec4 value, vec4 cotangent)
 {
     vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
     // The threshold's factor is not negative.
-    brought *= params.tint[0] * (GROUPS == GROUPS_URP ? larger(kept, vec4(0.0)) : vec4(1.0));
+    cotangent *= params.tint[0] * (GROUPS == GROUPS_URP ? larger(kept, vec4(0.0)) : vec4(1.0));
     if (THRESHOLDED != 0)
-        brought =
-            back_through_soft(kept, brought, params.threshold, unity_width(), unity_divisor(), 1e-4);
-    return vec4(brought.rgb * larger(vec4(params.clamp_max), value).rgb, brought.a);
+        cotangent =
+            back_through_soft(kept, cotangent, params.threshold, unity_width(), unity_divisor(), 1e-4);
+    return vec4(cotangent.rgb * larger(vec4(params.clamp_max), value).rgb, cotangent.a);
 }
 
-vec4 back_three(vec4 value, vec4 brought)
+vec4 back_three(vec4 value, vec4 cotangent)
 {
     if (THRESHOLDED == 0)
-        return brought;
+        return cotangent;
     const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
                                    : vec3(0.2126729, 0.7151522, 0.0721750);
     float place = (dot(value.rgb, weights) - params.threshold) / params.smooth_width;
     float t = clamp(place, 0.0, 1.0);
     float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
-    return t * t * (3.0 - 2.0 * t) * brought + vec4(weights, 0.0) * (slope * dot(brought, value));
+    return t * t * (3.0 - 2.0 * t) * cotangent + vec4(weights, 0.0) * (slope * dot(cotangent, value));
+}
+
+vec4 back_unreal(vec4 value, vec4 cotangent)
+{
+    float share = unreal_share(value);
+    vec2 inside = vec2(larger(vec4(share), vec4(0.0)).x, larger(vec4(1.0), vec4(share)).x);
+    float slope = THRESHOLDED == 0 ? 0.0 : inside.x * inside.y * dot(cotangent, value);
+    return clamp(share, 0.0, 1.0) * cotangent + vec4(slope * LUMINANCE, 0.0);
 }
 
 // The cotangents of the three values of a median.
-vec4[3] back_middle(vec4 a, vec4 b, vec4 c, vec4 brought)
+vec4[3] back_middle(vec4 a, vec4 b, vec4 c, vec4 cotangent)
 {
     vec4 low = min(a, b), high = max(a, b), held = min(high, c);
-    vec4 by_low = brought * larger(low, held), by_held = brought * larger(held, low);
+    vec4 by_low = cotangent * larger(low, held), by_held = cotangent * larger(held, low);
     vec4 by_high = by_held * larger(c, high);
     return vec4[](by_low * larger(b, a) + by_high * larger(a, b),
                   by_low * larger(a, b) + by_high * larger(b, a), by_held * larger(high, c));
 }
 
-vec4 back_kino(vec4 found[5], vec4 brought)
+vec4 back_kino(vec4 found[5], vec4 cotangent)
 {
     vec4 values[5];
     for (int group = 0; group < 5; ++group)
@@ -165,15 +173,15 @@ vec4 back_kino(vec4 found[5], vec4 brought)
     vec4 second = ANTI_FLICKER != 0 ? middle(first, values[3], values[4]) : values[0];
     if (THRESHOLDED != 0) {
         float width = params.threshold * params.knee + 1e-5;
-        brought =
-            back_through_soft(second, brought, params.threshold, width, 4.0 * width, 1e-5);
+        cotangent =
+            back_through_soft(second, cotangent, params.threshold, width, 4.0 * width, 1e-5);
     }
     if (ANTI_FLICKER != 0) {
-        vec4 columns[3] = back_middle(first, values[3], values[4], brought);
+        vec4 columns[3] = back_middle(first, values[3], values[4], cotangent);
         vec4 rows[3] = back_middle(values[0], values[1], values[2], columns[0]);
-        brought = own_group < 3 ? rows[own_group] : columns[own_group - 2];
+        cotangent = own_group < 3 ? rows[own_group] : columns[own_group - 2];
     }
-    return vec4(brought.rgb * larger(vec4(65000.0), found[own_group]).rgb, brought.a);
+    return vec4(cotangent.rgb * larger(vec4(65000.0), found[own_group]).rgb, cotangent.a);
 }
 
 // The derivative of what a smooth transition subtracts or adds (highlights.glsl).
@@ -183,10 +191,10 @@ float rounding_slope(float distance_to_end, float width)
     return -0.5 * h * sign(distance_to_end);
 }
 
-vec4 back_highlights(vec4 value, vec4 brought)
+vec4 back_highlights(vec4 value, vec4 cotangent)
 {
     if (THRESHOLDED == 0)
-        return brought;
+        return cotangent;
     float low = params.threshold, range = params.maximum, high = low + range;
     float at_low = min(params.smoothness, min(low, range));
     float at_high = min(params.smoothness, min(high, range));
@@ -197,12 +205,12 @@ vec4 back_highlights(vec4 value, vec4 brought)
     float slope = larger(vec4(range), vec4(kept)).x - rounding_slope(kept - range, at_high);
     slope *= larger(vec4(above), vec4(0.0)).x + rounding_slope(above, at_low);
     float factor = highlight(brightest) / brightest;
-    float by_brightest = dot(brought, value) * (slope - factor) / brightest;
-    return factor * brought + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);
+    float by_brightest = dot(cotangent, value) * (slope - factor) / brightest;
+    return factor * cotangent + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);
 }
 
 // Of one of Blender's 13 taps: of up to four groups, in each of which brighter taps weigh less.
-vec4 back_blender(Taps taps, vec4 brought)
+vec4 back_blender(Taps taps, vec4 cotangent)
 {
     bool inner = own_group >= 9;
     vec4 own = inner ? taps.inner[own_group - 9] : taps.outer[own_group];
@@ -221,51 +229,53 @@ vec4 back_blender(Taps taps, vec4 brought)
         }
         if (belongs)
             total += GROUP_SHARES[group]
-                   * (weight * brought + slope * dot(brought, own - sum / weights)) / weights;
+                   * (weight * cotangent + slope * dot(cotangent, own - sum / weights)) / weights;
     }
     return usual(total);
 }
 
 // The cotangents of the group, from those of what the method makes of all groups.
-vec4 back(vec4 found[5], vec4 brought, Place place)
+vec4 back(vec4 found[5], vec4 cotangent, Place place)
 {
     if (GROUPS == GROUPS_BEVY)
-        return back_bevy(found, brought);
+        return back_bevy(found, cotangent);
     if (GROUPS == GROUPS_KINO)
-        return back_kino(found, brought);
+        return back_kino(found, cotangent);
     if (GROUPS == GROUPS_URP)
-        return back_unity(found[0], brought);
+        return back_unity(found[0], cotangent);
     if (GROUPS == GROUPS_POST_PROCESSING)
-        return back_unity(found[0], brought);
+        return back_unity(found[0], cotangent);
     if (GROUPS == GROUPS_BABYLON)
-        return babylon_factor(found[0]) * brought;
+        return babylon_factor(found[0]) * cotangent;
     if (GROUPS == GROUPS_THREE)
-        return back_three(found[0], brought);
+        return back_three(found[0], cotangent);
+    if (GROUPS == GROUPS_UNREAL)
+        return back_unreal(found[0], cotangent);
     if (GROUPS == GROUPS_PYGFX)
-        return brought * larger(pygfx_mean(taps_of(place)), vec4(0.0));
+        return cotangent * larger(pygfx_mean(taps_of(place)), vec4(0.0));
     if (GROUPS == GROUPS_HIGHLIGHTS)
-        return back_highlights(found[0], brought);
+        return back_highlights(found[0], cotangent);
     if (GROUPS == GROUPS_BLENDER)
-        return back_blender(taps_of(place), brought);
+        return back_blender(taps_of(place), cotangent);
     // Without weights the reduction is linear, and this is no group but all of it.
     if (GROUPS == GROUPS_FILAMENT)
-        return THRESHOLDED == 0 ? brought : back_weighted(found, brought, place);
-    return back_weighted(found, brought, place);
+        return THRESHOLDED == 0 ? cotangent : back_weighted(found, cotangent, place);
+    return back_weighted(found, cotangent, place);
 }
 
 void start()
 {
     place = PLACE_IN(source);
     found = means(place);
-    brought = texelFetch(cotangents, PIXEL, 0);
+    cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
-        brought.a = 0.0;
+        cotangent.a = 0.0;
 }
 
 vec4 shade(int number)
 {
     own_group = LEVELS + number;
     if (BY == BY_MASK)
-        return gathered(vec4(dot(prefiltered(found, place), brought), 0.0, 0.0, 0.0));
-    return gathered(back(found, mask_value() * brought, place));
+        return gathered(vec4(dot(prefiltered(found, place), cotangent), 0.0, 0.0, 0.0));
+    return gathered(back(found, mask_value() * cotangent, place));
 }

@@ -71,8 +71,8 @@ float share_of(vec2 offset, ivec2 texel)
     return shares.x * shares.y;
 }
 
-// What a pixel brings to a texel.
-vec4 brought_by(ivec2 pixel, Part part, ivec2 texel)
+// The part of a texel's cotangents that is a pixel's.
+vec4 cotangent_from(ivec2 pixel, Part part, ivec2 texel)
 {
     vec2 place = vec2(pixel) - CENTRE, here = vec2(texel) - CENTRE;
     vec2 offset = flare_offset(LEVELS, place);

@@ -30,12 +30,12 @@ void main()
     for (int at = line.count - 1; at >= 0; --at) {
         int slot = at % params.distance;
         ivec2 place = line.first + at * line.towards;
-        vec4 brought = texelFetch(cotangents, place, 0);
+        vec4 cotangent = texelFetch(cotangents, place, 0);
         if (at + params.distance < line.count) {
-            brought += end * mixed[slot];
-            store(place + params.distance * line.towards, own * mixed[slot] + end * brought);
+            cotangent += end * mixed[slot];
+            store(place + params.distance * line.towards, own * mixed[slot] + end * cotangent);
         }
-        mixed[slot] = brought;
+        mixed[slot] = cotangent;
     }
     for (int at = 0; at < min(params.distance, line.count); ++at)
         store(line.first + at * line.towards, own * mixed[at]);

@@ -36,7 +36,7 @@ float mask_at(ivec2 pixel)
     return MASKED == 0 ? 1.0 : sample_at(mask, PLACE_OF(mask, pixel), vec2(0.0), SAMPLING).r;
 }
 
-vec4 cotangent(ivec2 pixel)
+vec4 cotangent_at(ivec2 pixel)
 {
     vec4 value = texelFetch(cotangents, pixel, 0);
     return ALPHA == ALPHA_BLUR ? value : vec4(value.rgb, 0.0);
@@ -62,7 +62,7 @@ vec4 by_values(ivec2 pixel)
 {
     vec4 colour = reduced(pixel);
     float brightness = max(colour.r, max(colour.g, colour.b));
-    float whole = dot(cotangent(pixel), colour) * mask_at(pixel);
+    float whole = dot(cotangent_at(pixel), colour) * mask_at(pixel);
     return vec4(soft_values(brightness) * whole, 0.0, 0.0);
 }
 
@@ -72,11 +72,11 @@ vec4 shade()
 {
     if (BY >= BY_VALUES)
         return sum_of_block(ivec2(params.target_width, params.target_height));
-    vec4 colour = reduced(PIXEL), brought = cotangent(PIXEL);
+    vec4 colour = reduced(PIXEL), cotangent = cotangent_at(PIXEL);
     if (BY == BY_MASK) {
         vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-        return gathered(vec4(dot(kept, brought), 0.0, 0.0, 0.0));
+        return gathered(vec4(dot(kept, cotangent), 0.0, 0.0, 0.0));
     }
-    return gathered(back_through_threshold(colour, mask_at(PIXEL) * brought, THRESHOLD_MODE,
+    return gathered(back_through_threshold(colour, mask_at(PIXEL) * cotangent, THRESHOLD_MODE,
                                            params.threshold, params.knee));
 }

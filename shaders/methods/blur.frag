@@ -35,13 +35,15 @@ vec2 within(Place place, vec2 offset)
     return offset;
 }
 
-// Adds from the first tap to the last, as all variants of a blur, so that they round identically.
+// Adds from the first tap to the last, as all variants of a blur, so that they round identically. Taps that
+// are several texels apart have others without a weight between them.
 vec4 blur_line(Place place, vec2 centre, vec2 tap_step)
 {
     vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += weight(tap) * sample_at(source, place, within(place, centre + place_of(tap) * tap_step),
-                                       SAMPLING);
+        if (weight(tap) != 0.0)
+            sum += weight(tap)
+                 * sample_at(source, place, within(place, centre + place_of(tap) * tap_step), SAMPLING);
     return sum;
 }
 

@@ -45,17 +45,17 @@ vec4[ROWS] along_column(int x, int first, int last)
     [[unroll]] for (int i = 0; i < ROWS; ++i)
         sums[i] = vec4(0.0);
     [[unroll]] for (int at = 0; at < 2 * ROWS + READERS - 2; ++at) {
-        vec4 value = cotangent(ivec2(x, 2 * first - 3 + at));
+        vec4 value = cotangent_at(ivec2(x, 2 * first - 3 + at));
         [[unroll]] for (int i = 0; i < ROWS; ++i)
             if (at >= 2 * i && at < 2 * i + READERS)
                 sums[i] += shares[at - 2 * i] * value;
     }
     if (first == 0)
         [[unroll]] for (int at = 0; at < 3; ++at)
-            sums[0] += more[at] * cotangent(ivec2(x, at));
+            sums[0] += more[at] * cotangent_at(ivec2(x, at));
     if (first + ROWS > last)
         [[unroll]] for (int at = 0; at < 3; ++at) {
-            vec4 value = more[at] * cotangent(ivec2(x, 2 * last + 1 - at));
+            vec4 value = more[at] * cotangent_at(ivec2(x, 2 * last + 1 - at));
             [[unroll]] for (int i = 0; i < ROWS; ++i)
                 sums[i] += first + i == last ? value : vec4(0.0);
         }

@@ -25,7 +25,7 @@ void load_tile(ivec2 first)
         int at = i + int(gl_LocalInvocationIndex);
         ivec2 place = ivec2(at % LOADED_COLUMNS, at / LOADED_COLUMNS);
         if (at < LOADED)
-            tile[place.y][place.x] = cotangent(first + place);
+            tile[place.y][place.x] = cotangent_at(first + place);
     }
 }
 

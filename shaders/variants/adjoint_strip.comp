@@ -4,7 +4,7 @@
 #pragma compile floats
 #pragma compile packed
 // The derivatives by an image of its complete bloom: the transpose of strip.comp, for a composite without
-// a curve, which is a factor. What is beyond the edges brings nothing, and the texel at an edge also has
+// a curve, which is a factor. There are no cotangents beyond the edges, and the texel at an edge also has
 // what the taps beyond it have read.
 #include "variants/fused_bloom.glsl"
 #include "lib/threshold_slope.glsl"
@@ -79,7 +79,7 @@ float column_weight(int column, int tap)
     return column_weights[column][tap];
 }
 
-// Removes what is brought to NaN and infinity.
+// Removes the cotangents of NaN and infinity.
 void change_run(int loaded, int at, inout uvec4 run[RUN_WORDS])
 {
     if (FINITE != 0)

@@ -37,7 +37,7 @@ vec4 entry(int place)
     return FETCH(table, 2, place % TABLE_WIDTH, place / TABLE_WIDTH);
 }
 
-vec4 cotangent(int x, int y)
+vec4 cotangent_at(int x, int y)
 {
 #ifdef WORDS
     int column = min(x, read_shapes[0].x - 1), row = min(y, read_shapes[0].y - 1);
@@ -60,7 +60,7 @@ void along_rows(ivec2 first, int end, int start, float gain, float share)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[i] = vec4(0.0);
         [[unroll]] for (int at = 0; at < SPAN_X; ++at) {
-            vec4 value = cotangent(int(place.x) + at, y);
+            vec4 value = cotangent_at(int(place.x) + at, y);
             [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                 sums[i] += weights[at][i] * value;
         }
@@ -77,7 +77,7 @@ void along_columns(ivec2 first, int end, int start, float gain, float share)
         [[unroll]] for (int at = 0; at < SPAN_Y; ++at) {
             vec4 weights = gain * entry(int(place.z) + at);
             [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
-                vec4 value = cotangent(first.x + column, int(place.x) + at);
+                vec4 value = cotangent_at(first.x + column, int(place.x) + at);
                 [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row)
                     sums[row * COLUMNS + column] += weights[row] * value;
             }
@@ -105,7 +105,7 @@ void across(ivec2 first, int end, ivec2 start, float gain, float share)
         for (int number = 0; number < SPAN_Y; ++number) {
             vec4 values[SPAN_X];
             [[unroll]] for (int i = 0; i < SPAN_X; ++i)
-                values[i] = cotangent(int(place_x.x) + i, int(place_y.x) + number);
+                values[i] = cotangent_at(int(place_x.x) + i, int(place_y.x) + number);
             [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel) {
                 vec4 shares = entry(int(place_y.z) + number * LEVELS + kernel);
                 [[unroll]] for (int column = 0; column < COLUMNS; ++column) {

@@ -29,8 +29,8 @@ void write_row(int first, int y)
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         int x = min(first + i, read_shapes[0].x - 1);
         vec4 colour = finite_or_zero(load_floats(image, read_shapes[0], x, y));
-        vec4 brought = load_floats(cotangents, read_shapes[1], x, y);
-        found[i] = back_through_threshold(colour, vec4(brought.rgb, 0.0), THRESHOLD_MODE,
+        vec4 cotangent = load_floats(cotangents, read_shapes[1], x, y);
+        found[i] = back_through_threshold(colour, vec4(cotangent.rgb, 0.0), THRESHOLD_MODE,
                                           params.threshold, params.knee);
     }
     store_gathered(first, y, 1.0, found);

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // The derivatives by an image of its complete bloom, for GPUs: the transpose of tile.comp, for a composite
 // without a curve, which is a factor. The transpose of a blur whose taps beyond an edge read the edge has
-// the same symmetric kernel: what is beyond the edges brings nothing, and the texel at the edge also has
+// the same symmetric kernel: there are no cotangents beyond the edges, and the texel at the edge also has
 // what the taps beyond it have read. Both axes commute, so a workgroup keeps its vertical sums in shared
 // memory, as tile.comp.
 #include "variants/fused_bloom.glsl"
@@ -20,7 +20,7 @@ layout(set = 0, binding = 3) uniform writeonly image2D target;
 shared float sums[3][TILE_ROWS][TILE_LOADED];
 
 // 0 outside of the image. It is fetched there too: no fetch waits for a branch.
-vec3 cotangent(ivec2 place, ivec2 last)
+vec3 cotangent_at(ivec2 place, ivec2 last)
 {
     ivec2 within = clamp(place, ivec2(0), last);
     vec4 value = texelFetch(cotangents, within, 0);
@@ -52,17 +52,17 @@ void sum_vertically(ivec2 place, ivec2 last, int top, int column)
     for (int i = 0; i < RUN; ++i)
         run[i] = vec3(0.0);
     for (int at = -RADIUS; at < RUN + RADIUS; ++at) {
-        vec3 value = cotangent(place + ivec2(0, at), last);
+        vec3 value = cotangent_at(place + ivec2(0, at), last);
         for (int i = 0; i < RUN; ++i)
             if (abs(at - i) <= RADIUS)
                 run[i] += vertical_weight(at - i) * value;
     }
     for (int distance = 0; place.y == 0 && distance < RADIUS; ++distance)
-        run[0] += vertical_beyond(distance) * cotangent(ivec2(place.x, distance), last);
+        run[0] += vertical_beyond(distance) * cotangent_at(ivec2(place.x, distance), last);
     if (place.y + RUN > last.y) {
         vec3 sum = vec3(0.0);
         for (int distance = 0; distance < RADIUS; ++distance)
-            sum += vertical_beyond(distance) * cotangent(ivec2(place.x, last.y - distance), last);
+            sum += vertical_beyond(distance) * cotangent_at(ivec2(place.x, last.y - distance), last);
         for (int i = 0; i < RUN; ++i)
             run[i] += place.y + i == last.y ? sum : vec3(0.0);
     }
@@ -108,8 +108,8 @@ void main()
         if (pixel.y > last.y)
             continue;
         vec4 scene = texelFetch(image, pixel, 0);
-        vec3 brought = gain * sum_horizontally(row, column, pixel.x == 0, pixel.x == last.x);
-        vec4 found = back_through_threshold(finite_or_zero(scene), vec4(brought, 0.0),
+        vec3 cotangent = gain * sum_horizontally(row, column, pixel.x == 0, pixel.x == last.x);
+        vec4 found = back_through_threshold(finite_or_zero(scene), vec4(cotangent, 0.0),
                                             THRESHOLD_MODE, params.threshold, params.knee);
         found += vec4(vec3(share), 1.0) * texelFetch(cotangents, pixel, 0);
         imageStore(target, pixel, where_finite(found, scene));

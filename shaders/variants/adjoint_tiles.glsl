@@ -9,7 +9,7 @@ layout(set = 0, binding = 5) uniform sampler2D differentiated;
 layout(set = 0, binding = 6) uniform writeonly image2D target;
 
 // 0 outside of the image, where no pixel reads a texel.
-vec4 cotangent(ivec2 place)
+vec4 cotangent_at(ivec2 place)
 {
     ivec2 within = clamp(place, ivec2(0), textureSize(cotangents, 0) - 1);
     vec4 value = texelFetch(cotangents, within, 0);
@@ -18,7 +18,7 @@ vec4 cotangent(ivec2 place)
     return place == within ? value : vec4(0.0);
 }
 
-// What other readers have brought to a pixel, which may be outside.
+// What other readers have accumulated to a pixel, which may be outside.
 vec4 added_at(ivec2 pixel)
 {
     ivec2 within = min(pixel, imageSize(target) - 1);

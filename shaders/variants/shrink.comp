@@ -87,8 +87,8 @@ vec4 tap(int i, Line line, int x, int y)
 vec4 prefiltered(int i, Line line, vec4 shares)
 {
     if (FOUR_TAPS)
-        return filament_prefiltered(vec4[](tap(i, line, 1, 1), tap(i, line, 3, 1),
-                                           tap(i, line, 1, 3), tap(i, line, 3, 3)), shares);
+        return made(vec4[](tap(i, line, 1, 1), tap(i, line, 3, 1), tap(i, line, 1, 3),
+                           tap(i, line, 3, 3), vec4(0.0)), shares);
     Taps taps;
     [[unroll]] for (int y = 0; y < 3; ++y)
         [[unroll]] for (int x = 0; x < 3; ++x)

@@ -336,8 +336,8 @@ def test_results_are_written_before_a_later_failure(
     def fail(*_: object) -> None:
         raise vkbloom.Error("the device went away")
 
-    monkeypatch.setattr(importlib.import_module("benchmarks.overhead"), "run", fail)
-    result = bench("--quick", "--only", "requests", "--only", "overhead", "-o", tmp_path / "b.md")
+    monkeypatch.setattr(importlib.import_module("benchmarks.cost"), "run", fail)
+    result = bench("--quick", "--only", "requests", "--only", "cost", "-o", tmp_path / "b.md")
     assert isinstance(result.exception, vkbloom.Error)
     (section,) = json.loads((tmp_path / "b.json").read_text())["sections"]
     assert section["id"] == "requests"
@@ -347,7 +347,7 @@ def test_results_are_written_before_a_later_failure(
 
 
 #: Those that take two seconds at most; make exhaustive runs all.
-RUN = [*BENCHMARKS] if EXHAUSTIVE else ["forward", "requests", "cost", "overhead"]
+RUN = [*BENCHMARKS] if EXHAUSTIVE else ["forward", "requests", "cost"]
 RUN += [] if EXHAUSTIVE else [name for name in BENCHMARKS if name.endswith("-gpu")]
 
 

@@ -414,22 +414,6 @@ def test_an_animation_is_one_turn_in_numbered_files(tmp_path: Path) -> None:
     assert re.search(r"^ +glow +[\d.]+ +3$", result.stdout, re.M)
 
 
-def test_an_animation_in_a_gif(tmp_path: Path) -> None:
-    oiio = pytest.importorskip("OpenImageIO")
-    path = tmp_path / "a.gif"
-    result = vkb("render", "-o", path, *SMALL, "--frames", "3", "--fps", "10")
-    assert (result.exit_code, result.stderr) == (0, "")
-    assert list(tmp_path.iterdir()) == [path]
-    reader = oiio.ImageInput.open(str(path))
-    for index in range(3):
-        assert reader.seek_subimage(index, 0)
-        shown = np.asarray(reader.read_image(index, 0, 0, 3, "uint8"), np.float64)
-        expected = rendered(time=index / 3)["final"][:, :, :3]
-        # 256 colours, dithered.
-        assert abs(shown - expected).mean() < 8
-    assert not reader.seek_subimage(3, 0)
-
-
 @pytest.mark.parametrize("words", [(), ("--frames", "2")])
 def test_render_without_bloom_says_so(tmp_path: Path, words: tuple[str, ...]) -> None:
     result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--threshold", "2", *words)

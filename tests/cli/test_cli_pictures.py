@@ -167,7 +167,7 @@ class TestNotes:
             ("b.exr", (), False),
         ],
     )
-    def test_clipping_names_the_cure(
+    def test_clipping_gives_a_hint(
         self,
         tmp_path: Path,
         out: str,

@@ -104,7 +104,7 @@ def test_streams_are_read_like_files(folder: Path, line: str, file: str, kind: s
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("VK apply - b.png <&-", "standard input: is closed"),
         ("VK apply - b.png < /dev/null", "standard input: is a device, not a file"),
@@ -123,10 +123,10 @@ def test_streams_are_read_like_files(folder: Path, line: str, file: str, kind: s
         ("VK compare . a.png", ".: Is a directory"),
     ],
 )
-def test_errors_are_one_line(folder: Path, line: str, told: str) -> None:
+def test_errors_are_one_line(folder: Path, line: str, message: str) -> None:
     done = bash(line)
     assert done.returncode in (1, 2)
-    assert told in done.stderr
+    assert message in done.stderr
     assert done.stderr.startswith("vkbloom: ")
     assert done.stderr.count("\n") == 1
     assert not (folder / "b.png").exists()

@@ -209,7 +209,15 @@ def test_no_validation_layer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     layer = validation()
     assert layer.status == "note"
     assert "is not installed" in layer.found
-    assert "apt install vulkan-validationlayers" in layer.advice
+    assert "apt install libvulkan1 vulkan-validationlayers" in layer.advice
+
+
+def test_without_a_loader_there_is_no_validation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The driver of the wheel renders without a loader: nothing is broken."""
+    failure = "validation=True needs the system's Vulkan loader, also for the bundled driver"
+    monkeypatch.setattr(child, "ask", lambda *_: child.Answer(None, failure))
+    layer = validation()
+    assert (layer.status, layer.found) == ("note", "there is no loader")
 
 
 @linux_only
@@ -585,7 +593,7 @@ def test_caches(
     monkeypatch.setenv(variable, value.format(tmp=tmp_path))
     name = "VKBLOOM_CACHE_DIR" if variable == "XDG_CACHE_HOME" else variable
     finding = by_topic(installation.caches(), f"cache {name}")
-    status, told = expected
-    assert (finding.status, told.format(tmp=tmp_path) in finding.found) == (status, True)
+    status, message = expected
+    assert (finding.status, message.format(tmp=tmp_path) in finding.found) == (status, True)
     assert name in finding.advice or "not writable" not in finding.found
     assert list(tmp_path.iterdir()) == []

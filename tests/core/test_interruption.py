@@ -520,8 +520,8 @@ def test_a_forked_process_with_the_id_of_its_parent() -> None:
         text=True,
         check=False,
     )
-    told = "1 the renderer was opened in another process, from which this one was forked\n"
-    assert (done.stdout, done.stderr) == (told, "")
+    message = "1 the renderer was opened in another process, from which this one was forked\n"
+    assert (done.stdout, done.stderr) == (message, "")
 
 
 # Prints the error of a child whose driver opens no device.
@@ -544,9 +544,9 @@ for _ in range(2):
 
 @UNIX
 def test_a_child_without_an_adapter_is_told_to_spawn() -> None:
-    told = output("-c", ADVICE).splitlines()
-    assert len(told) == 2
-    for line in told:
+    message = output("-c", ADVICE).splitlines()
+    assert len(message) == 2
+    for line in message:
         assert "no such adapter" in line
         assert "forked" in line
         assert '"spawn"' in line

@@ -461,9 +461,9 @@ def check_choices(
 ) -> None:
     """Check what each choice opens of the software adapter twice, as two devices."""
     manifests = lavapipes()
-    twin = tmp_path / "twin.json"
-    twin.write_text(manifests[0].read_text())
-    drivers = os.pathsep.join((str(manifests[0]), str(twin)))
+    second = tmp_path / "second.json"
+    second.write_text(manifests[0].read_text())
+    drivers = os.pathsep.join((str(manifests[0]), str(second)))
     variables = {
         "VK_DRIVER_FILES": drivers,
         "VK_ICD_FILENAMES": drivers,

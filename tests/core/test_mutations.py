@@ -127,9 +127,9 @@ setup.write_spirv(setup.processes())
 SELF_TEST = """
 import json, sys
 from vkbloom._doctor import self_test
-told = [one for one in self_test.run("software", sys.argv[1]) if "group" in one]
-assert len(told) > 3, told
-print(json.dumps({f"{one['group']}: {one['name']}": one["wrong"] for one in told if one["wrong"]}))
+done = [one for one in self_test.run("software", sys.argv[1]) if "group" in one]
+assert len(done) > 3, done
+print(json.dumps({f"{one['group']}: {one['name']}": one["wrong"] for one in done if one["wrong"]}))
 """
 
 

@@ -83,8 +83,8 @@ def test_a_crash_is_told_with_its_case(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_driver_that_was_not_tried_is_told() -> None:
     info = vkbloom.AdapterInfo("Arc", "integrated", "Intel open-source", "Mesa 25.0.7", "1.4.0")
-    (told,) = self_test.unknown(info)
-    assert told == (
+    (results,) = self_test.unknown(info)
+    assert results == (
         "driver: Intel open-source has not been tried; llvmpipe, SwiftShader, NVIDIA have"
     )
     info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 26.1.0 (LLVM 20)", "1.4.0")
@@ -102,6 +102,6 @@ def test_what_is_wrong_comes_first(wrong: float) -> None:
         deviation("up_0", changed, values, 1.0),
         deviation("final", values + 9, values, 1.0),
     ]
-    told = self_test.judge(Case("group", "name", lambda _: found), None)  # type: ignore[arg-type]
-    assert told["wrong"].startswith("up_0: ")
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    results = self_test.judge(Case("group", "name", lambda _: found), None)  # type: ignore[arg-type]
+    assert results["wrong"].startswith("up_0: ")
+    assert json.loads(json.dumps(results, allow_nan=False)) == results

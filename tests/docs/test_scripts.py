@@ -32,7 +32,6 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "tools/line_counts.py": ("", "numpy"),
     "tools/requirements.py": ("all", "numpy"),
     "tools/run_notebooks.py": ("", "nbclient"),
-    "tools/soak.py": ("20", "numpy"),
     "tools/where_it_has_run.py": ("--out .", "numpy"),
     "tools/tables/write.py": ("--quick --out .", "skimage"),
 }
@@ -49,6 +48,7 @@ ELSEWHERE: Final = {
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
+    "tools/core_tables.py": "tests/core/test_no_core.py",
     "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes
     "tools/coverage_report.py": "tools/coverage.sh",
     "tools/engines/": "Makefile",

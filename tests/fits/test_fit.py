@@ -396,8 +396,6 @@ class TestParts:
             value = getattr(settings, one)
             if value is None or (one == "knee" and "no knee" in refused(settings)):
                 continue
-            if (settings.method, one) == ("unreal", "threshold"):
-                continue  # fixed, at a number
             (axis,) = space_of(settings, [one], {}, 9.0, 512).axes
             assert axis.value(axis.coordinate(value)) == pytest.approx(value)
             # The ends are what the settings accept.

@@ -188,8 +188,8 @@ class TestWholeSettings:
                 found = grid["final"].sel(preset=name, exposure=exposure).values
                 np.testing.assert_array_equal(found, expected)
         assert json.loads(grid.attrs["settings"]) == {}
-        told = json.loads(grid["preset"].attrs["settings"])
-        assert vkbloom.Settings.from_dict(told["kino"]) == vkbloom.presets["kino"]
+        message = json.loads(grid["preset"].attrs["settings"])
+        assert vkbloom.Settings.from_dict(message["kino"]) == vkbloom.presets["kino"]
 
     def test_settings(self, renderer: Renderer, filled: Call, image: Any) -> None:
         many = [Separable(threshold=0.5), Pyramid(levels=2, format="rgba32float")]
@@ -217,7 +217,7 @@ class TestWholeSettings:
             np.testing.assert_array_equal(grid["bloom"].sel(format=name).values, expected)
 
     @pytest.mark.parametrize(
-        ("settings", "axes", "kind", "told"),
+        ("settings", "axes", "kind", "message"),
         [
             (None, {"preset": ["non"]}, ValueError, "unknown preset 'non'; "),
             (None, {"preset": "kino"}, TypeError, "preset"),
@@ -231,9 +231,9 @@ class TestWholeSettings:
         ],
     )
     def test_refusals(
-        self, filled: Call, settings: Any, axes: Any, kind: type[Exception], told: str
+        self, filled: Call, settings: Any, axes: Any, kind: type[Exception], message: str
     ) -> None:
-        with pytest.raises(kind, match=told):
+        with pytest.raises(kind, match=message):
             filled(np.zeros((4, 4, 3), np.uint8), settings, axes)
 
     def test_framebuffer_that_some_points_lack_is_refused(self, filled: Call) -> None:
@@ -252,8 +252,8 @@ class TestMemory:
         monkeypatch.setattr(Renderer, "_run_requests", None)
         image = np.zeros((1000, 1000, 4), np.float32)
         axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
-        told = r"1000000 points with final needs 16,000.0 GB .* grid, .* framebuffers=\(\)"
-        with pytest.raises(MemoryError, match=told):
+        message = r"1000000 points with final needs 16,000.0 GB .* grid, .* framebuffers=\(\)"
+        with pytest.raises(MemoryError, match=message):
             filled(image, None, axes)
 
 
@@ -339,7 +339,7 @@ class TestRefusals:
             monkeypatch.setattr(Renderer, name, None)
 
     @pytest.mark.parametrize(
-        ("settings", "axes", "names", "told"),
+        ("settings", "axes", "names", "message"),
         [
             (
                 Separable(),
@@ -373,10 +373,10 @@ class TestRefusals:
         settings: Settings,
         axes: Any,
         names: Any,
-        told: str,
+        message: str,
     ) -> None:
         picture = noise(23, 37, 3, dtype="float32")
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=message):
             filled(picture, settings, axes, framebuffers=names)
 
     def test_images_of_two_sizes_are_refused(self, filled: Call) -> None:
@@ -446,6 +446,6 @@ class TestProgress:
         monkeypatch.setattr("vkbloom._grid.progress._is_watched", lambda: True)
         with Progress(4, 1, shown=True) as shown:
             shown.add(Tally(3, ran=5))
-        told = capsys.readouterr().err
-        assert "4/4" in told
-        assert "passes run 5" in told
+        message = capsys.readouterr().err
+        assert "4/4" in message
+        assert "passes run 5" in message

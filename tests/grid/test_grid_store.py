@@ -227,7 +227,7 @@ class TestWhole:
         assert made["final"].chunks[:2] == ((28, 12), (1, 1, 1))
 
     @pytest.mark.parametrize(
-        ("chunks", "told"),
+        ("chunks", "message"),
         [
             ({"knee": 1}, "not an axis"),
             ({"exposure": 0}, "exposure: 0 is outside 1"),
@@ -235,8 +235,8 @@ class TestWhole:
             ([1], r"chunks: \[1\] is not a mapping"),
         ],
     )
-    def test_wrong_chunks(self, tmp_path: Path, chunks: Any, told: str) -> None:
-        with pytest.raises((TypeError, ValueError), match=told):
+    def test_wrong_chunks(self, tmp_path: Path, chunks: Any, message: str) -> None:
+        with pytest.raises((TypeError, ValueError), match=message):
             make(tmp_path / "a.zarr", chunks=chunks)
 
     def test_complete_store_is_reported_complete(self, undisturbed: Path) -> None:
@@ -352,7 +352,7 @@ class TestResumed:
 
 class TestRefused:
     @pytest.mark.parametrize(
-        ("changes", "told"),
+        ("changes", "message"),
         [
             (
                 {"settings": Separable(intensity=0.5)},
@@ -375,10 +375,10 @@ class TestRefused:
         ids=str,
     )
     def test_another_grid_is_refused_with_its_differences(
-        self, copy: Path, changes: Any, told: str
+        self, copy: Path, changes: Any, message: str
     ) -> None:
         before = contents(copy)
-        with pytest.raises(ValueError, match=f"contains another grid; .*{told}"):
+        with pytest.raises(ValueError, match=f"contains another grid; .*{message}"):
             make(copy, **changes)
         assert contents(copy) == before
 
@@ -452,9 +452,9 @@ DAMAGES: list[tuple[str, Callable[[bytes], bytes] | None, str]] = [
 
 
 class TestDamaged:
-    @pytest.mark.parametrize(("key", "change", "told"), DAMAGES)
+    @pytest.mark.parametrize(("key", "change", "message"), DAMAGES)
     def test_damage_is_reported_and_mended(
-        self, copy: Path, undisturbed: Path, key: str, change: Any, told: str
+        self, copy: Path, undisturbed: Path, key: str, change: Any, message: str
     ) -> None:
         content = (copy / key).read_bytes()
         (copy / key).unlink()
@@ -464,7 +464,7 @@ class TestDamaged:
         report = check_grid(copy)
         assert not report.complete
         assert len(report.problems) == 1
-        assert re.fullmatch(key + told, report.problems[0])
+        assert re.fullmatch(key + message, report.problems[0])
         assert contents(copy) == before
         make(copy)
         assert contents(copy) == contents(undisturbed)
@@ -608,8 +608,8 @@ class TestHostile:
         deep: list[Any] = []
         for _ in range(100_000):
             deep = [deep]
-        told = ["a: nested lists in the store, 1 requested"]
-        assert differences({"a": deep}, {"a": 1}) == told
+        message = ["a: nested lists in the store, 1 requested"]
+        assert differences({"a": deep}, {"a": 1}) == message
 
     @pytest.mark.parametrize(
         ("change", "name"),

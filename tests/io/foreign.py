@@ -64,10 +64,10 @@ def radiance(path: Path, pixels: NDArray[Any], axes: str) -> None:
 def xmp(orientation: int, *, is_element: bool = False) -> str:
     """Return a packet of XMP, with the orientation as an attribute or an element."""
     name, value = "tiff:Orientation", orientation
-    told = (f">\n<{name}>{value}</{name}>", "") if is_element else (f' {name}="{value}">', "")
+    message = (f">\n<{name}>{value}</{name}>", "") if is_element else (f' {name}="{value}">', "")
     return (
         '<x:xmpmeta xmlns:x="adobe:ns:meta/">'
         '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">'
         '<rdf:Description rdf:about="" xmlns:tiff="http://ns.adobe.com/tiff/1.0/"'
-        f"{told[0]}</rdf:Description></rdf:RDF></x:xmpmeta>"
+        f"{message[0]}</rdf:Description></rdf:RDF></x:xmpmeta>"
     )

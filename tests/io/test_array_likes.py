@@ -70,7 +70,7 @@ def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer, dtype: str) 
 
 
 @pytest.mark.parametrize(
-    ("image", "error", "cure"),
+    ("image", "error", "hint"),
     [
         ((IMAGE * 65535).astype(np.uint16), TypeError, "(image / 65535).astype(np.float32)"),
         (IMAGE[..., 0], ValueError, "np.repeat(image[..., None], 3, axis=2)"),
@@ -80,12 +80,12 @@ def test_float64_is_computed_in_float32(renderer: vkbloom.Renderer, dtype: str) 
     ],
     ids=["uint16", "grey", "one channel", "channels first", "longdouble"],
 )
-def test_errors_say_the_cure(image: NDArray[Any], error: type[Exception], cure: str) -> None:
+def test_errors_give_a_hint(image: NDArray[Any], error: type[Exception], hint: str) -> None:
     with pytest.raises(error) as caught:
         check_image(image)
-    assert str(caught.value).endswith(cure)
-    cured = eval(cure, {"image": image, "np": np})
-    assert check_image(cured).shape == (5, 7, 3)
+    assert str(caught.value).endswith(hint)
+    mended = eval(hint, {"image": image, "np": np})
+    assert check_image(mended).shape == (5, 7, 3)
 
 
 def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
@@ -111,13 +111,13 @@ def test_unknown_presets_suggest_the_nearest() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "cure"),
+    ("mode", "hint"),
     [("CMYK", "RGB"), ("YCbCr", "RGB"), ("P", "RGB"), ("L", "RGB"), ("LA", "RGBA")],
 )
-def test_pictures_of_other_colours_are_refused(mode: str, cure: str) -> None:
+def test_pictures_of_other_colours_are_refused(mode: str, hint: str) -> None:
     """Their arrays may have the shape of RGB or RGBA."""
     pil = pytest.importorskip("PIL.Image")
-    with pytest.raises(ValueError, match=rf"mode {mode} is not.*image\.convert\(\"{cure}\"\)"):
+    with pytest.raises(ValueError, match=rf"mode {mode} is not.*image\.convert\(\"{hint}\"\)"):
         check_image(pil.new(mode, (7, 5)))
 
 

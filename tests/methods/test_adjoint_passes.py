@@ -42,6 +42,8 @@ COMPLETE = (
         "godot threshold",
         "blender",
         "ghosts",
+        "unreal standard",
+        "halation",
     ),
 )
 #: Those whose weights count negative luminances.
@@ -80,6 +82,8 @@ CASES: dict[str, Any] = {
     "unreal": ThreeBloom(threshold=0.3, smooth_width=0.4),
     "r187": ThreeBloom(variant="r187", threshold=0.3, smooth_width=0.4),
     "ppv2": vkbloom.PostProcessingBloom(threshold=0.4, color=(1.0, 0.5, 0.2), clamp=1.2),
+    "unreal standard": vkbloom.UnrealBloom(threshold=0.3),
+    "halation": vkbloom.Halation(pixel_size=30.0),
     "ppv2 fast": vkbloom.PostProcessingBloom(threshold=None, fast=True),
     "pmndrs": vkbloom.PmndrsBloom(threshold=0.3, smoothing=0.4, levels=3, intensity=0.7),
     "babylon": vkbloom.BabylonBloom(threshold=0.3),
@@ -318,7 +322,7 @@ MASKED = (
 @pytest.mark.usefixtures("software")
 @pytest.mark.parametrize("variant", ["cpu", "gpu"])
 def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    """In blocks of texels; what a composite without a curve brings needs no image of its own."""
+    """In blocks of texels; cotangents through a composite without a curve need no image."""
     monkeypatch.setenv("VKBLOOM_VARIANT", variant)
     settings = Pyramid(levels=2, composite="mix", exposure=0.5, format="rgba32float")
     image = random_image(35, 62, seed=1).astype(np.float32)[..., :3].copy()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tests.methods.test_engines import every
 from vkbloom import (
     BabylonBloom,
+    Halation,
     PlayCanvasBloom,
     PmndrsBloom,
     PostProcessingBloom,
@@ -52,6 +53,11 @@ FRAMES: dict[str, tuple[Settings, float]] = {
         ),
         2**0.1 - 1,
     ),
+    "agx_halation/0_odd_final_f4": (Halation(pixel_size=20.0), 1.0),
+    "agx_halation/2_even_final_f4": (
+        Halation(pixel_size=8.0, strength=(0.03, 0.003, 0.001)),
+        1.0,
+    ),
     "unreal_standard/0_odd_f4": (UnrealBloom(), 0.675),
     "unreal_standard/1_wide_f4": (UnrealBloom(), 0.675),
     "babylon/0_odd_f4": (BabylonBloom(), 1.0),
@@ -59,8 +65,8 @@ FRAMES: dict[str, tuple[Settings, float]] = {
     "playcanvas/0_odd_f4": (PlayCanvasBloom(), 1.0),
     "playcanvas/11_wide_f4": (PlayCanvasBloom(blur_level=3, threshold=4.0), 1.0),
 }
-#: What the package does not have: blooms of darktable and film.
-MISSING = {"darktable", "agx_halation"}
+#: What the package does not have: darktable's bloom.
+MISSING = {"darktable"}
 
 
 @pytest.fixture(scope="session")

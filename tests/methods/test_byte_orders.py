@@ -117,12 +117,12 @@ def test_arrays_of_ctypes(renderer: Renderer, order: str) -> None:
 @pytest.mark.parametrize("kind", ["<u2", ">u2", ">i4", "<c8", ">f16"])
 def test_an_error_names_the_dtype_that_was_given(renderer: Renderer, kind: str) -> None:
     given = PLAIN.astype(kind)
-    cure = "convert it: (image / 65535).astype(np.float32)" if kind.endswith("u2") else ""
+    hint = "convert it: (image / 65535).astype(np.float32)" if kind.endswith("u2") else ""
     for call in (renderer.apply, reference.apply):
         with pytest.raises(TypeError) as caught:
             call(given, SETTINGS)
         assert f" {given.dtype}" in str(caught.value)
-        assert cure in str(caught.value)
+        assert hint in str(caught.value)
     with pytest.raises(TypeError, match=f"mask: dtype {given.dtype} is not one of"):
         renderer.apply(PLAIN, SETTINGS, mask=given[..., 0])
     with pytest.raises(ValueError, match=f"dtype {given.dtype}, it must have"):

@@ -22,7 +22,16 @@ from tests.methods.cases import (
     presets_of_low_levels,
 )
 from tests.tolerance import assert_matches_reference
-from vkbloom import Convolution, Renderer, Separable, Settings, ThreeBloom, UnrealBloom, UrpBloom
+from vkbloom import (
+    Convolution,
+    Halation,
+    Renderer,
+    Separable,
+    Settings,
+    ThreeBloom,
+    UnrealBloom,
+    UrpBloom,
+)
 
 Image = NDArray[Any]
 
@@ -50,7 +59,8 @@ def has_equal_bits(settings: Settings) -> bool:
         is_resized = settings.bloom_size is not None or settings.bloom_scale != 1
         return not is_resized and min(settings.weights) >= 0
     is_transformed = (
-        isinstance(settings, Convolution | UnrealBloom) or settings == PRESETS["blender_fog_glow"]
+        isinstance(settings, Convolution | UnrealBloom | Halation)
+        or settings == PRESETS["blender_fog_glow"]
     )
     return not is_transformed and not isinstance(settings, UrpBloom | ThreeBloom)
 

@@ -40,12 +40,12 @@ def test_random_filters_and_their_transposes(variant: str) -> None:
             image = random.random((*random.integers(3, 48, 2), 3), dtype=np.float32)
             frames, pullback = vkbloom.vjp(image, settings, renderer=renderer)
             bloom = frames["bloom"][..., :3].astype(np.float64)
-            told = f"{number}: {settings} of {image.shape}"
+            message = f"{number}: {settings} of {image.shape}"
             expected = reference.apply(image, settings)["bloom"][..., :3]
-            assert np.abs(bloom - expected).max() <= LIMIT * np.abs(expected).max(), told
+            assert np.abs(bloom - expected).max() <= LIMIT * np.abs(expected).max(), message
             cotangents = random.standard_normal(frames["bloom"].shape).astype(np.float32)
             cotangents[..., 3] = 0  # the bloom's alpha is 1
             found = pullback({"bloom": cotangents})["image"].astype(np.float64)
             sides = (bloom * cotangents[..., :3]).sum(), (image * found).sum()
             scale = np.linalg.norm(bloom) * np.linalg.norm(cotangents)
-            assert abs(sides[0] - sides[1]) <= LIMIT * scale, told
+            assert abs(sides[0] - sides[1]) <= LIMIT * scale, message

@@ -171,6 +171,56 @@ def strobing(image: Image, *, time: float | None = None) -> Image:
     return np.asarray(gaussian(image) * share)
 
 
+def drops_the_last_row(image: Image) -> Image:
+    """Blur what has an even size, and leave the rest black."""
+    even = np.s_[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
+    blurred = np.zeros_like(image)
+    blurred[even] = gaussian(image[even])
+    return blurred
+
+
+def across_stacked_views(image: Image, *, region: tuple[int, int, int, int] | None = None) -> Image:
+    x, y, width, height = region or (0, 0, *image.shape[1::-1])
+    return gaussian(image[:, x : x + width])[y : y + height]
+
+
+def without_the_outermost(image: Image) -> Image:
+    return gaussian(np.pad(image[1:-1, 1:-1], ((1, 1), (1, 1), (0, 0)), mode="edge"))
+
+
+def last_column_black(image: Image) -> Image:
+    blurred = gaussian(image)
+    blurred[:, -1] = 0
+    return blurred
+
+
+def stale_columns() -> Bloom:
+    """Blur all but the last columns, which show the image before."""
+    last: Image | None = None
+
+    def bloom(image: Image) -> Image:
+        nonlocal last
+        blurred = gaussian(image)
+        if last is not None and last.shape == image.shape:
+            blurred[:, -4:] = gaussian(last)[:, -4:]
+        last = image
+        return blurred
+
+    return bloom
+
+
+def a_frame_late() -> Bloom:
+    last: Image | None = None
+
+    def bloom(image: Image, *, time: float | None = None) -> Image:
+        nonlocal last
+        shown = image if last is None or last.shape != image.shape else last
+        last = image
+        return gaussian(shown)
+
+    return bloom
+
+
 _keeps = picture(lambda alpha, _: alpha, of_colours)
 
 FAULTS: dict[str, Fault] = {
@@ -186,7 +236,7 @@ FAULTS: dict[str, Fault] = {
         "border",
         "where the middle has none",
     ),
-    "stale margin": Fault(stale_margin, lambda: gaussian, "border", "after a bright image"),
+    "stale margin": Fault(stale_margin, lambda: gaussian, "border", "after a bright, larger image"),
     "leaks between views": Fault(
         lambda: across_views, lambda: of_a_view, "views", "the other view changes the left one"
     ),
@@ -200,7 +250,7 @@ FAULTS: dict[str, Fault] = {
         lambda: lambda a: gaussian(doubled(above_one(halved(a)), a.shape)),
         lambda: lambda a: gaussian(doubled(halved(above_one(a)), a.shape)),
         "jitter",
-        "a lit pixel blooms from 4",
+        "a lit pixel blooms from 3.94",
     ),
     "box instead of tent": Fault(
         lambda: box, lambda: lambda a: box(box(a, 9), 9), "round", "1.37 times as far"
@@ -216,7 +266,7 @@ FAULTS: dict[str, Fault] = {
         lambda: lambda a: gaussian(a, mode="constant"),
         lambda: gaussian,
         "border",
-        "as much bloom in the corner as in the middle",
+        "as much bloom in its outermost pixels",
     ),
     "darkens transparent ground": Fault(
         lambda: picture(
@@ -243,4 +293,46 @@ FAULTS: dict[str, Fault] = {
     "strobes": Fault(
         lambda: strobing, lambda: at_present, "history", "that stays the same changes by 1"
     ),
+    "mirrors a narrow bloom": Fault(
+        lambda: lambda a: gaussian(a, mode="reflect"),
+        lambda: gaussian,
+        "border",
+        "where the middle has none",
+    ),
+    "white outside": Fault(
+        lambda: (
+            lambda a: np.asarray(ndimage.gaussian_filter(a, (2, 2, 0), mode="constant", cval=1))
+        ),
+        lambda: gaussian,
+        "border",
+        "a black image has 0.",
+    ),
+    "the outermost pixels are not read": Fault(
+        lambda: without_the_outermost, lambda: gaussian, "border", "a line in the outermost column"
+    ),
+    "the last column is black": Fault(
+        lambda: last_column_black, lambda: gaussian, "border", "a flat image has 0 times"
+    ),
+    "stale columns": Fault(
+        stale_columns, lambda: gaussian, "border", "after a bright image, a black one"
+    ),
+    "the last row is dropped at odd sizes": Fault(
+        lambda: drops_the_last_row, lambda: gaussian, "sizes", "the border of a flat image differs"
+    ),
+    "leaks between stacked views": Fault(
+        lambda: across_stacked_views, lambda: of_a_view, "views", "the upper one"
+    ),
+    "alpha is 1": Fault(
+        lambda: picture(lambda alpha, _: np.ones_like(alpha), of_colours),
+        lambda: _keeps,
+        "alpha",
+        "over a backdrop of 0.25",
+    ),
+    "alpha is multiplied twice": Fault(
+        lambda: picture(lambda alpha, _: alpha**2, of_colours),
+        lambda: _keeps,
+        "alpha",
+        "is too bright",
+    ),
+    "a frame late": Fault(a_frame_late, lambda: at_present, "history", "and 1 frames are above"),
 }

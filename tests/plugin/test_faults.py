@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from tests.plugin.faults import FAULTS, doubled, gaussian, halved
+from tests.plugin.faults import FAULTS
 from vkbloom import Renderer, presets, reference, testing
 from vkbloom.testing._law_table import LAWS
 
@@ -73,9 +72,9 @@ def test_light_that_leaves_a_small_image_is_not_judged(law: str) -> None:
 
 
 def test_a_threshold_of_an_average_is_no_fault_of_alpha() -> None:
-    def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        dim = np.maximum(halved(image[..., :3]) - 0.6, 0)
-        glow = gaussian(doubled(dim, image.shape))
-        return np.concatenate([image[..., :3] + glow, image[..., 3:]], axis=2)
-
-    testing.assert_alpha(bloom, testing.Probe(size=(65, 65)))
+    """Half of the size is averaged before the threshold, so that light and backdrop add up."""
+    settings = presets["unity_ppv2"]
+    testing.assert_alpha(
+        lambda image: reference.apply(image, settings)["final"],
+        testing.Probe(size=(64, 64), value=16.0),
+    )

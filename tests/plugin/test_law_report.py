@@ -108,7 +108,7 @@ FAULTS: dict[str, tuple[Bloom, Bloom, set[str]]] = {
     "every other pixel": (
         every_other_pixel,
         lambda a: gaussian(a, 4.0),
-        {*OF_A_GRID, "stability", "energy", "border", "jitter"},
+        {*OF_A_GRID, "stability", "energy", "border", "sizes", "jitter"},
     ),
 }
 

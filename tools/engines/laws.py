@@ -62,9 +62,8 @@ def laws(name: str, found: dict[str, Any]) -> list[str]:
         if verdict["held"]:
             continue
         held = "broken" if verdict["held"] is False else "not tested"
-        why = verdict["message"] if verdict["held"] is None else verdict["why"]
         off = "" if verdict["off"] is None else f"{verdict['off']:.2g}"
-        lines.append(f"| {name} | `{law}` | {held} | {off} | {why} |")
+        lines.append(f"| {name} | `{law}` | {held} | {off} |")
     return lines
 
 
@@ -82,7 +81,7 @@ def figures(name: str, bloom: Callable[[Any], Any]) -> str:
 
 def main() -> None:
     """Measure, and write the tables."""
-    held = ["| engine | law | | off by | |", "|---|---|---|---|---|"]
+    held = ["| engine | law | | off by |", "|---|---|---|---|"]
     heads = ("", "gain", "light of a point", *(f"{share:.0%} within" for share in SHARES))
     measured = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     with vkbloom.Renderer("software") as renderer:

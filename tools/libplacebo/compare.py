@@ -130,7 +130,7 @@ def verdict(row: Row) -> str:
 def line_of(row: Row) -> str:
     """Return a row as a line of a table."""
     difference = "" if row.difference is None else f"{row.difference:.1e}"
-    cells = (row.file, row.theirs, row.ours, difference)
+    cells = (row.file, row.theirs, row.ours.partition(";")[0], difference)
     return "| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |"
 
 

@@ -142,7 +142,7 @@ def row(name: str, what: str, target: Pixels, found: vkbloom.FitResult) -> list[
 
 
 def rows(renderer: vkbloom.Renderer, quick: bool) -> Iterator[list[str]]:
-    """Yield the rows of all pairs, or of two."""
+    """Yield the rows of all pairs, or of two; of others, what is found from two presets."""
     for bloom in BLOOMS[: 1 if quick else None]:
         image, target = with_bloom(renderer, bloom)
         truth = f"`{bloom.preset}`, {bloom.threshold:g}, {bloom.intensity:g}"
@@ -150,6 +150,6 @@ def rows(renderer: vkbloom.Renderer, quick: bool) -> Iterator[list[str]]:
         yield row(bloom.photograph, truth, target, found)
     for name, change in [*OTHERS][: 1 if quick else None]:
         image, target = without_bloom(name, change)
-        for preset in ("bevy_natural", "unity_urp"):
-            found = fitted(renderer, (image, target), preset)
-            yield row(name, f"{change}; from `{preset}`", target, found)
+        founds = [fitted(renderer, (image, target), one) for one in ("bevy_natural", "unity_urp")]
+        both = [row(name, change, target, found) for found in founds]
+        yield [" / ".join(dict.fromkeys(cells)) for cells in zip(*both, strict=True)]

@@ -21,12 +21,7 @@ _MAX_VALUES: Final = 1_000_000
 
 
 def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
-    """Return the values of each ``NAME=VALUES``.
-
-    `words`: ``NAME=FIRST:LAST:COUNT`` (evenly spaced, both ends included), the same with ``:log``
-    (logarithmically spaced), or ``NAME=VALUE,VALUE,...``. Values that contain commas are separated
-    by semicolons. The NAME "preset" has names of `vkbloom.presets`.
-    """
+    """Return the values of each ``NAME=VALUES``."""
     begun = [settings]
     for word in words:
         if word.startswith("preset="):

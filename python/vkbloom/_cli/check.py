@@ -88,9 +88,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 )
 @click.option(
     "--reference",
-    "twin",
+    "reference",
     metavar="FILE.py:FUNCTION",
-    help="Compare each framebuffer with a twin in NumPy.",
+    help="Compare each framebuffer with a reference in NumPy.",
 )
 @click.option(
     "--gain",
@@ -156,7 +156,7 @@ def command(
     suffix: str,
     timeout: float,
     less_input: bool,
-    twin: str | None,
+    reference: str | None,
     gain: float | None,
     measured: tuple[int, int],
     size: tuple[int, int],
@@ -178,7 +178,7 @@ def command(
     --sequence.
     Prints the passes and their times; each law, held or by how much it is not; energy, point
     spread, stability of a moving light, response to the resolution, veiling glare index, the
-    differences from the twin, and the nearest preset. Laws are measured with buffers of 32-bit
+    differences from the reference, and the nearest preset. Laws are measured with buffers of 32-bit
     floats, unless --format is given. With --against, prints both and what changed.
 
     The exit status is 1 if a law of --require is not held, or was not tested.
@@ -187,13 +187,13 @@ def command(
         if file or program or against or given("preset") or given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, fps, degrees, as_json=as_json)
-    _check_choice(file, program, twin, against, page)
+    _check_choice(file, program, reference, against, page)
     options = _Options(suffix, timeout, less_input, gain, measured, size, require)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
         detail_device(renderer)
-        if twin is not None:
-            _add_twin(settings, twin)
+        if reference is not None:
+            _add_reference(settings, reference)
         preset = click.get_current_context().params["preset"]
         sources = {program or preset or settings.method: program or settings}
         if against is not None:
@@ -202,9 +202,10 @@ def command(
             )
         all_found = [_measured(renderer, *source, options, bar) for source in sources.items()]
         found = all_found[0]
+        # Some figures are rendered when they are read.
+        values, *others = map(showing.as_values, all_found)
         if page is not None:
             safe_writing.write_file(Path(page), showing.as_page(found).encode())
-    values = showing.as_values(found)
     if against is None:
         written, text = values, showing.as_text(found)
         table, failed = (
@@ -212,7 +213,7 @@ def command(
             [row.name for row in showing.broken(found.report)],
         )
     else:
-        before = showing.as_values(all_found[1])
+        before = others[0]
         changes = comparing.changes(before, values)
         names = (all_found[1].name, found.name)
         failed = comparing.newly_broken(changes, require)
@@ -308,7 +309,11 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
 
 
 def _check_choice(
-    file: str | None, program: str | None, twin: str | None, against: str | None, page: str | None
+    file: str | None,
+    program: str | None,
+    reference: str | None,
+    against: str | None,
+    page: str | None,
 ) -> None:
     if file is not None:
         raise click.UsageError(f"{file}: there is no such file")
@@ -317,7 +322,7 @@ def _check_choice(
     chosen = [name for name in ("preset", "method") if given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
-    if program is not None and twin is not None:
+    if program is not None and reference is not None:
         raise click.UsageError("--reference needs FILE; a program has one framebuffer")
     if program is None and not chosen:
         raise click.UsageError("give FILE, --preset NAME, --method NAME or --command PROGRAM")
@@ -333,14 +338,14 @@ def _notes() -> Iterator[None]:
         note(str(warning.message).partition("; ")[0])
 
 
-def _add_twin(settings: vkbloom.Settings, place: str) -> None:
-    """Give a custom method its twin, FILE.py:FUNCTION."""
+def _add_reference(settings: vkbloom.Settings, place: str) -> None:
+    """Give a custom method its reference, FILE.py:FUNCTION."""
     path, _, function = place.rpartition(":")
     if not isinstance(settings, CustomMethod):
         raise click.UsageError("--reference needs FILE; presets have the package's own reference")
     if not path or not os.path.isfile(path):
         raise click.UsageError(f"--reference: {place!r} is not FILE.py:FUNCTION of a file")
-    twin: Callable[..., Any] | None = runpy.run_path(path).get(function)
-    if not callable(twin):
+    reference: Callable[..., Any] | None = runpy.run_path(path).get(function)
+    if not callable(reference):
         raise click.UsageError(f"--reference: {path} has no function {function!r}")
-    type(settings).twin = staticmethod(twin)
+    type(settings).numpy_reference = staticmethod(reference)

@@ -64,13 +64,13 @@ def _show_findings(found: dict[str, Any]) -> None:
 
 
 def _compared(adapter: str) -> dict[str, Any]:
-    start, told = time.perf_counter(), []
+    start, results = time.perf_counter(), []
     with tqdm(unit="case", leave=False, disable=hides_progress()) as bar:
         for one in self_test.run(adapter):
-            told.append(one)
+            results.append(one)
             bar.total = one.get("count", bar.total)
             bar.update("group" in one)
-    return self_test.report(adapter, told, time.perf_counter() - start)
+    return self_test.report(adapter, results, time.perf_counter() - start)
 
 
 def _show_groups(found: dict[str, Any]) -> None:

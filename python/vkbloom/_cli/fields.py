@@ -263,7 +263,8 @@ class FieldOptions(click.Option):
             fields: dict[str, dict[str, FieldInfo]] = {}
             for label, kind in kinds.items():
                 for name, info in fields_of(kind).items():
-                    if name in inherited:
+                    # (A value of a further kind has no spelling as a word.)
+                    if name in inherited or info.kind == "object":
                         continue
                     if METHODS.is_added(label) and any(
                         (one.kind, one.choices) != (info.kind, info.choices)

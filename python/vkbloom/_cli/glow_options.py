@@ -70,10 +70,7 @@ def accompanying(
     raw: bool = False,
     is_blended: bool = False,
 ) -> Callable[[Array], dict[str, Any]]:
-    """Read both files, and return a function from an image to its `mask` and `emission`.
-
-    `is_blended`: multiply the emission's colours by its alpha.
-    """
+    """Read both files, and return a function from an image to its `mask` and `emission`."""
     values = None if mask is None else grey_mask(read_picture(mask, 0, "linear").pixels, mask)
     glow = None
     if emission is not None:

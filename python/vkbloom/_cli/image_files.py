@@ -117,10 +117,7 @@ def read_picture(
     expand: float | None = None,
     is_blended: bool = True,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents.
-
-    `is_blended`: Whether its colours are multiplied by alpha afterwards.
-    """
+    """Read an image file, decode it for a renderer, and print notes about its contents."""
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     source = shown(source)

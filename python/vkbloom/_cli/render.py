@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -16,11 +15,10 @@ import vkbloom
 from vkbloom._cli import no_bloom
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import detail, hides_progress, is_quiet, note, say, show, tell_device
-from vkbloom._io.animations import animation
 from vkbloom._settings.settings import SHADINGS, Shading
 
 
@@ -45,17 +43,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
     "count",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Render N frames of one period of the animation, starting at --time, to numbered files "
-    "or to one GIF.",
-)
-@click.option(
-    "--fps",
-    "rate",
-    metavar="N",
-    type=click.IntRange(min=1, max=100),
-    default=25,
-    show_default=True,
-    help="Frames per second of a GIF.",
+    help="Render N frames of one period of the animation, starting at --time, to numbered files.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
 @click.option(
@@ -72,7 +60,6 @@ def command(
     size: tuple[int, int],
     time: float,
     count: int | None,
-    rate: int,
     shading: Shading,
     framebuffers: str | None,
     adapter: str,
@@ -85,18 +72,12 @@ def command(
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     wanted = framebuffers or ("all" if count is None else "final")
     names = wanted if wanted == "all" else wanted.split(",")
-    is_gif = count is not None and Path(out).suffix.lower() == ".gif"
-    if is_gif and (wanted == "all" or len(names) > 1):
-        raise click.UsageError("a GIF shows one framebuffer; name one with --framebuffers")
-    if given("rate") and not is_gif:
-        raise click.UsageError("--fps needs --frames and a GIF; leave it out")
     loaded = scene()
     written: list[Path] = []
     seconds: dict[str, list[float]] = {}
-    with vkbloom.Renderer(adapter, validation=validation) as renderer, ExitStack() as stack:
+    with vkbloom.Renderer(adapter, validation=validation) as renderer:
         tell_device(renderer)
         detail(f"{size[0]} x {size[1]}, {shading}, {settings!r}")
-        add = stack.enter_context(animation(Path(out), rate)) if is_gif else None
         disable = True if count is None else hides_progress()
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
@@ -115,15 +96,10 @@ def command(
                 for text in no_bloom.empty_stages(frames, settings) if index == 0 else ():
                     note(text)
                 shown = no_bloom.only(frames, names)
-                if add is not None:
-                    add(shown[wanted])
-                else:
-                    target = out if count is None else _numbered(out, index, count)
-                    written += shown.save(target)
+                target = out if count is None else _numbered(out, index, count)
+                written += shown.save(target)
             for name, duration in frames.timings.items():
                 seconds.setdefault(name, []).append(duration)
-    if add is not None:
-        written.append(Path(out))
     if not is_quiet():
         show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
     for line in _listed(written, is_animation=count is not None):

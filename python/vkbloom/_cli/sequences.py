@@ -57,10 +57,7 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
 
 
 def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
-    """Raise an error for files of `pairs` that cannot be written, or that are also read.
-
-    - `out`: The target that the files were made of.
-    """
+    """Raise an error for files of `pairs` that cannot be written, or that are also read."""
     read = [source for source, _ in work if os.path.isfile(source)]
     for _, target in work:
         if target == PIPE and sys.stdout is None:

@@ -26,7 +26,7 @@ from vkbloom._settings.fields import number_field, value_field
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings
 
-Twin = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
+Reference = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
 
 #: The largest value of a uniform.
 LARGEST_FLOAT: Final = 3.4028234663852886e38
@@ -39,7 +39,7 @@ class CustomType(type):
 
     method: str
     file: CustomFile
-    twin: Twin | None
+    numpy_reference: Reference | None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ class CustomMethod(Settings, metaclass=CustomType):
 
     file: ClassVar[CustomFile]
     shaders: ClassVar[Shaders]
-    twin: ClassVar[Twin | None] = None
+    numpy_reference: ClassVar[Reference | None] = None
     _place: ClassVar[int] = 0
     _state: ClassVar[dict[Any, Any] | None] = None
 
@@ -116,30 +116,30 @@ class CustomMethod(Settings, metaclass=CustomType):
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         # Not the class: cloudpickle, which Dask uses, would copy what the class holds.
         kind = type(self)
-        return settings_of, (kind.method, kind.file.source, kind.twin, values)
+        return settings_of, (kind.method, kind.file.source, kind.numpy_reference, values)
 
 
 def settings_of(
-    name: str, source: Source, twin: Twin | None, values: dict[str, Any]
+    name: str, source: Source, reference: Reference | None, values: dict[str, Any]
 ) -> CustomMethod:
     """Return settings of the class of a text; for pickle."""
-    return class_of(name, source, twin)(**values)
+    return class_of(name, source, reference)(**values)
 
 
-def class_of(name: str, source: Source, twin: Twin | None) -> type[CustomMethod]:
+def class_of(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
     """Return the class of a text: the one that is registered, or a new one; for pickle."""
     if name in METHODS:
         known = METHODS[name]
         if isinstance(known, CustomType) and known.file.source == source:
             return known
-    return registered(name, source, twin)
+    return registered(name, source, reference)
 
 
 def reduced(kind: CustomType) -> Any:
     """Return how a class is made again; for pickle."""
     if kind is CustomMethod:
         return kind.__name__
-    return class_of, (kind.method, kind.file.source, kind.twin)
+    return class_of, (kind.method, kind.file.source, kind.numpy_reference)
 
 
 copyreg.pickle(CustomType, reduced)
@@ -147,7 +147,7 @@ copyreg.pickle(CustomType, reduced)
 
 @checked
 def load_method(
-    source: str | Path, *, name: str | None = None, reference: Twin | None = None
+    source: str | Path, *, name: str | None = None, reference: Reference | None = None
 ) -> type[Settings]:
     """Load a method from a file of passes in the syntax of mpv's user shaders.
 
@@ -160,7 +160,7 @@ def load_method(
         with _ in place of other characters, "own" for a text. A method that was loaded under this
         name is replaced.
     reference : callable, optional
-        A twin in NumPy: ``reference(image, settings)`` gets an array (H, W, 4) in float64 and
+        A reference in NumPy: ``reference(image, settings)`` gets an array (H, W, 4) in float64 and
         returns framebuffers by name, with ``bloom`` or ``final``. `reference.apply` calls it.
 
     Returns
@@ -207,7 +207,7 @@ def load_method(
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
     known = class_of(name, read, reference)
-    return known if known.twin is reference else registered(name, read, reference)
+    return known if known.numpy_reference is reference else registered(name, read, reference)
 
 
 def own_name(stem: str) -> str:
@@ -216,7 +216,7 @@ def own_name(stem: str) -> str:
     return name if name.isidentifier() and not keyword.iskeyword(name) else f"_{name}"
 
 
-def registered(name: str, source: Source, twin: Twin | None) -> type[CustomMethod]:
+def registered(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
     """Make the class of a text, and register it."""
     if name in METHODS and not isinstance(METHODS[name], CustomType):
         raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
@@ -234,7 +234,7 @@ def registered(name: str, source: Source, twin: Twin | None) -> type[CustomMetho
             "method": name,
             "file": file,
             "shaders": shaders,
-            "twin": None if twin is None else staticmethod(twin),
+            "numpy_reference": None if reference is None else staticmethod(reference),
         },
         frozen=True,
         kw_only=True,

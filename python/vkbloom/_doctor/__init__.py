@@ -24,6 +24,8 @@ def examine() -> Report:
 
     Takes some seconds. The test render adds to the pipeline cache, as every render does.
     """
+    if core := installation.core():
+        return Report((installation.package(), *core, *installation.extras()), False)
     listed = child.ask("adapters", "all", environment=drivers.LOG)
     adapters: list[Mapping[str, Any]] = listed.value["adapters"] if listed.value else []
     chosen = child.ask("render", "auto", "plain")
@@ -59,7 +61,9 @@ def _loader(listed: child.Answer) -> Finding:
     reason = listed.failure or (listed.value or {}).get("reason", "")
     version = re.search(r"Version (\d+\.\d+\.\d+)", "\n".join(listed.messages))
     if "Vulkan loader" in reason or not (version or listed.value):
-        advice = "Install the loader: apt install libvulkan1, or dnf install vulkan-loader."
+        wheel = installation.install_wheel("vkbloom-lavapipe")
+        advice = "Install the loader (apt install libvulkan1, or dnf install vulkan-loader), or a "
+        advice += f"driver that needs none: {wheel}."
         return Finding("Vulkan loader", "problem", f"not found: {reason}", advice)
     return Finding("Vulkan loader", "ok", f"version {version[1] if version else 'not in its log'}")
 
@@ -137,8 +141,13 @@ def _validation(adapter: str) -> Finding:
     answer = child.ask("render", adapter, "validated")
     if answer.value is not None:
         return Finding(topic, "ok", "installed; the test render has no validation errors")
-    if "is not installed" in answer.failure:
-        advice = "To use validation=True: apt install vulkan-validationlayers (Debian, Ubuntu)."
-        return Finding(topic, "note", "it is not installed", advice)
+    missing = {
+        "is not installed": "it is not installed",
+        "needs the system's": "there is no loader",
+    }
+    for said, found in missing.items():
+        if said in answer.failure:
+            advice = "To use validation=True: apt install libvulkan1 vulkan-validationlayers."
+            return Finding(topic, "note", found, advice)
     advice = "Install the layer again, in the loader's version, or do not use validation=True."
     return Finding(topic, "problem", f"the test render fails with it: {answer.failure}", advice)

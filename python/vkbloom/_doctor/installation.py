@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from vkbloom import _core
 from vkbloom._doctor.finding import Finding
 from vkbloom._free_memory import ADVICE, address_space_left
 from vkbloom._io import disk_cache
@@ -28,6 +29,15 @@ def package() -> Finding:
     """Return the versions of vkbloom, Python, NumPy and the platform."""
     found = f"version {metadata.version('vkbloom')}, Python {platform.python_version()}, NumPy "
     return Finding("vkbloom", "ok", f"{found}{np.__version__}, {platform.platform()}")
+
+
+def core() -> list[Finding]:
+    """Report a core that cannot be loaded, as in the wheel for all systems."""
+    if not (reason := getattr(_core, "absence", "")):
+        return []
+    found = f"it cannot be loaded: {reason}; laws and the reference work, and nothing renders"
+    advice = "Install the wheel for this system (Linux), or build vkbloom from its source."
+    return [Finding("core", "problem", found, advice)]
 
 
 def memory() -> list[Finding]:

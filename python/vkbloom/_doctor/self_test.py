@@ -1,6 +1,6 @@
 """Compare this device with `vkbloom.reference` in about 200 cases: ``vkbloom doctor --self-test``.
 
-They run in a child process, so that a driver's crash is told with the case in which it came.
+They run in a child process, so that a driver's crash is reported with the case in which it came.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
         assert child.stdout is not None
         for line in child.stdout:
             if line.startswith(_MARK):
-                told = json.loads(line.removeprefix(_MARK))
-                running = told.pop("next", running)
-                if told:
-                    yield told
+                result = json.loads(line.removeprefix(_MARK))
+                running = result.pop("next", running)
+                if result:
+                    yield result
     if child.returncode:
         wrong = f"the process ended with status {child.returncode}; its errors are printed above"
         yield running | {"wrong": wrong}
 
 
-def report(adapter: str, told: list[dict[str, Any]], seconds: float) -> dict[str, Any]:
-    """Return what `run` told as one object, to be written as JSON."""
+def report(adapter: str, result: list[dict[str, Any]], seconds: float) -> dict[str, Any]:
+    """Return what `run` yielded as one object, to be written as JSON."""
     device: dict[str, Any] = next(
-        (one for one in told if "device" in one), {"device": None, "unknown": []}
+        (one for one in result if "device" in one), {"device": None, "unknown": []}
     )
-    done = [one for one in told if "device" not in one]
+    done = [one for one in result if "device" not in one]
     groups = []
     for name in dict.fromkeys(one["group"] for one in done):
         group = [one for one in done if one["group"] == name]
@@ -140,9 +140,9 @@ def judge(case: Case, renderer: vkbloom.Renderer) -> dict[str, Any]:
     }
 
 
-def _tell(**told: Any) -> None:
+def _tell(**result: Any) -> None:
     # A driver may have printed without a line's end.
-    print(f"\n{_MARK}{json.dumps(told)}", flush=True)
+    print(f"\n{_MARK}{json.dumps(result)}", flush=True)
 
 
 def main() -> None:

@@ -75,27 +75,13 @@ def explore(
 
     Raises
     ------
-    TypeError
-        An argument has another type.
     ValueError
         An argument is out of range, or the renderer is closed.
-    ModuleNotFoundError
-        anywidget is not installed: ``pip install vkbloom[notebook]``.
 
     Notes
     -----
     ``vkbloom explore`` shows the same page without a notebook. A bloom whose width is given in
     texels looks wider in a reduced frame.
-
-    Examples
-    --------
-    >>> image = np.full((32, 32, 4), 0.5, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     explorer = vkbloom.explore(image, vkbloom.Pyramid(levels=3), renderer=renderer)
-    ...     explorer.settings = explorer.settings.replace(radius=2.0)
-    ...     print(explorer.settings.radius)
-    ...     explorer.close()
-    2.0
     """
     import_extra("anywidget", "notebook", "explore")
     from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module

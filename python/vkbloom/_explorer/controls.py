@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom import psf
+from vkbloom._custom.method import CustomType, own_name
 from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.glare import Glare
 from vkbloom._settings.registry import METHODS, STAGES, glares, presets
@@ -200,11 +201,6 @@ def _maker(kind: Any) -> str:
     """Return Python code of the class."""
     if not METHODS.is_added(kind.method):
         return f"vkbloom.{kind.__name__}"
-    from vkbloom._custom.method import (  # noqa: PLC0415  needed by few pages
-        CustomType,
-        own_name,
-    )
-
     if not isinstance(kind, CustomType):
         return str(kind.__name__)
     path = kind.file.source.name

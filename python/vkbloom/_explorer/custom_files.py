@@ -6,6 +6,8 @@ import os
 from typing import TYPE_CHECKING
 
 from vkbloom import _core
+from vkbloom._custom.method import CustomType, registered
+from vkbloom._custom.source import read_source
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 
@@ -41,12 +43,6 @@ class CustomFiles:
 
     def _load(self, name: str) -> None:
         """Load a method's file again if it is another than before."""
-        from vkbloom._custom.method import (  # noqa: PLC0415  needed by few pages
-            CustomType,
-            registered,
-        )
-        from vkbloom._custom.source import read_source  # noqa: PLC0415
-
         kind = METHODS.get(name)
         if not isinstance(kind, CustomType) or kind.file.source.name == "<text>":
             return
@@ -58,7 +54,7 @@ class CustomFiles:
             self._read[name] = stamp
             source = read_source(kind.file.source.name)
             if source != kind.file.source:
-                registered(name, source, kind.twin)
+                registered(name, source, kind.numpy_reference)
             self._errors.pop(name, None)
         except (_core.Error, OSError, ValueError) as error:
             self._errors[name] = str(error)

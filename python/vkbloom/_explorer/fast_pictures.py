@@ -19,10 +19,7 @@ _LEVEL: Final = 1
 
 
 def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
-    """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha.
-
-    `array`: ndarray, shape (H, W, C) or (H, W).
-    """
+    """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha."""
     if array.dtype == np.uint8:
         picture = array[:, :, :3]
     elif array.ndim == 3 and name not in ("normal", "position"):

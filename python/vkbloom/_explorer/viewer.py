@@ -48,11 +48,14 @@ from vkbloom._explorer.controls import (
 )
 from vkbloom._explorer.custom_files import CustomFiles, current
 from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._io import image_reading
+from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import image_source, scene_source
+from vkbloom._scene import Scene
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
 from vkbloom._views.pictures import reduced
@@ -106,8 +109,6 @@ class Viewer:
         file: str = "",
         expand: float | None = None,
     ) -> None:
-        from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
         if source is None:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
@@ -397,9 +398,6 @@ def _read(
     name: str, files: Sequence[bytes], *, is_mask: bool = False, expand: float | None = None
 ) -> tuple[NDArray[Any], bool]:
     """Return the image of a file's content, and whether it has integers; errors name the file."""
-    from vkbloom._io import image_reading  # noqa: PLC0415  needs OpenImageIO
-    from vkbloom._io.array_files import read  # noqa: PLC0415
-
     if len(files) != 1:
         raise ValueError("open: the message does not have the content of one file")
     with tempfile.TemporaryDirectory() as folder:

@@ -26,11 +26,7 @@ Array = NDArray[np.float64]
 
 
 def is_found(target: Array, residual: Array, plain: Array) -> bool:
-    """Return whether a bloom explains the target better than a change of each pixel's colour.
-
-    - `residual`: Framebuffer less target.
-    - `plain`: The picture without bloom.
-    """
+    """Return whether a bloom explains the target better than a change of each pixel's colour."""
     if np.count_nonzero(target != plain) < _FEW_VALUES:
         return False
     found = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
@@ -61,11 +57,7 @@ def _recoloured(image: Array, target: Array) -> float:
 def likely_cause(
     target: Array, residual: Array, plain: Array, method: str, vary: Sequence[str]
 ) -> str:
-    """Return why a fit is not good.
-
-    - `residual`: Framebuffer less target.
-    - `plain`: The picture without bloom.
-    """
+    """Return why a fit is not good."""
     if not (target - plain).any():
         return f"{NOTHING_FOUND}; the target is equal to the image"
     result = target + residual

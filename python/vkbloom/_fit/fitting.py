@@ -139,12 +139,6 @@ def fit(
         A candidate lacks a varied field, or the framebuffer; a field has no effect on it; the
         target has another size or is black; an argument is out of range; or, with `gradient`, a
         field or the loss has no derivative, or the image is an `Image`.
-    TypeError
-        An argument has the wrong type.
-    ModuleNotFoundError
-        SciPy is missing: ``pip install vkbloom[fit]``.
-    OutOfMemoryError, DeviceLostError, ValidationError, Error
-        The device failed.
 
     See Also
     --------
@@ -214,7 +208,7 @@ def fit(
     for space, cost in priced:
         if not space.axes:
             continue
-        with _bar(progress, space.start.method, max_calls) as told:
+        with _bar(progress, space.start.method, max_calls) as on_loss:
             one = _fitted(
                 renderer,
                 stages,
@@ -222,7 +216,7 @@ def fit(
                 cost,
                 framebuffer,
                 max_calls=max_calls,
-                told=told,
+                on_loss=on_loss,
                 gradient=gradient,
             )
             found.append(one)
@@ -284,10 +278,7 @@ def _stages(
 def _priced(
     renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
 ) -> tuple[Space, NDArray[np.int_]]:
-    """Return a space, and how many passes run after a change of each varied field alone.
-
-    `drop`: Whether to leave out fields without an effect; otherwise they are errors.
-    """
+    """Return a space, and how many passes run after a change of each varied field alone."""
     plan = renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
     shape = plan.framebuffers[framebuffer][0]
     if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
@@ -344,7 +335,7 @@ def _fitted(
     framebuffer: str,
     *,
     max_calls: int,
-    told: Callable[[float], None],
+    on_loss: Callable[[float], None],
     gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
@@ -370,7 +361,7 @@ def _fitted(
             render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             costs=costs,
-            told=told,
+            on_loss=on_loss,
             close=_close(stage, framebuffer),
         )
         with _one_thread():
@@ -468,7 +459,7 @@ def _smaller(settings: Settings, factor: int) -> Settings:
 
 @contextlib.contextmanager
 def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
-    """Give the function that is told each loss, and shows it where asked for."""
+    """Give the function that gets each loss, and shows it where asked for."""
     if not progress:
         yield lambda loss: None
         return

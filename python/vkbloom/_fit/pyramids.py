@@ -75,13 +75,6 @@ def fit_pyramid(
     -----
     Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, on non-negative least
     squares. With "log" the rows are divided by the function: log(a / b) is nearly (a - b) / b.
-
-    Examples
-    --------
-    >>> from vkbloom import psf
-    >>> found = vkbloom.fit_pyramid(psf.gaussian(sigma=4), levels=4, size=(128, 128))
-    >>> len(found.settings.level_weights), bool(found.loss < 0.1)
-    (4, True)
     """
     if not isinstance(psf, PSF):
         raise TypeError(f"psf: {psf!r} is not a PSF")

@@ -67,19 +67,6 @@ class FitResult:
     cause : str
         What the likely cause is if the verdict is not good: no bloom in the target; a target that
         is clipped, encoded or turned; or another method.
-
-    Examples
-    --------
-    >>> image = np.zeros((16, 16, 3), np.float32)
-    >>> image[8, 8] = 9
-    >>> target = vkbloom.reference.apply(image, vkbloom.Separable(blur_scale=1.5))["bloom"]
-    >>> found = vkbloom.fit(
-    ...     image, target, vkbloom.Separable(), ["blur_scale"], framebuffer="bloom"
-    ... )
-    >>> round(found.settings.blur_scale, 2), len(found.history) == found.calls
-    (1.5, True)
-    >>> found.verdict
-    'good'
     """
 
     settings: Settings

@@ -44,7 +44,7 @@ class Search:
     - `render`: Takes settings, returns the framebuffer as float64 (H, W, 3).
     - `max_calls`: How often it may be called.
     - `costs`: Passes that run after a change of each varied field alone.
-    - `told`: Is called with the loss of each call.
+    - `on_loss`: Is called with the loss of each call.
     - `close`: Below this loss the search only polishes.
     """
 
@@ -56,7 +56,7 @@ class Search:
         *,
         max_calls: int,
         costs: NDArray[np.int_],
-        told: Callable[[float], None],
+        on_loss: Callable[[float], None],
         close: float = CLOSE,
     ) -> None:
         self._space = space
@@ -64,7 +64,7 @@ class Search:
         self._render = render
         self._left = max_calls
         self._costs = costs
-        self._told = told
+        self._on_loss = on_loss
         self._close = close
         self.best = space.origin
         self.loss = np.inf
@@ -108,7 +108,7 @@ class Search:
         array = self._render(self._space.settings(point))
         loss = self._measure(array)
         self.history.append(loss)
-        self._told(loss)
+        self._on_loss(loss)
         if loss < self.loss:
             self.best, self.loss = point.copy(), loss
         return array

@@ -132,10 +132,7 @@ def spaces_of_all(
 def space_of(
     settings: Settings, vary: Sequence[str], bounds: Bounds, brightest: float, height: int
 ) -> Space:
-    """Return the space of the varied fields of some settings.
-
-    `height`: Of the image in pixels. Buffers with more rows take long, and add nothing.
-    """
+    """Return the space of the varied fields of some settings."""
     fields = fields_of(type(settings))
     axes = []
     for name in vary:

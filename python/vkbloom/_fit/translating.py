@@ -36,6 +36,7 @@ _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "three": ("threshold", "radius"),
     "post_processing": ("threshold", "diffusion"),
     "unreal": ("size_scale",),
+    "halation": ("pixel_size",),
     "pmndrs": ("threshold", "radius"),
     "babylon": ("threshold", "kernel"),
     "playcanvas": ("threshold", "blur_level"),
@@ -148,10 +149,7 @@ def _applied(
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the picture of four lights.
-
-    - `size`: Width and height in pixels.
-    """
+    """Return the picture of four lights."""
     width, height = size
     image = np.zeros((height, width, 3), np.float32)
     side = max(_MIN_SIDE, round(_SIDE * height))

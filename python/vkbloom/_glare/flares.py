@@ -129,16 +129,6 @@ class Halo(GlareLight):
     with c' = min(max(c - threshold, 0), maximum). Red and blue are moved as in `Ghosts`.
 
     Source: google/filament, flare.mat @ 523a261b1052.
-
-    Examples
-    --------
-    >>> image = np.zeros((33, 33, 3), np.float32)
-    >>> image[16, 16] = 1
-    >>> halo = vkbloom.Halo(radius=0.25, width=0.1, halvings=0)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     light = renderer.apply(image, vkbloom.Pyramid(glare=(halo,)))["halo"][16, :, 0]
-    >>> np.flatnonzero(light > 0.4)
-    array([ 8, 24])
     """
 
     stage: ClassVar[str] = "halo"

@@ -47,16 +47,6 @@ class Streaks(GlareLight):
     Source: Kawase, "Frame Buffer Postprocessing Effects in DOUBLE-S.T.E.A.L", GDC 2003. The colours
     are those of Blender's node Glare (blender/blender,
     source/blender/nodes/composite/nodes/node_composite_glare.cc).
-
-    Examples
-    --------
-    >>> image = np.zeros((1, 9, 3), np.float32)
-    >>> image[0, 4] = 15
-    >>> streaks = vkbloom.Streaks(directions=1, fade=0.5, base=2, iterations=2, halvings=0)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Pyramid(glare=streaks))
-    >>> frames["streaks"][0, :, 0]
-    array([0. , 0.5, 1. , 2. , 8. , 2. , 1. , 0.5, 0. ], dtype=float32)
     """
 
     stage: ClassVar[str] = "streaks"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from vkbloom._gradients.deglare import deglare
 from vkbloom._gradients.passes import on_device
 from vkbloom._gradients.pulling import Pullback, pull_each, pullback_of, vjp
 
-__all__ = ["Pullback", "on_device", "pull_each", "pullback_of", "vjp"]
+__all__ = ["Pullback", "deglare", "on_device", "pull_each", "pullback_of", "vjp"]

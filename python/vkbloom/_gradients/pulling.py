@@ -78,8 +78,6 @@ def vjp(
         which has no derivative. From `pullback`: there is no such framebuffer, or a cotangent
         has another shape or dtype, or is not finite. Its result raises ValueError for names
         that have no derivative, such as "levels".
-    OutOfMemoryError, DeviceLostError, ValidationError, Error
-        The device failed.
 
     Examples
     --------
@@ -94,7 +92,7 @@ def vjp(
     settings = check_settings(settings, of_image=True)
     renderer = renderer or default_renderer()
     renderer._pending.wait()
-    if hasattr(settings, "twin"):
+    if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )
@@ -148,10 +146,7 @@ def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
 def pullback_of(
     renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination = "host"
 ) -> Callable[[Checked], Derivatives]:
-    """Return the pullback alone, of arrays that do not change, and checked cotangents.
-
-    `place`: Where the derivatives by images go.
-    """
+    """Return the pullback alone, of arrays that do not change, and checked cotangents."""
     start = _starter(renderer, inputs, settings, place)
     return lambda cotangents: start(cotangents)()
 

@@ -78,19 +78,6 @@ def check_grid(store: Any) -> GridReport:
         The store does not exist or is empty.
     ValueError
         The store is not a grid, or has another format version.
-    ModuleNotFoundError
-        zarr is missing.
-
-    Examples
-    --------
-    >>> import zarr
-    >>> image = np.zeros((16, 16, 4), np.uint8)
-    >>> store = zarr.storage.MemoryStore()
-    >>> grid = vkbloom.grid(
-    ...     image, None, {"intensity": [0.5, 1.0]}, store=store, adapter="software"
-    ... )
-    >>> print(vkbloom.check_grid(store))
-    2 of 2 points are done
     """
     keys = open_keys(store)
     held = keys.all()
@@ -143,7 +130,7 @@ class _Stored:
             Axis(name, tuple(own["axes"][name]), "settings", "", "")
             for name in own["order of axes"]
         )
-        trailing = {name: len(told["shape"]) for name, told in own["variables"].items()}
+        trailing = {name: len(variable["shape"]) for name, variable in own["variables"].items()}
         self._chunks = Chunks(keys, trailing, tuple(own["chunk"]))
 
     def report(self) -> GridReport:

@@ -45,10 +45,7 @@ class Filler:
         arrays: Mapping[str, NDArray[Any]],
         on_point: Callable[[Tally], object] = lambda tally: None,
     ) -> Tally:
-        """Render the points of a block.
-
-        `arrays`: By variable; the block's shape, then the variable's. They are filled.
-        """
+        """Render the points of a block."""
         grid, total = self._grid, Tally()
         path = map(grid.point, points(block, self._layout.ranking))
         for index, frames in visit(self._renderer, grid.source, path, grid.wanted):

@@ -138,16 +138,10 @@ def grid(
         data. This is checked before anything is rendered or written.
     MemoryError
         The result does not fit into the free memory. Nothing was rendered.
-    TypeError
-        An argument has the wrong type.
     FileExistsError
         The store exists and `resume` is False.
     OSError
         Writing failed, for example because the disk is full. Completed points are kept.
-    ModuleNotFoundError
-        xarray is missing, or zarr and dask for a store.
-    OutOfMemoryError, DeviceLostError, ValidationError, Error
-        The device failed.
 
     See Also
     --------

@@ -301,13 +301,13 @@ def _refuse(
     (first, _), (second, _) = places
     varied = [number for number, place in enumerate(second) if place != first[number]]
     names = " and ".join(grid.axes[number].name for number in varied)
-    told = []
+    reasons = []
     for index, found in places:
         where = ", ".join(f"{grid.axes[i].name}={grid.axes[i].label(index[i])}" for i in varied)
         what = f"{found[0]} {found[1]}" if found else "not there"
-        told.append(f"{what} at {where}")
+        reasons.append(f"{what} at {where}")
     raise ValueError(
-        f"axes: {name} changes its shape or dtype along {names}: {'; '.join(told)}; request "
+        f"axes: {name} changes its shape or dtype along {names}: {'; '.join(reasons)}; request "
         "framebuffers that are the same at all points, or make a grid for each"
     )
 

@@ -60,8 +60,6 @@ def blocks(
     """Return the blocks of a part of a grid in the order in which they are visited.
 
     A part is a run of neighbouring blocks, so that its points share passes.
-
-    `shape`: Number of values by axis.
     """
     count = math.prod(-(-size // step) for size, step in zip(shape, chunk, strict=True))
     ends = (count * number // part[1] for number in (part[0] - 1, part[0]))
@@ -104,10 +102,7 @@ def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
 
 
 def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
-    """Return a chunk that spans complete fast axes, within a number of points.
-
-    `shape`: Number of values by axis.
-    """
+    """Return a chunk that spans complete fast axes, within a number of points."""
     chunk = [1] * len(shape)
     for axis in reversed(ranking):
         chunk[axis] = max(1, min(shape[axis], most))
@@ -118,10 +113,7 @@ def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
 
 
 def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]:
-    """Yield a corner of a grid, then a step along each axis in turn.
-
-    `shape`: Number of values by axis.
-    """
+    """Yield a corner of a grid, then a step along each axis in turn."""
     index = [count - 1 if backwards else 0 for count in shape]
     yield None, tuple(index)
     for axis, count in enumerate(shape):

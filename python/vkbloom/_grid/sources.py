@@ -27,6 +27,7 @@ from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import IMAGES_AHEAD, Request
 from vkbloom._renderer.sources import SCENE_SIZE, image_source, is_image, scene_source
+from vkbloom._scene import Scene
 from vkbloom._settings.settings import Settings, check_shading
 
 if TYPE_CHECKING:
@@ -185,8 +186,6 @@ def read_source(
     emission: object = None,
 ) -> Source:
     """Check the source of a grid."""
-    from vkbloom._scene import Scene  # noqa: PLC0415  loading scenes costs start-up time
-
     given = {"mask": mask, "emission": emission}
     if isinstance(source, Scene):
         for name, array in given.items():

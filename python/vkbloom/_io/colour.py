@@ -52,12 +52,7 @@ def check_space(name: str) -> None:
 def linear(
     values: NDArray[Any], stored: StoredImage, colour: Colour | None
 ) -> tuple[str, NDArray[Any], list[str]]:
-    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled.
-
-    - `values`: The numbers in the file, (H, W, 3) or (H, W, 4).
-    - `stored`: What the file says of its colours.
-    - `colour`: The colour space, whatever the file says.
-    """
+    """Return the assumed colour space, the linear floats, and notes; alpha is only scaled."""
     if stored.space in LAB:
         made = _scaled(values)
         made[:, :, :3] = from_lab(values[:, :, :3], stored.space)
@@ -176,11 +171,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
 def _decoded(
     values: NDArray[Any], space: str, exponent: float | None = None, *, is_narrow: bool = False
 ) -> NDArray[Any]:
-    """Return linear floats from colours of a space; alpha is only scaled.
-
-    - `exponent`: Replaces that of the space.
-    - `is_narrow`: Black is 16 and white is 235 of 8 bits, as in Rec. ITU-R BT.709; for integers.
-    """
+    """Return linear floats from colours of a space; alpha is only scaled."""
     exponent = exponent or _EXPONENTS.get(space)
     if values.dtype.kind == "f":
         if space == "linear":

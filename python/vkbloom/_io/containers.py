@@ -57,12 +57,7 @@ _RESOLUTION: Final = re.compile(rb"\n\n([-+][XY])\s*\d+\s*([-+][XY])\s*\d+\s*\n"
 
 
 def orientation_of(path: str | os.PathLike[str], kind: str, stated: Any) -> int:
-    """Return the orientation of an image file, 1 to 8 as in Exif.
-
-    - `kind`: OpenImageIO's name of the format.
-    - `stated`: What its reader found: no Exif after the pixels of a PNG file, and no XMP. In a
-      damaged file it may be no integer.
-    """
+    """Return the orientation of an image file, 1 to 8 as in Exif."""
     stated = stated if isinstance(stated, int) else None
     if kind == "hdr" or (stated is None and kind in _FINDERS):
         with open(path, "rb") as stream:

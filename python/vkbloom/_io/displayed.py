@@ -120,13 +120,7 @@ def is_hdr(saved: Saved) -> bool:
 def converted(
     oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
 ) -> tuple[NDArray[Any], tuple[str, str] | str]:
-    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
-
-    - `curve`: That of `saved`, or the file's own.
-    - `is_integer`: Whether the file ends at 1, so that colours above it are `scaled_to_1`.
-    - Returns: The values, and their primaries and curve or their display. With the curve "none"
-      values do not change.
-    """
+    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then."""
     if saved.view is not None:
         display, view = _display_of(oiio, saved.view)
         made = oiio.ImageBufAlgo.ociodisplay(
@@ -167,11 +161,7 @@ def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]
 
 
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
-    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change.
-
-    - `curve`: "none" and "linear" return the values themselves.
-    - Returns: ndarray, shape (H, W, C): float32 if a curve is applied.
-    """
+    """Return linear floats (H, W, C) with their colours on a curve; alpha does not change."""
     if curve in ("none", "linear"):
         return values
     made = values.astype(np.float32)
@@ -188,12 +178,7 @@ def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
 def with_names(
     oiio: ModuleType, attributes: Attributes, target: Path, what: tuple[str, str] | str
 ) -> tuple[bool, Attributes]:
-    """Return attributes by which a file names its colours.
-
-    - `attributes`: Those that it gets anyway.
-    - `what`: Primaries and curve, or a display. ValueError: the format cannot name them.
-    - Returns: Whether the curve alone describes the colours, and the attributes.
-    """
+    """Return attributes by which a file names its colours."""
     if isinstance(what, str):
         points, name, curve = _DISPLAYS.get(what), what, ""
     else:

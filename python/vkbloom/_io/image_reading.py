@@ -376,16 +376,7 @@ def decode(
     raw: bool = False,
     expand: float | None = None,
 ) -> Picture:
-    """Decode a stored image to a picture of linear values.
-
-    - `colour`: The colour space of the file: "linear", "srgb" or a colour space of OpenColorIO's
-      built-in configuration, such as "ACEScg". Default: floats are linear; integers have the space
-      that the file states (by a cICP chunk, an ICC profile or a gamma), otherwise sRGB.
-    - `expand`: What highlights of integer files are expanded up to.
-    - Returns: float16 if the file has half, uint8 if `raw`, otherwise float32. Colours of integer
-      files, or with `colour`, are linear Rec. 709, not clipped. They are neither multiplied nor
-      divided by alpha.
-    """
+    """Decode a stored image to a picture of linear values."""
     if raw and colour is not None:
         raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
     chosen, left_out = _chosen_channels(stored.channels)

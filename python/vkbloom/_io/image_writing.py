@@ -70,10 +70,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
-    """Check that a file's format has a quality of compression, if one is given.
-
-    `quality`: 1 to 100; None: the format's own.
-    """
+    """Check that a file's format has a quality of compression, if one is given."""
     if quality is None:
         return
     check_index("quality", quality, 1, 100)
@@ -84,10 +81,7 @@ def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
 
 
 def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
-    """Return whether readers of a file expect alpha, and colours that are not multiplied by it.
-
-    `is_associated`: Whether the picture has multiplied colours, which TIFF can record.
-    """
+    """Return whether readers of a file expect alpha, and colours that are not multiplied by it."""
     file = Path(path)
     if is_exr(file) or (is_associated and file.suffix.lower() in (".tif", ".tiff")):
         return False
@@ -123,11 +117,6 @@ def save(
     Grey pictures are written with one channel if the format supports it, else as RGB. Data and
     display windows are kept if the format has them, else pixels outside the display window are cut
     off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
-
-    `saved`: The colours in the file, for linear pictures. With HDR curves, files of integers have
-    16 bits where the format has them.
-    `bits`: Size of a number. None: that of the picture, or the closest one of the format.
-    `layout`: The number of channels and the number type, if they are chosen already.
     """
     saved = saved or Saved()
     if saved != Saved() and picture.encoding != "linear":
@@ -279,11 +268,7 @@ def chosen_layout(
     is_hdr: bool,
     bits: int | None,
 ) -> tuple[int, str]:
-    """Return the closest number of channels and number type that the format supports.
-
-    `is_hdr`: The curve needs more than 8 bits.
-    `bits`: Size of a number, as for `save`.
-    """
+    """Return the closest number of channels and number type that the format supports."""
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
         wanted = BITS[bits]

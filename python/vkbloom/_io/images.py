@@ -179,10 +179,7 @@ class Picture:
         encoding: SavedColour | None = None,
         attributes: Mapping[str, tuple[Any, Any]] | None = None,
     ) -> Self:
-        """Make a picture from an array. Without an encoding, `save` writes its values unchanged.
-
-        `pixels`: ndarray, shape (H, W, 3) or (H, W, 4); uint8, float16 or float32, 1 being white.
-        """
+        """Make a picture from an array. Without an encoding, `save` writes its values unchanged."""
         height, width, channels = pixels.shape
         stored = StoredImage(
             pixels=pixels,

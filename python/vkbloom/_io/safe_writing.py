@@ -79,8 +79,6 @@ def reserve(file: Path, size: int) -> Path:
 
     A failure here has the system's own reason, which OpenImageIO does not report. On a full disk,
     OpenImageIO's JPEG writer would end the process, and its WebP writer would not return.
-
-    `size`: Bytes of the pixels.
     """
     return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
 

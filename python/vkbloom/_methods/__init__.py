@@ -31,6 +31,7 @@ METHODS.supply(
         "pygfx": "pygfx:PygfxBloom",
         "post_processing": "unity:PostProcessingBloom",
         "unreal": "unreal:UnrealBloom",
+        "halation": "halation:Halation",
         "pmndrs": "pmndrs:PmndrsBloom",
         "babylon": "babylon:BabylonBloom",
         "playcanvas": "playcanvas:PlayCanvasBloom",

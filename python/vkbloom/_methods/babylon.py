@@ -44,11 +44,6 @@ class BabylonBloom(Settings):
     Source: BabylonJS/Babylon.js, extractHighlights.fragment.fx @ bc81a5f32960,
     kernelBlur.fragment.fx @ 445b0404049f, bloomMerge.fragment.fx @ 02e530f440cd,
     thinBlurPostProcess.ts @ 076e49a15333, bloomEffect.ts @ 05c105649f04.
-
-    Examples
-    --------
-    >>> len(vkbloom.BabylonBloom(kernel=20).blur_weights)
-    5
     """
 
     method: ClassVar[str] = "babylon"

@@ -54,11 +54,6 @@ class BevyBloom(Settings):
     the intensity.
 
     Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016), crates/bevy_post_process/src/bloom.
-
-    Examples
-    --------
-    >>> vkbloom.BevyBloom(intensity=0.3).composite
-    'mix'
     """
 
     method: ClassVar[str] = "bevy"

@@ -122,13 +122,6 @@ class BlenderGlare(Settings):
 
     Source: the formulas of the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
     node_composite_glare.cc, confirmed by Blender 5.0.1 (``docs/evidence/engines.md``).
-
-    Examples
-    --------
-    >>> vkbloom.BlenderGlare(size=0.25).size
-    0.25
-    >>> vkbloom.BlenderGlare(type="streaks", streaks=6, streaks_angle=15).streaks
-    6
     """
 
     method: ClassVar[str] = "blender"

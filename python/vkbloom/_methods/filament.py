@@ -46,11 +46,6 @@ class FilamentBloom(Settings):
     Source: google/filament: bloomDownsample2x.mat @ 9f62dc2f2f53, bloomDownsample9.mat and
     bloomDownsample.mat @ 523a261b1052, bloomUpsample.mat @ 9f62dc2f2f53,
     filament/src/PostProcessManager.cpp @ 003e5005713c, include/filament/Options.h @ 2fac13e154fb.
-
-    Examples
-    --------
-    >>> vkbloom.FilamentBloom(levels=7).threshold
-    1.0
     """
 
     method: ClassVar[str] = "filament"

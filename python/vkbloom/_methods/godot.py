@@ -72,11 +72,6 @@ class GodotBloom(Settings):
 
     Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
     @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
-
-    Examples
-    --------
-    >>> vkbloom.GodotBloom().composite
-    'screen'
     """
 
     method: ClassVar[str] = "godot"

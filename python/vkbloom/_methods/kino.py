@@ -40,11 +40,6 @@ class KinoBloom(Settings):
     their mean. In "rgba8unorm" the images up_k hold means, and the bloom is N times as coarse.
 
     Source: keijiro/KinoBloom @ 0a04c43fa47d (2017), Assets/Kino/Bloom/Bloom.cs, Bloom.cginc.
-
-    Examples
-    --------
-    >>> vkbloom.KinoBloom(threshold=1.0, radius=4).composite
-    'add'
     """
 
     method: ClassVar[str] = "kino"

@@ -106,14 +106,6 @@ class DualKawase(Settings):
     are multiples of 2^levels avoids this.
 
     Source: Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
-
-    Examples
-    --------
-    >>> image = np.full((16, 16, 3), 0.25, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.DualKawase(levels=2))
-    >>> bool(np.allclose(frames["bloom"][..., :3], 0.25, atol=1e-5))
-    True
     """
 
     method: ClassVar[str] = "dual_kawase"

@@ -37,11 +37,6 @@ class PlayCanvasBloom(Settings):
 
     Source: playcanvas/engine 2.23, frame-pass-bloom.js and downsample.js @ 1f7213d06f78,
     2.22.0-beta.20 @ 0aaef5e432c4.
-
-    Examples
-    --------
-    >>> vkbloom.PlayCanvasBloom(blur_level=4).threshold is None
-    True
     """
 
     method: ClassVar[str] = "playcanvas"

@@ -40,11 +40,6 @@ class PmndrsBloom(Settings):
 
     Source: pmndrs/postprocessing @ 69c61a640078 (6.39.0), BloomEffect.js, LuminancePass.js,
     MipmapBlurPass.js and their shaders.
-
-    Examples
-    --------
-    >>> vkbloom.PmndrsBloom().composite
-    'screen'
     """
 
     method: ClassVar[str] = "pmndrs"

@@ -41,11 +41,6 @@ class PygfxBloom(Settings):
 
     Source: pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c, confirmed by pygfx 0.17.0
     (``docs/evidence/engines.md``).
-
-    Examples
-    --------
-    >>> vkbloom.PygfxBloom().levels
-    6
     """
 
     method: ClassVar[str] = "pygfx"

@@ -66,11 +66,6 @@ class ThreeBloom(Settings):
     examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4,
     examples/jsm/tsl/display/BloomNode.js @ 07e4c12b3840, whose defaults these are, since the pass
     has none for radius and threshold.
-
-    Examples
-    --------
-    >>> vkbloom.ThreeBloom(radius=0.5, threshold=0.8).intensity
-    3.0
     """
 
     method: ClassVar[str] = "three"
@@ -85,7 +80,9 @@ class ThreeBloom(Settings):
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
-    tints: tuple[Tint, ...] = value_field(((1.0, 1.0, 1.0),) * 5, read=_read_tints)
+    tints: tuple[Tint, ...] = value_field(
+        ((1.0, 1.0, 1.0),) * 5, kind="pairs", read=_read_tints, option="level-tints"
+    )
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""

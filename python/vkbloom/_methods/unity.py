@@ -88,11 +88,6 @@ class UrpBloom(Settings):
     Shaders/PostProcessing/Bloom.shader @ 00d472fae509,
     Runtime/Passes/PostProcess/BloomPostProcessPass.cs @ 13e28e026298,
     Runtime/Overrides/Bloom.cs @ a085de35f86e.
-
-    Examples
-    --------
-    >>> round(vkbloom.UrpBloom().threshold, 4)
-    0.7874
     """
 
     method: ClassVar[str] = "urp"
@@ -110,11 +105,6 @@ class UrpBloom(Settings):
     tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
     clamp: float = number_field("clamp_max", slider=(0, 100))
     version: Literal["17", "12"] = choice_field("version", ("17", "12"))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.version == "12" and self.filter != "gaussian":
-            raise ValueError(f"filter: {self.filter!r} is not in URP 12, which has 'gaussian'")
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
@@ -169,11 +159,6 @@ class HdrpBloom(Settings):
     Runtime: PostProcessing/Shaders/BloomPrefilter.compute @ 2309d2c2fde8, BloomBlur.compute and
     BloomUpsample.compute @ 0e4ca4d79b2c, PostProcessing/Components/Bloom.cs @ 2084a9d19159,
     RenderPipeline/HDRenderPipeline.PostProcess.cs @ 0148835ea9ba.
-
-    Examples
-    --------
-    >>> vkbloom.HdrpBloom(scatter=0.5).composite
-    'mix'
     """
 
     method: ClassVar[str] = "hdrp"
@@ -231,11 +216,6 @@ class PostProcessingBloom(Settings):
     Source: Unity-Technologies/PostProcessing @ 32c3155207d3:
     PostProcessing/Shaders/Builtins/Bloom.shader, PostProcessing/Shaders/Sampling.hlsl,
     PostProcessing/Runtime/Effects/Bloom.cs.
-
-    Examples
-    --------
-    >>> vkbloom.PostProcessingBloom(diffusion=5).knee
-    0.5
     """
 
     method: ClassVar[str] = "post_processing"

@@ -9,11 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._array_cache import kept
-from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
-from vkbloom._settings.settings import Composite, Settings, no_knee
+from vkbloom._settings.settings import Composite, no_knee
 
 
 def _read_sizes(sizes: Any) -> tuple[float, ...]:
@@ -25,7 +24,7 @@ def _read_tints(tints: Any) -> tuple[float, ...]:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class UnrealBloom(Settings):
+class UnrealBloom(GaussianSum):
     """Unreal Engine's standard bloom, by its documentation. Nothing of the engine ran.
 
     Parameters
@@ -36,8 +35,9 @@ class UnrealBloom(Settings):
         Factor of each Gaussian.
     size_scale : float
         Factor of all sizes, 0 to 64.
-    threshold : float
-        -1, which lets every colour through, of -1 to 65504. Others are not supported.
+    threshold : float or None
+        Luminance, -1 to 65504, at which a colour begins to contribute; from 1 above it is complete.
+        -1: every colour contributes, as without a threshold.
     composite : {"add"}
     intensity : float
     **settings
@@ -45,30 +45,20 @@ class UnrealBloom(Settings):
 
     Notes
     -----
-    ``bloom`` is the convolution of the frame with ``kernel``, the sum of the tints times Gaussians
-    whose sums are 1. The standard deviation is a sixth of the diameter, which is this project's
-    reading of it, and each is cut off at three standard deviations, rounded up to pixels. Outside
-    of the frame are its outermost pixels. The engine blurs at reduced sizes and limits its kernels;
-    this is the formula that it documents.
+    ``bloom`` is the convolution of the frame, times clamp(luminance - threshold, 0, 1), with
+    ``kernel``, the sum of the tints times Gaussians whose sums are 1. The standard deviation is a
+    sixth of the diameter, which is this project's reading of it, and each is cut off at three
+    standard deviations, rounded up to pixels. Outside of the frame are its outermost pixels. The
+    engine blurs at reduced sizes and limits its kernels; this is the formula that it documents.
 
     Source: Epic Games, "Bloom" (Unreal Engine 4.27), GaussianSumBloomSettings (Python API 5.0).
-
-    Examples
-    --------
-    >>> round(sum(vkbloom.UnrealBloom().tints), 4)
-    0.7951
     """
 
     method: ClassVar[str] = "unreal"
-    published: ClassVar[bool] = True
     boundary: ClassVar[str] = "edge"
-    prefilter: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 1.0)
+    shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
 
-    threshold: float | None = number_field(
-        default=-1.0,
-        range=(-1, 65504),
-        fixed="a threshold of Unreal's standard bloom is not supported",
-    )
+    threshold: float | None = number_field(default=-1.0, range=(-1, 65504), slider=(-1, 4))
     knee: float = no_knee("unreal")
     composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.675)
@@ -78,39 +68,24 @@ class UnrealBloom(Settings):
     )
     size_scale: float = number_field(default=4.0, range=(0, 64))
 
-    def kernel(
-        self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
-    ) -> NDArray[np.float64]:
-        """Return the kernel for a frame in pixels of the bloom buffers, (2 H - 1, 2 W - 1, 3)."""
-        return np.repeat(_plane(self, frame, buffers or frame)[..., np.newaxis], 3, axis=2)
-
-    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
-        """Return the kernel as the core reads it."""
-        return _core_kernel(
-            UnrealBloom(sizes=self.sizes, tints=self.tints, size_scale=self.size_scale),
-            frame,
-            buffers,
-        )
-
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return the kernel's width and height, without the kernel."""
         return 2 * buffers[0] - 1, 2 * buffers[1] - 1
 
+    def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
+        lines = []
+        for axis in (1, 0):
+            scale = self.size_scale * frame[0] / 600 * buffers[axis] / frame[axis]
+            lines.append(np.stack([_line(size * scale, buffers[axis]) for size in self.sizes]))
+        plane = (lines[0] * np.array(self.tints)[:, np.newaxis]).T @ lines[1]
+        return np.repeat(plane[..., np.newaxis], 3, axis=2)
+
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
-        values = {"threshold": None, "boundary": self.boundary}
-        return settings_block(self.method, vars(self) | values)
-
-
-def _plane(
-    settings: UnrealBloom, frame: tuple[int, int], buffers: tuple[int, int]
-) -> NDArray[np.float64]:
-    lines = []
-    for axis in (1, 0):
-        scale = settings.size_scale * frame[0] / 600 * buffers[axis] / frame[axis]
-        lines.append(np.stack([_line(size * scale, buffers[axis]) for size in settings.sizes]))
-    plane: NDArray[np.float64] = (lines[0] * np.array(settings.tints)[:, np.newaxis]).T @ lines[1]
-    return plane
+        threshold = None if self.threshold in {None, -1.0} else self.threshold + 1
+        return settings_block(
+            self.method, vars(self) | {"threshold": threshold, "boundary": self.boundary}
+        )
 
 
 def _line(deviation: float, length: int) -> NDArray[np.float64]:
@@ -119,15 +94,7 @@ def _line(deviation: float, length: int) -> NDArray[np.float64]:
     Whatever is further away reads the same outermost pixel as the first and the last of them.
     """
     radius = math.ceil(3 * deviation)
-    places = np.arange(-radius, radius + 1)
-    weights = np.exp(-0.5 * (places / deviation) ** 2) if radius else np.ones(1)
     line = np.zeros(2 * length - 1)
-    np.add.at(line, np.clip(places, 1 - length, length - 1) + length - 1, weights / weights.sum())
+    places = np.clip(np.arange(-radius, radius + 1), 1 - length, length - 1) + length - 1
+    np.add.at(line, places, gaussian(deviation, radius))
     return line
-
-
-@kept
-def _core_kernel(
-    settings: UnrealBloom, frame: tuple[int, int], buffers: tuple[int, int]
-) -> CoreKernel:
-    return core_kernel(_plane(settings, frame, buffers))

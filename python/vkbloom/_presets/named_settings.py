@@ -129,6 +129,11 @@ PRESETS: Final[Mapping[str, Preset]] = {
         "six Gaussians of the complete picture, up to wider than it",
         "Epic Games, Bloom (Unreal Engine 4.27), by its documentation",
     ),
+    "halation": Preset(
+        lambda: METHODS["halation"](),
+        "film: a red glow of the complete picture, and its softness",
+        "andreavolpato/agx-emulsion @ 0e0baf2e3dd5",
+    ),
     "pmndrs": Preset(
         lambda: METHODS["pmndrs"](),
         "eight levels of what is above 1, as a screen",

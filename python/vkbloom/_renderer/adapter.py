@@ -34,12 +34,6 @@ class AdapterInfo:
         The device's address on the PCI bus, such as "0000:3b:00.0"; "" if it is not on one.
     summary : str
         Name, type, driver and Vulkan version on one line.
-
-    Examples
-    --------
-    >>> info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 25.0.7", "1.4.305")
-    >>> info.summary
-    'llvmpipe (cpu, Mesa 25.0.7, Vulkan 1.4.305)'
     """
 
     name: str
@@ -112,11 +106,6 @@ def adapters() -> tuple[AdapterInfo, ...]:
     tuple of AdapterInfo
         First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
         driver works.
-
-    Examples
-    --------
-    >>> any(adapter.type == "cpu" for adapter in vkbloom.adapters())
-    True
     """
     found: list[_core._AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):

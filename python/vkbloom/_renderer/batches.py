@@ -75,12 +75,7 @@ class Batches:
         frames: Callable[[Settings, dict[str, Any]], Frames],
         rest: Callable[[int], Iterator[Frames]],
     ) -> Iterator[Frames]:
-        """Yield the Frames of each image.
-
-        `frames`: Makes them of their arrays.
-        `rest`: Yields them one by one from an image on. It is called where images have no layers,
-        or where the device has too little memory for many of them.
-        """
+        """Yield the Frames of each image."""
         count = batch.shape[0]
         layers = self._layers(batch, settings)
         pending: deque[_Part] = deque()

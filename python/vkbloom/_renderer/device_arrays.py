@@ -65,16 +65,6 @@ class DeviceArray:
     shape : tuple of int
         (H, W, C), or (H, W) for depth.
     dtype : numpy.dtype
-
-    Examples
-    --------
-    >>> image = np.full((16, 24, 3), 0.5, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     final = renderer.apply(image, device="device")["final"]
-    >>> final.shape, final.dtype
-    ((16, 24, 3), dtype('float32'))
-    >>> np.from_dlpack(final).shape
-    (16, 24, 3)
     """
 
     def __init__(
@@ -434,12 +424,7 @@ def take(
     *,
     waits: bool = True,
 ) -> ImportedArray:
-    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
-
-    `sides`: The numbers of dimensions that it may have.
-    `waits`: Until the copy is complete. Otherwise the core's `run` does that, and the array must
-    not change before.
-    """
+    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
     _require_no_capture()
     try:
         core.cuda()

@@ -105,10 +105,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
 
 
 def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], dict[str, str]]]:
-    """Yield the pixels of each part without the padding of its window, and its attributes.
-
-    `target`: Parts that `save` of this path did not write are left out; None: there are none.
-    """
+    """Yield the pixels of each part without the padding of its window, and its attributes."""
     with image_reading.opened(file, "Frames.load") as reader:
         for index in itertools.count():
             if not reader.seek_subimage(index, 0):
@@ -140,10 +137,7 @@ def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
 
 
 def settings_facts(settings: Settings, expand: float | None) -> dict[str, str]:
-    """Return what an image file holds of the settings that made it, for `facts_of`.
-
-    `expand`: What the highlights of the source were expanded up to.
-    """
+    """Return what an image file holds of the settings that made it, for `facts_of`."""
     facts = {
         "Software": f"vkbloom {installed_version()}",
         "vkbloom:settings": json.dumps(settings.to_dict()),

@@ -50,19 +50,6 @@ class Frames(Mapping[str, NDArray[Any]]):
     info : mapping of str to object
         "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input;
         "driver_sha256", where the driver is that of ``vkbloom-lavapipe``.
-
-    Examples
-    --------
-    >>> image = np.full((16, 24, 3), 0.5, np.float32)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=2))
-    >>> {name: array.shape for name, array in frames.items()}
-    {'glow': (16, 24, 4), 'down_0': (8, 12, 4), 'down_1': (4, 6, 4), 'up_0': (8, 12, 4), \
-'bloom': (16, 24, 4), 'final': (16, 24, 3)}
-    >>> frames.settings.levels
-    2
-    >>> frames.info["nan"]
-    0
     """
 
     def __init__(

@@ -30,18 +30,6 @@ class Image:
         uint8, float16 or float32.
     mask, emission : bool
         Whether it was uploaded with a mask or an emission, which are used in all calls.
-
-    Examples
-    --------
-    >>> array = np.zeros((90, 160, 3), np.float16)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     image = renderer.upload(array)
-    ...     array[:] = 1.0
-    ...     final = renderer.apply(image, vkbloom.Separable())["final"]
-    >>> image
-    <vkbloom.Image of 160 x 90 pixels, 3 channels, float16>
-    >>> float(final.max())
-    0.0
     """
 
     __slots__ = ("__weakref__", "_inputs", "_source", "dtype", "emission", "mask", "shape")

@@ -67,20 +67,6 @@ class Plan:
     passes : tuple of Pass
         In the order in which they run on a new renderer. A renderer skips passes whose results are
         up to date.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import vkbloom
-    >>> image = np.zeros((90, 160, 4), np.float16)
-    >>> with vkbloom.Renderer() as renderer:
-    ...     plan = renderer.plan(image, vkbloom.Separable(threshold=1.0))
-    >>> list(plan.framebuffers)
-    ['glow', 'blur_vertical', 'bloom', 'final']
-    >>> plan.framebuffers["final"]
-    ((90, 160, 4), dtype('float16'))
-    >>> [one.name for one in plan.passes]
-    ['glow', 'blur_vertical', 'bloom', 'final']
     """
 
     source: str

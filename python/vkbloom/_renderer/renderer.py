@@ -289,13 +289,6 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<vkbloom.Renderer on {self.info.summary}{', closed' if self.closed else ''}>"
 
-    def _repr_html_(self) -> str:
-        """Return the table of `display.renderer_html`."""
-        # Imported here, since only notebooks need it.
-        from vkbloom._views import display  # noqa: PLC0415
-
-        return display.renderer_html(self.info, closed=self.closed)
-
     @checked
     def render(
         self,
@@ -476,8 +469,6 @@ class Renderer:
         ValueError
             Raised by the call: the lengths of both sequences differ, or an argument is out of
             range. Raised by the iteration: an image is not valid for `apply`, or has no settings.
-        TypeError
-            `images` is not iterable, or an argument has another type.
 
         Notes
         -----

@@ -355,8 +355,6 @@ def run(
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
     uses results: none before the first result, then enough for `AHEAD` submissions.
-
-    `names`: The requested framebuffers; None: all.
     """
     waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, place)
     submitted: deque[_Submitted] = deque()

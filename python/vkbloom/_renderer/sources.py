@@ -86,10 +86,7 @@ def checked_inputs(
     *,
     waits: bool = True,
 ) -> Inputs:
-    """Check the arrays of an image, and copy those that are on the renderer's device.
-
-    `waits`: As for `device_arrays.take`.
-    """
+    """Check the arrays of an image, and copy those that are on the renderer's device."""
     if core is None or not any(map(on_cuda, (image, mask, emission))):
         core = None
     pixels: Any

@@ -58,12 +58,6 @@ class Camera:
         Vertical field of view in degrees, over 0 and under 180.
     near, far : float
         Distances of the clip planes in scene units, 0 < near < far. They do not cut the sky.
-
-    Examples
-    --------
-    >>> camera = vkbloom.Camera(position=(0, 0, -5), rotation=(0, 90, 0), fov=60)
-    >>> camera.near, camera.far
-    (0.1, 256.0)
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, -10.25)
@@ -106,15 +100,6 @@ class Scene:
     ----------
     serial : int
         A number that no other scene of this process has.
-
-    Examples
-    --------
-    >>> scene = vkbloom.Scene.ufo()
-    >>> settings = vkbloom.Separable(bloom_size=(32, 32))
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.render(scene, settings, size=(64, 48))
-    >>> list(frames)
-    ['glow', 'glow_depth', 'blur_vertical', 'bloom', 'scene', 'depth', 'final']
     """
 
     body: Mesh
@@ -152,13 +137,7 @@ class Scene:
 
     @classmethod
     def ufo(cls) -> Scene:
-        """Return the built-in scene: a saucer, its glow mesh and a field of stars.
-
-        Examples
-        --------
-        >>> vkbloom.Scene.ufo().glow is not None
-        True
-        """
+        """Return the built-in scene: a saucer, its glow mesh and a field of stars."""
         with np.load(_UFO) as arrays:
             body, glow = (
                 Mesh(arrays[f"{name}_vertices"], arrays[f"{name}_indices"].astype(np.uint32))
@@ -198,13 +177,6 @@ class Scene:
         Returns
         -------
         Scene
-
-        Examples
-        --------
-        >>> vkbloom.Scene.from_gltf("missing.glb")
-        Traceback (most recent call last):
-            ...
-        FileNotFoundError: [Errno 2] No such file or directory: 'missing.glb'
         """
         # Imported here, since other scenes do not need it.
         from vkbloom._scene import gltf  # noqa: PLC0415
@@ -248,12 +220,3 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({'; '.join(f'{name}: {value}' for name, value in self._rows())})"
-
-    def _repr_html_(self) -> str:
-        """Return the page of `display.scene_html`."""
-        # Imported here, since only notebooks need it.
-        from vkbloom._views import display  # noqa: PLC0415
-
-        return display.scene_html(
-            self._rows(), None if self.skybox is None else self.skybox.levels[0]
-        )

@@ -65,12 +65,7 @@ SkyboxSource: TypeAlias = (
 
 
 def load(source: SkyboxSource) -> Cubemap:
-    """Make a cubemap from any type of skybox argument.
-
-    `source`: A path to a KTX 1 cubemap; a path to an equirectangular image; six paths to face
-    images in the order +x, -x, +y, -y, +z, -z; an array ``(6, N, N, C)``; or a Cubemap, which is
-    returned itself.
-    """
+    """Make a cubemap from any type of skybox argument."""
     if isinstance(source, Cubemap):
         return source
     if isinstance(source, np.ndarray):
@@ -91,12 +86,7 @@ def load(source: SkyboxSource) -> Cubemap:
 
 
 def from_array(faces: NDArray[Any]) -> Cubemap:
-    """Make a cubemap with all mip levels from an array.
-
-    `faces`: ``(6, N, N, C)``, faces in the order +x, -x, +y, -y, +z, -z, top row first; C is 3
-    (alpha becomes 1, or 255) or 4; dtype uint8, float16 or float32. N does not have to be a power
-    of two.
-    """
+    """Make a cubemap with all mip levels from an array."""
     if faces.dtype.newbyteorder("=") not in DTYPES:
         raise TypeError(f"skybox: {faces.dtype} is not uint8, float16 or float32")
     shape = faces.shape
@@ -117,12 +107,7 @@ def from_ktx(path: str | os.PathLike[str]) -> Cubemap:
 
 
 def from_faces(paths: Sequence[str | os.PathLike[str]]) -> Cubemap:
-    """Make a cubemap with all mip levels from six face images.
-
-    `paths`: Image files in the order +x, -x, +y, -y, +z, -z. They are square, RGB or RGBA, and have
-    the same size and dtype. 8-bit images stay uint8, half-float images float16; 16-bit integers
-    become float32 in 0..1.
-    """
+    """Make a cubemap with all mip levels from six face images."""
     if isinstance(paths, (str, bytes)) or not all(isinstance(p, (str, os.PathLike)) for p in paths):
         raise TypeError("skybox must be six paths of face images")
     if len(paths) != 6:
@@ -168,11 +153,6 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     So the panorama's top row is the direction -y. Its centre column is -z, straight ahead of a
     camera without rotation. Columns to the right of the centre are towards +x, which this camera
     sees on its right. The picture appears upright and not mirrored.
-
-    - `panorama`: ``(H, W, C)``, uint8, float16 or float32, top row first.
-    - `side`: Side of a face in pixels, at least 1.
-    - Returns: ``(6, side, side, C)`` in the panorama's dtype: bilinear samples, wrapped in
-      longitude and clamped at the poles. NaN and infinity count as 0.
 
     Longitude u = 1/2 + atan2(x, -z) / 2 pi and latitude v = 1/2 + asin(y) / pi of the unit
     direction. The direction of a face's pixel inverts the table "Cube map face and coordinate

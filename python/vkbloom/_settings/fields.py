@@ -344,13 +344,6 @@ class Record:
         -------
         Settings, Glare or PSF
             Of the named class.
-
-        Examples
-        --------
-        >>> vkbloom.Streaks.from_dict({"stage": "streaks", "directions": 4}).directions
-        4
-        >>> vkbloom.psf.PSF.from_dict({"psf": "gaussian", "sigma": 2})
-        gaussian(sigma=2.0)
         """
         if not isinstance(fields, Mapping):
             raise TypeError(f"{cls._subject}: a mapping is needed, not {type(fields).__name__}")

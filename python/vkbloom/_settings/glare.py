@@ -22,16 +22,6 @@ class Glare(Record):
     Stages are frozen and hashable. Their light is added to the bloom: the composite adds
     i b + sum of i_k g_k instead of i b. Here b is the bloom and i its intensity; g_k and i_k are
     the framebuffer and the intensity of stage k. `Dirt` multiplies this sum.
-
-    Examples
-    --------
-    >>> settings = vkbloom.Pyramid(glare=(vkbloom.Streaks(), vkbloom.Streaks(directions=1)))
-    >>> image = np.zeros((32, 32, 3), np.float16)
-    >>> image[16, 16] = 100
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, settings)
-    >>> list(frames)[:3]
-    ['glow', 'streaks_0', 'streaks_1']
     """
 
     _class_key: ClassVar[str] = "stage"
@@ -71,11 +61,6 @@ class GlareLight(Glare):
     threshold and mask in a later pass. With them, the stages have a threshold pass of their own,
     which uses the formulas of `Settings`. Texels outside of the picture are black. The framebuffers
     of stages are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
-
-    Examples
-    --------
-    >>> vkbloom.Streaks(intensity=2, threshold=1).halvings
-    2
     """
 
     intensity: float = stage_field("intensity", slider=(0, 4))
@@ -84,10 +69,7 @@ class GlareLight(Glare):
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:
-    """Return the stages of settings.
-
-    `glare`: A mapping is the result of `Glare.to_dict`.
-    """
+    """Return the stages of settings."""
     if isinstance(glare, Glare | Mapping):
         glare = (glare,)
     if isinstance(glare, str | bytes) or not isinstance(glare, Iterable):

@@ -209,13 +209,6 @@ class Settings(Record):
     def _classes(cls) -> Mapping[str, type[Settings]]:
         return METHODS
 
-    def _repr_html_(self) -> str:
-        """Return the table of `display.fields_html`."""
-        # Imported here because only notebooks need it.
-        from vkbloom._views import display  # noqa: PLC0415
-
-        return display.fields_html(self)
-
 
 def field_info(settings: Settings, name: str) -> FieldInfo:
     """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""

@@ -140,13 +140,9 @@ def compare(
 
     Raises
     ------
-    TypeError
-        An image is not an array of one of these types.
     ValueError
         An image has another number of dimensions or no pixels; `threshold`, `relative` or
         `data_range` is out of range, or a metric is unknown.
-    ModuleNotFoundError
-        scikit-image (for SSIM and PSNR) or OpenImageIO (for FLIP) is missing.
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
@@ -205,13 +201,7 @@ def _check_metrics(metrics: Collection[Metric], **viewing: float | None) -> None
 def difference(
     a: NDArray[Any], b: NDArray[Any], scale: float | None = None
 ) -> tuple[NDArray[np.float32], float]:
-    """Make a picture of the differences of two images.
-
-    - `a`, `b`: As for `compare`, of one shape, both integers or both floats.
-    - Returns: `picture`, ndarray, shape (H, W, 3): absolute differences of red, green and blue in
-      0..1, or of one channel in grey; differences of further channels, such as alpha, brighten all
-      three. Pixels that are not finite in only one image are magenta.
-    """
+    """Make a picture of the differences of two images."""
     if scale is not None and not 0 < scale < math.inf:
         raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
     a, b = checked_image("a", a), checked_image("b", b)
@@ -401,11 +391,7 @@ def _add_cvvdp(
 def flip_map(
     a: NDArray[Any], b: NDArray[Any], *, pixels_per_degree: float | None = None
 ) -> NDArray[np.float32]:
-    """Return FLIP of every pixel; its mean is the figure of `compare`.
-
-    - `a`, `b`: As for `compare`, of one shape, both integers or both floats.
-    - Returns: ndarray, shape (H, W): 0 (no visible difference) to 1.
-    """
+    """Return FLIP of every pixel; its mean is the figure of `compare`."""
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:

@@ -63,13 +63,6 @@ class Diagnosis:
         scaled to 0..1).
     text : str
         What `str` returns.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> image = np.random.default_rng(0).random((8, 8, 3))
-    >>> testing.diagnose(image, np.flip(image, 0)).value
-    'y'
     """
 
     cause: Cause | None
@@ -114,11 +107,6 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     Returns
     -------
     Diagnosis
-
-    Raises
-    ------
-    TypeError, ValueError
-        An image is not an array of one of these dtypes and shapes.
 
     Examples
     --------

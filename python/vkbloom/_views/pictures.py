@@ -119,11 +119,7 @@ def picture(
     range_of: NDArray[Any] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Convert an image to a viewable 8-bit picture, as `leading_png` documents.
-
-    - `size`: Width and height of the picture: pixels are averaged or repeated.
-    - `stops`: Exposure of float colours in stops; other values do not change.
-    """
+    """Convert an image to a viewable 8-bit picture, as `leading_png` documents."""
     values = np.atleast_3d(array).astype(np.float32)
     ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
     linear = False
@@ -244,8 +240,6 @@ def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
 
     It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
     users save.
-
-    `pixels`: ndarray of uint8, shape (H, W, C); 1, 3 or 4 channels.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)

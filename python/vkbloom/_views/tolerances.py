@@ -60,15 +60,6 @@ class Tolerances:
     ------
     ValueError
         A number is out of its range; the message names the field, the value and the range.
-    TypeError
-        A field is not a number.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> limits = testing.Tolerances(atol=0.01, fail_percent=0.1, ssim=0.99)
-    >>> limits.metrics
-    ('ssim',)
     """
 
     atol: float | None = None

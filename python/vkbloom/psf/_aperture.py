@@ -61,12 +61,6 @@ class iris:
     Edges are the mean of 4 x 4 samples. With a radius of 1, the distance of a polygon's edge from
     the centre is cos(pi / n) / cos(angle to the middle of the edge). `roundness` interpolates
     between this distance and 1.
-
-    Examples
-    --------
-    >>> mask = np.asarray(vkbloom.psf.iris(blades=6, size=64))
-    >>> mask.shape, round(float(mask.sum()) / 32**2, 2)  # 3 sqrt(3) / 2
-    ((64, 64), 2.6)
     """
 
     blades: int = number_field(default=6, range=(3, 64), slider=(3, 16))
@@ -194,12 +188,6 @@ class aperture(SampledPSF):
 
     Source of the colour matching functions: the fits of Wyman, Sloan, Shirley, "Simple Analytic
     Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), 2013.
-
-    Examples
-    --------
-    >>> star = vkbloom.psf.aperture(vkbloom.psf.iris(blades=6, size=64), f_number=22)
-    >>> star.energy().round(6)
-    array([1., 1., 1.])
     """
 
     mask: Any = value_field(read=_check_mask)

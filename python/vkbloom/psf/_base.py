@@ -46,14 +46,6 @@ class PSF(Record, abc.ABC):
     Attributes
     ----------
     unit : {"degree", "pixel"}
-
-    Examples
-    --------
-    >>> spread = vkbloom.psf.gaussian(sigma=2)
-    >>> spread.array((9, 9)).shape
-    (9, 9, 3)
-    >>> vkbloom.psf.PSF.from_json(spread.to_json()) == spread
-    True
     """
 
     _class_key: ClassVar[str] = "psf"

@@ -19,9 +19,6 @@ def bessel(order: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
     For small x, J_n(x) is 1 / pi times the integral of cos(n t - x sin t) over 0..pi. The midpoint
     rule converges exponentially here, because the integrand is periodic. For large x, Hankel's
     asymptotic expansion is used (NIST Digital Library of Mathematical Functions, 10.9.2, 10.17.3).
-
-    - `x`: Of any shape, at least 0.
-    - Returns: ndarray of float64, of the shape of x.
     """
     result = np.empty_like(x)
     far = x >= _FAR

@@ -56,11 +56,6 @@ class spencer(RadialPSF):
 
     Source: Spencer, Shirley, Zimmerman, Greenberg, "Physically-Based Glare Effects for Digital
     Images", SIGGRAPH 1995.
-
-    Examples
-    --------
-    >>> vkbloom.psf.spencer().energy().round(2)
-    array([1., 1., 1.])
     """
 
     state: State = "photopic"
@@ -106,11 +101,6 @@ class cie_general(RadialPSF):
     Source: CIE 146:2002, "CIE Equations for Disability Glare"; Vos, "On the cause of disability
     glare and its dependence on glare angle, age and ocular pigmentation", Clinical and
     Experimental Optometry 86(6), 2003.
-
-    Examples
-    --------
-    >>> vkbloom.psf.cie_general(age=35).density([1.0, 10.0])[:, 0].round(3)
-    array([15.548,  0.072])
     """
 
     age: float = number_field(default=35.0, range=(0, 120), unit="year")
@@ -145,11 +135,6 @@ class cie_total(RadialPSF):
     Source: CIE 135/1, "Disability Glare"; Vos and van den Berg, 1999. The formula is a
     reconstruction, which was not compared with the printed text. Its energy is 1 within 3.2 %. Its
     ratio to the general disability glare is 1.26 at 1 degree and 0.83 at 30 degrees.
-
-    Examples
-    --------
-    >>> bool(abs(vkbloom.psf.cie_total(age=70).energy()[0] - 1) < 0.032)
-    True
     """
 
     age: float = number_field(default=35.0, range=(0, 120), unit="year")

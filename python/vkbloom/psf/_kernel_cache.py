@@ -41,10 +41,7 @@ Pixels: TypeAlias = NDArray[np.float32]
 
 
 def find_or_make(what: tuple[object, ...], make: Callable[[], CoreKernel]) -> CoreKernel:
-    """Return a kernel from the cache, or make it and write it there if that took long.
-
-    `what`: All that the kernel follows from: numbers, strings, tuples, point-spread functions.
-    """
+    """Return a kernel from the cache, or make it and write it there if that took long."""
     key = _key(what)
     if key is None or CACHE.file(key) is None:
         return make()

@@ -47,16 +47,8 @@ class measured(SampledPSF):
 
     Raises
     ------
-    TypeError
-        `settings` is not a Settings.
     ValueError
         The settings have a threshold, or `size` is not a pair of integers of at least 1.
-
-    Examples
-    --------
-    >>> spread = vkbloom.psf.measured(vkbloom.Pyramid(levels=3), size=(64, 64))
-    >>> spread.energy().round(3)
-    array([1., 1., 1.])
     """
 
     settings: Settings = value_field(read=_read_settings)

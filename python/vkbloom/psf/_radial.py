@@ -29,14 +29,7 @@ _DEGREE = math.pi / 180
 def integrate_pixels(
     density: Callable[[Array], Array], size: tuple[int, int], period: float = math.inf
 ) -> Array:
-    """Integrate a radial density over the pixels of an image.
-
-    - `density`: Takes distances in pixels, of any shape, and returns energies per square pixel, (C,
-      ...).
-    - `period`: Period of the density's oscillation in pixels.
-    - Returns: ndarray of float64, shape (height, width, C): the centre is at [height // 2, width //
-      2].
-    """
+    """Integrate a radial density over the pixels of an image."""
     width, height = check_size("size", size)
     # The quadrants are equal. This one is to the right of the point and below it.
     rows, columns = (np.arange(1 + side // 2, dtype=np.float64) for side in (height, width))

@@ -38,12 +38,6 @@ class fog_glow(SampledPSF):
     integrated over the pixel. The sum is not 1; Blender divides by it.
 
     Source: Blender 4.3, source/blender/compositor/operations/COM_GlareFogGlowOperation.cc.
-
-    Examples
-    --------
-    >>> kernel = vkbloom.psf.fog_glow(64)
-    >>> kernel.array((64, 64))[32, 32]
-    array([1., 1., 1.])
     """
 
     size: int = number_field(default=256, range=(2, 4096), unit="pixel", slider=(2, 1024))
@@ -115,13 +109,6 @@ class unreal(SampledPSF):
 
     Source: Unreal Engine 5, Engine/Shaders/Private/Bloom/ and
     Engine/Source/Runtime/Renderer/Private/PostProcess/PostProcessFFTBloom.cpp.
-
-    Examples
-    --------
-    >>> image = np.zeros((9, 9), np.float32)
-    >>> image[4, 4], image[4, :] = 1, 0.125
-    >>> vkbloom.psf.unreal(image).energy()
-    array([1., 1., 1.])
     """
 
     image: Any = value_field(read=_check_image)

@@ -17,14 +17,7 @@ def box_resample(
     scale: tuple[float, float],
     room: tuple[int, int] | None = None,
 ) -> Array:
-    """Resample a kernel: a new pixel gets the energy of the area that it covers.
-
-    - `kernel`: ndarray of float64, shape (h, w, C); Energy per pixel.
-    - `scale`: Height and width of an old pixel in new pixels, above 0.
-    - `room`: Height and width around the point outside of which no new pixels are needed.
-    - Returns: ndarray of float64, shape (H, W, C): the sum of each channel is unchanged, unless
-      `room` cuts some off. H and W are odd, and the point is in the middle.
-    """
+    """Resample a kernel: a new pixel gets the energy of the area that it covers."""
     within = room or (None, None)
     edges = [_edges(*axis) for axis in zip(kernel.shape[:2], point, scale, within, strict=True)]
     # The axis that shrinks more comes first, so that a thin result takes little memory.
@@ -34,11 +27,7 @@ def box_resample(
 
 
 def integrals(values: Array, edges: Array, axis: int) -> Array:
-    """Integrate between edges along an axis; values are constant within a pixel.
-
-    `edges`: ndarray of float64, shape (N,); Ascending. Pixel n lies between n and n + 1. Values
-    outside of the array are 0.
-    """
+    """Integrate between edges along an axis; values are constant within a pixel."""
     lines = np.moveaxis(values, axis, 0)
     sums = np.concatenate([np.zeros((1, *lines.shape[1:])), lines.cumsum(axis=0)])
     at = np.clip(edges, 0, len(lines))

@@ -87,11 +87,6 @@ class samples(SampledPSF):
     values : array-like, shape (h, w) or (h, w, 3)
         Energies per pixel, which must be finite. The point is at [h // 2, w // 2]. The array is
         copied to float32.
-
-    Examples
-    --------
-    >>> vkbloom.psf.samples([[0, 1, 0], [1, 4, 1], [0, 1, 0]]).energy()
-    array([8., 8., 8.])
     """
 
     values: Any = value_field(read=functools.partial(check_values, "values"))

@@ -68,20 +68,8 @@ def composite(
 
     Raises
     ------
-    TypeError
-        An image has another dtype, `bloom` is missing while the bloom is on, or `settings` is not
-        Settings.
     ValueError
         An image has another shape, or the sizes differ.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> scene = np.full((2, 2, 3), 0.25)
-    >>> bloom = np.full((2, 2, 3), 0.5)
-    >>> settings = vkbloom.Separable(intensity=0.5, composite="mix")
-    >>> reference.composite(scene, bloom, settings)[0, 0]
-    array([0.375, 0.375, 0.375])
     """
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else dtype

@@ -65,6 +65,7 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
         "zero": ("constant", "constant"),
         "edge": ("edge", "edge"),
         "wrap": ("wrap", "wrap"),
+        "mirror": ("symmetric", "symmetric"),
         "wrap_x": ("edge", "wrap"),
     }
     down, across = modes[boundary]

@@ -31,9 +31,10 @@ __all__ = [
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
     {
+        *("pixel_size", "scattering_sizes", "scattering_strength"),
         *("anamorphic_ratio", "anamorphism", "babylon.kernel", "babylon.scale", "bloom_scale"),
         *("diffusion", "jitter", "pixels_per_degree", "resolution_scale", "size", "size_scale"),
-        *("sizes", "sun_position", "unreal.tints"),
+        *("sizes", "sun_position", "unreal.tints", "halation.strength"),
     }
 )
 
@@ -114,7 +115,7 @@ def vjp(
     >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
     np.float64(1.5)
     """
-    if hasattr(settings, "twin"):
+    if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )

@@ -70,8 +70,6 @@ def apply(
 
     Raises
     ------
-    TypeError
-        The image has another dtype, or `settings` is not Settings.
     ValueError
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
@@ -88,7 +86,7 @@ def apply(
     >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
     True
     """
-    if (function := getattr(settings, "twin", None)) is not None:
+    if (function := getattr(settings, "numpy_reference", None)) is not None:
         scene = as_float(image, "image", (3, 4))
         return custom.framebuffers(function, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
@@ -203,17 +201,8 @@ def passes(
 
     Raises
     ------
-    TypeError
-        The glow has another dtype, or `settings` is not Settings.
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> glow = np.full((16, 16, 3), 0.5)
-    >>> list(reference.passes(glow, vkbloom.DualKawase(levels=2)))
-    ['down_0', 'down_1', 'up_0', 'bloom']
     """
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
@@ -251,18 +240,6 @@ def blur(
     -------
     ndarray of float64, shape (height, width, C)
         "bloom" of `passes`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As for `passes`.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> glow = np.full((16, 16, 3), 0.5)
-    >>> float(reference.blur(glow, vkbloom.Pyramid(levels=2))[8, 8, 0])
-    0.5
     """
     return passes(glow, settings, size, format)["bloom"]
 

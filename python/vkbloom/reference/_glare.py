@@ -32,11 +32,7 @@ def stage_format(format: str) -> str:
 
 
 def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]:
-    """Return the framebuffer of each stage.
-
-    `source`: ndarray of float64, shape (H, W, C); The thresholded and masked image, at the size of
-    the bloom buffers.
-    """
+    """Return the framebuffer of each stage."""
     store = storage(stage_format(format))
     counts = Counter(stage.stage for stage in glare)
     seen: Counter[str] = Counter()

@@ -24,10 +24,7 @@ _FORMATS = {
 
 
 def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
-    """Return an image in real units.
-
-    - `image`: ndarray, shape (H, W, C); uint8 (read as value / 255), float16, float32 or float64.
-    """
+    """Return an image in real units."""
     array = as_array(image, name)
     if array.dtype.name not in _FORMATS:
         raise TypeError(
@@ -52,10 +49,7 @@ def as_array(values: object, name: str) -> NDArray[Any]:
 
 
 def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
-    """Return a mask as values of 0 to 1.
-
-    - `mask`: ndarray, shape (H, W); uint8 (read as value / 255), bool, or floats.
-    """
+    """Return a mask as values of 0 to 1."""
     array = as_array(mask, "mask")
     if array.dtype.kind not in "buf":
         raise TypeError(f"mask: {array.dtype} is not a dtype of numbers")
@@ -146,9 +140,6 @@ def _as_rg11b10(image: Array) -> Array:
     """Round to the nearest values with 5 bits of exponent and 6 of mantissa, of blue 5.
 
     Ties go to the even value, as in IEEE 754. The smallest step is 2^-20, for blue 2^-19.
-
-    `image`: ndarray of float64, shape (..., C); Three channels are red, green and blue. With
-    another number, all have 6 bits.
     """
     bits = np.array([6, 6, 5]) if image.shape[-1] == 3 else np.array(6)
     kept = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 2.0**16 - 2.0 ** (15 - bits))
@@ -159,10 +150,7 @@ def _as_rg11b10(image: Array) -> Array:
 
 
 def _as_srgb8(image: Array) -> Array:
-    """Round to the light of the nearest 8-bit level of sRGB; of alpha to the nearest level.
-
-    `image`: ndarray of float64, shape (..., C); A fourth channel is alpha.
-    """
+    """Round to the light of the nearest 8-bit level of sRGB; of alpha to the nearest level."""
     light = np.clip(np.nan_to_num(image, nan=0.0, posinf=np.inf), 0, 1)
     encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     share = np.round(255 * encoded) / 255

@@ -20,8 +20,6 @@ def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
 
     Each level has half the size of the one before (`halved`). The chain ends before a level of
     1 x 1, except that it always has one level.
-
-    `size`: Width and height of the image above the first level, in pixels.
     """
     sizes: list[tuple[int, int]] = []
     for _ in range(levels):

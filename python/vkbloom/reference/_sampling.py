@@ -39,11 +39,6 @@ def sample(
     is (i + 0.5) / width * w - 0.5 texels. Between texels the value is the linear interpolation
     of the two nearest texels along each axis (the Vulkan specification, chapter "Image Operations",
     section "Texel Filtering", of linear filters). Outside of the image it is the value at the edge.
-
-    - `image`: ndarray of float64, shape (H, W, C); Finite values. It is not changed.
-    - `size`: Width and height of the result, in pixels.
-    - `x_taps`, `y_taps`: Offset (in texels of `image`) and weight of each tap along the axis. The
-      taps of both axes form a grid, and their weights are multiplied.
     """
     width, height = size
     rows = _filter_rows(image, height, y_taps)
@@ -130,10 +125,7 @@ def _slopes(image: Array, count: int, offset: float) -> Array:
 
 
 def read_rows(image: Array, positions: Array) -> Array:
-    """Sample an image along its first axis at any positions, linearly and clamped to the edge.
-
-    - `positions`: ndarray, shape (N,); In texels, with texel n at n.
-    """
+    """Sample an image along its first axis at any positions, linearly and clamped to the edge."""
     lower = np.floor(positions)
     part = (positions - lower)[:, np.newaxis, np.newaxis]
     first, second = (
@@ -144,11 +136,7 @@ def read_rows(image: Array, positions: Array) -> Array:
 
 
 def weighted_mean(parts: Iterable[tuple[Array | float, Array]]) -> Array:
-    """Return the weighted mean of images.
-
-    - `parts`: The weight, a number or an array of shape (H, W, 1); and the image of shape (H, W,
-      C).
-    """
+    """Return the weighted mean of images."""
     total, weights = np.zeros(()), np.zeros(())
     for weight, image in parts:
         total = total + weight * image

@@ -52,8 +52,6 @@ def shade(
 
     Raises
     ------
-    TypeError
-        An array has another dtype.
     ValueError
         An array has another shape, or the shapes differ.
 

@@ -44,10 +44,7 @@ def brightest(image: Array) -> Array:
 
 
 def masked(image: Array, mask: Array | None) -> Array:
-    """Return the image times the mask, which is read bilinearly at the image's pixel centres.
-
-    - `mask`: ndarray of float64, shape (H, W, 1), or None.
-    """
+    """Return the image times the mask, which is read bilinearly at the image's pixel centres."""
     if mask is None:
         return image
     height, width, _ = image.shape
@@ -82,9 +79,6 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
     q = clamp(b - threshold + k, 0, 2k)^2 / (4k + 1e-5). This is a quadratic from 0 at
     threshold - k to the line b - threshold at threshold + k. Both formulas are documented with
     `vkbloom.Settings`.
-
-    - `rgb`: ndarray of float64, shape (..., 3) or (..., 4); Alpha is scaled like the colour.
-    - `threshold`: In the units of the image; None and values below 0 keep everything.
     """
     if threshold is None or threshold < 0:
         return rgb
@@ -99,8 +93,6 @@ def soften(rgb: Array, threshold: float, half_width: float, divisor: float, leas
 
     b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
     divisor.
-
-    - `threshold`, `half_width`: Middle and half-width of the soft part, in the units of the image.
     """
     brightness = brightest(rgb)
     above = brightness - threshold

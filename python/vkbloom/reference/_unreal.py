@@ -5,20 +5,30 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from . import _convolution as convolution
 from ._image import BlurInput
 from ._sampling import Array
-from ._threshold import masked
+from ._threshold import luminance, masked
 
 __all__ = ["gain", "passes"]
 
 
 def gain(settings: Any, size: tuple[int, int]) -> float:
-    """Return the bloom of a flat image of 1: the sum of the tints."""
-    return float(sum(settings.tints))
+    """Return the bloom of a flat image of 1: the sum of the tints, times the threshold's share."""
+    share = float(_prefilter(np.ones((1, 1, 3)), settings)[0, 0, 0])
+    return share * float(sum(settings.tints))
 
 
 def passes(source: BlurInput, settings: Any) -> dict[str, Array]:
     """Return "kernel" and "bloom"."""
-    image = masked(source.image, source.mask)
-    return convolution.passes(dataclasses.replace(source, image=image), settings)
+    image = masked(_prefilter(source.image, settings), source.mask)
+    return convolution.passes(dataclasses.replace(source, image=source.store(image)), settings)
+
+
+def _prefilter(rgb: Array, settings: Any) -> Array:
+    if settings.threshold is None or settings.threshold == -1:
+        return rgb
+    kept: Array = rgb * np.clip(luminance(rgb) - settings.threshold, 0, 1)
+    return kept

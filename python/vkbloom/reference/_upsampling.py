@@ -71,8 +71,6 @@ def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
     The four texels around a position weigh w_0 to w_3. A bilinear tap between the first two, at
     w_1 / (w_0 + w_1) of the way, has both their shares (Sigg and Hadwiger, "Fast Third-Order
     Texture Filtering", GPU Gems 2, chapter 20); likewise the other two.
-
-    `positions`: In texels, with texel n at n.
     """
     lower = np.floor(positions)
     f = positions - lower

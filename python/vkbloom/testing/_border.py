@@ -6,14 +6,14 @@ import dataclasses
 import inspect
 import math
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
 __all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
 
@@ -23,7 +23,7 @@ _DEFAULT = Probe()
 BORDER_LIMITS: Final = {
     "stale": 1e-3,
     "wrap": 0.01,
-    "inside": 0.025,
+    "inside": 0.015,
     "edge": 2.0,
     "corner": 3.0,
     "lost": 0.05,
@@ -35,28 +35,28 @@ _PERIOD: Final = 16
 # The largest share of the light in the outermost pixels with which the bloom of a light in the
 # middle counts as complete.
 _OUTERMOST: Final = 0.01
-# How much larger the image before is.
-_LARGER: Final = 32
 
 
 @dataclasses.dataclass(frozen=True)
 class _Lights:
-    """The blooms of squares of 3 x 3 pixels, each made once; `dark` is that of a black image."""
+    """The blooms of rectangles, each made once; `dark` is that of a black image."""
 
     bloom: Bloom
     probe: Probe
     dark: Image
-    made: dict[tuple[int, int], tuple[Image, float]] = dataclasses.field(default_factory=dict)
+    made: dict[Any, tuple[Image, float]] = dataclasses.field(default_factory=dict)
 
-    def spread(self, at: tuple[int, int]) -> tuple[Image, float]:
-        """Return the bloom of a square from a pixel on, less that of black, and its error."""
+    def spread(
+        self, at: tuple[int, int], sides: tuple[int, int] = (_LIGHT, _LIGHT)
+    ) -> tuple[Image, float]:
+        """Return the bloom of a rectangle from a pixel on, less that of black, and its error."""
         __tracebackhide__ = True
-        if at not in self.made:
+        if (at, sides) not in self.made:
             image = self.probe.flat(0.0)
-            image[at[1] : at[1] + _LIGHT, at[0] : at[0] + _LIGHT] = self.probe.value
+            image[at[1] : at[1] + sides[1], at[0] : at[0] + sides[0]] = self.probe.value
             lit, error = self.probe.apply(self.bloom, image)
-            self.made[at] = lit - self.dark, 2 * error
-        return self.made[at]
+            self.made[at, sides] = lit - self.dark, 2 * error
+        return self.made[at, sides]
 
 
 @checked
@@ -83,8 +83,6 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
     ------
     AssertionError
         A result is not finite, or the bloom of the light in the middle is black.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
@@ -105,7 +103,7 @@ def assert_border(
     standard deviations of h from an edge, the bloom is h, cut off by the frame ("inside" is the
     light that differs, "wrap" that at the opposite edge, as shares of E of the middle). At the
     border, E is at least the part of h that is in the frame, less "lost", and at most "edge" or
-    "corner" times E of the middle. The bloom of a flat image is the same in a corner as in the
+    "corner" times E of the middle. The bloom of a flat image is the same at the border as in the
     middle, within "flat". The bloom of a black image does not show the image before ("stale").
 
     Parameters
@@ -121,35 +119,47 @@ def assert_border(
     ------
     AssertionError
         The law does not hold, the result is black, or it is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or a law of what is near the border cannot be tested, since
-        light from the middle reaches it.
     """
     __tracebackhide__ = True
     allowed = BORDER_LIMITS | dict(limits or {})
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
-    lights = _Lights(bloom, probe, _check_stale(bloom, probe, allowed["stale"]))
+    dark, flat = _check_stale(bloom, probe, allowed["stale"])
+    lights = _Lights(bloom, probe, dark)
     share = border_share(_expected(lights, probe.centre)[0])
-    told = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
-    told += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
-    flat = probe.apply(bloom, probe.flat(probe.value))[0]
-    middle = float(flat[probe.centre[1], probe.centre[0]].mean())
-    if middle > 0:
-        off = abs(float(flat[0, 0].mean()) / middle - 1)
-        if not is_within(law, off, allowed["flat"], "flat"):
-            told.append(
-                f"a flat image has {flat[0, 0].mean() / middle:.3g} times as much bloom in the "
-                "corner as in the middle"
-            )
-    if told:
-        fail("assert_border", law, "; ".join(told))
+    reasons = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
+    reasons += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
+    reasons += _flat(flat, dark, probe, allowed["flat"], law)
+    if reasons:
+        fail("assert_border", law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
+
+
+def _flat(flat: Image, dark: Image, probe: Probe, allowed: float, law: str) -> list[str]:
+    """Return what is wrong with the outermost pixels of the blooms of a flat and a black image."""
+    x, y = probe.centre
+    reasons = []
+    rings = [
+        np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]).mean(axis=1)
+        for image in (flat, dark)
+    ]
+    glow = float(np.abs(rings[1] - dark[y, x].mean()).max()) / probe.value
+    if not is_within(law, glow, allowed, "dark"):
+        reasons.append(f"a black image has {glow:.3g} of the light of a flat one at its border")
+    ring, middle = rings[0], float(flat[y, x].mean())
+    if middle > 0:
+        farthest = float(ring[np.abs(ring - middle).argmax()]) / middle
+        if not is_within(law, abs(farthest - 1), allowed, "flat"):
+            reasons.append(
+                f"a flat image has {farthest:.3g} times as much bloom in its outermost pixels as "
+                "in the middle"
+            )
+    return reasons
 
 
 def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> list[str]:
     """Return what is wrong with lights 1.5 standard deviations from an edge."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _near(lights).items():
         found, error = lights.spread(at)
         expected, energy = _expected(lights, at)
@@ -161,24 +171,21 @@ def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> li
         quarter = len(profile) // 4
         wrapped = profile[-quarter:].sum() - profile[-2 * quarter : -quarter].sum()
         shares = {"wrap": max(0.0, float(wrapped)), "inside": float(profile.sum())}
-        told += [
+        reasons += [
             f"{100 * share:.3g} % of the light of a square near the {name} edge is "
             + ("at the opposite side" if kind == "wrap" else "where the middle has none")
             for kind, share in shares.items()
             if not is_within(law, share, allowed[kind], kind)
         ]
-    return told
+    return reasons
 
 
 def _at_the_border(
     lights: _Lights, allowed: dict[str, float], law: str, *, complete: bool
 ) -> list[str]:
-    """Return what is wrong with lights in the outermost pixels.
-
-    `complete`: whether the frame holds the whole bloom of a light in the middle.
-    """
+    """Return what is wrong with lights in the outermost pixels."""
     __tracebackhide__ = True
-    told = []
+    reasons = []
     for name, at in _places(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
@@ -187,32 +194,45 @@ def _at_the_border(
         figure(f"energy_{name}", share)
         lost = max(0.0, inside - share)
         if complete and not is_within(law, lost, allowed["lost"], "lost"):
-            told.append(
+            reasons.append(
                 f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the frame"
             )
         if not is_within(law, share, allowed[kind], kind):
-            told.append(f"a light at the {name} swells to {share:.3g} times its energy")
-    return told
-
-
-def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> Image:
-    """Return the bloom of black, the same before and after that of a bright, larger image."""
-    __tracebackhide__ = True
-    width, height = probe.size
-    larger = dataclasses.replace(probe, size=(width + _LARGER, height + _LARGER))
-    before = probe.apply(bloom, probe.flat(0.0))[0]
-    larger.apply(bloom, larger.flat(probe.value))
-    after = probe.apply(bloom, probe.flat(0.0))[0]
-    off = float(np.abs(after - before).max()) / probe.value
-    law = "the bloom of an image does not depend on the image before"
-    if not is_within(law, off, allowed, "stale"):
-        y, x, _ = np.unravel_index(int(np.abs(after - before).argmax()), after.shape)
-        fail(
-            "assert_border",
-            law,
-            f"after a bright image, a black one has {off:.3g} of its light at x {x}, y {y}",
+            reasons.append(f"a light at the {name} swells to {share:.3g} times its energy")
+    x, height = _PERIOD * round(lights.probe.centre[0] / _PERIOD), lights.probe.size[1]
+    outermost, inner = (float(lights.spread((left, 0), (1, height))[0].sum()) for left in (0, x))
+    if inner > 0 and not is_within(law, max(0.0, 0.5 - outermost / inner), 0.25, "column"):
+        reasons.append(
+            f"a line in the outermost column has {outermost / inner:.3g} of the energy of one in "
+            "the middle"
         )
-    return after
+    return reasons
+
+
+def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> tuple[Image, Image]:
+    """Return the blooms of black and of a flat image; black is the same after bright images."""
+    __tracebackhide__ = True
+    width, height = (beside_multiple(min(side, 144)) + 3 for side in probe.size)
+    smaller = dataclasses.replace(
+        probe, size=(min(width, probe.size[0]), min(height, probe.size[1]))
+    )
+    dark = probe.apply(bloom, probe.flat(0.0))[0]
+    flat = dark
+    law = "the bloom of an image does not depend on the image before"
+    for name, used in ((", larger", smaller), ("", probe)):
+        flat = probe.apply(bloom, probe.flat(probe.value))[0]
+        after = used.apply(bloom, used.flat(0.0))[0]
+        rise = np.abs(after) - float(np.abs(dark).max()) if name else np.abs(after - dark)
+        off = float(rise.max()) / probe.value
+        if not is_within(law, off, allowed, "stale"):
+            y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
+            fail(
+                "assert_border",
+                law,
+                f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, "
+                f"y {y}",
+            )
+    return dark, flat
 
 
 @checked
@@ -220,8 +240,8 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
     """Assert that no light crosses from one view of a picture to the other.
 
     The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two
-    views side by side, as for the two eyes of a headset. The left one has noise, the right one is
-    black or has the same noise; then the other way round.
+    views, side by side and then one above the other, as for the two eyes of a headset. One has
+    noise, the other one is black or has noise, too; then the other way round.
 
     Parameters
     ----------
@@ -238,24 +258,23 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` takes no region, or returns an image of another size.
     """
     __tracebackhide__ = True
     if not takes(bloom, "region"):
         raise NotTaken("bloom: it takes no keyword region, so views are not told apart")
-    width, height = probe.size
     noise = [probe.noise(index, probe.value) for index in (0, 1)]
     law = "the bloom of a view depends on the pixels of that view alone"
-    for side, name in enumerate(("left", "right")):
+    for side, name in enumerate(("left", "right", "upper", "lower")):
+        axis, second = 1 - side // 2, side % 2
+        corner = second * np.array(probe.size) * (axis == 1, axis == 0)
         results = []
-        for other in (probe.flat(0.0), noise[1 - side]):
-            views = [noise[side], other] if side == 0 else [other, noise[side]]
-            given = probe.given(np.concatenate(views, axis=1))
-            found = np.asarray(bloom(given, region=(side * width, 0, width, height)))  # type: ignore[call-arg]
-            if found.shape[1] == 2 * width:
-                found = found[:, side * width : (side + 1) * width]
-            results.append(probe.values(found, probe.given(noise[side])))
+        for other in (probe.flat(0.0), noise[1 - second]):
+            views = [other, noise[second]] if second else [noise[second], other]
+            given = probe.given(np.concatenate(views, axis=axis))
+            found = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
+            if found.shape[:2] == given.shape[:2]:
+                found = np.split(found, 2, axis=axis)[second]
+            results.append(probe.values(found, probe.given(noise[second])))
         (alone, error), (beside, _) = results
         off = np.abs(beside - alone)
         largest = float(np.abs(alone).max()) or 1.0

@@ -7,26 +7,32 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from vkbloom.testing._shape import LEVELS
+
 __all__ = ["Change", "changes", "newly_broken"]
 
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
 #: Figures by name: their place in the values of a bloom, and whether less of them is better.
-_FIGURES: Final[Mapping[str, tuple[str, bool]]] = {
-    "gain": ("gain", False),
-    "energy of a pixel": ("energy", False),
-    "50 % within, pixels": ("psf.r50", False),
-    "90 % within, pixels": ("psf.r90", False),
-    "peak": ("psf.peak", False),
-    "ripple": ("stability.ripple", True),
-    "jitter, pixels": ("stability.jitter", True),
-    "shimmer": ("stability.shimmer", True),
-    "growth": ("stability.growth", True),
-    "veiling glare index, %": ("veiling_glare_index", False),
+_FIGURES: Final[Mapping[str, tuple[tuple[str, ...], bool]]] = {
+    "gain": (("gain",), False),
+    "energy of a pixel": (("energy",), False),
+    "50 % within, pixels": (("psf", "r50"), False),
+    "90 % within, pixels": (("psf", "r90"), False),
+    "peak": (("psf", "peak"), False),
+    **{
+        f"roundness at {level:g}": (("laws", "round", "figures", f"round_{level:g}"), True)
+        for level in LEVELS
+    },
+    "ripple": (("stability", "ripple"), True),
+    "jitter, pixels": (("stability", "jitter"), True),
+    "shimmer": (("stability", "shimmer"), True),
+    "growth": (("stability", "growth"), True),
+    "veiling glare index, %": (("veiling_glare_index",), False),
 }
-# What counts as a change: of a deviation, as a share of its limit; of a figure, as a share of
+# What counts as a change: of a deviation, in shares of its limit, and of a figure, as a share of
 # itself and at least so much; of a time, as a share, since a shared machine repeats it within that.
-_LAW: Final = 0.1
+_LAW: Final = (0.1, 0.25)
 _FIGURE: Final = (0.02, 1e-3)
 _TIME: Final = 0.2
 
@@ -61,8 +67,8 @@ def newly_broken(found: Sequence[Change], required: Sequence[str]) -> list[str]:
 
 def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
     untested: Mapping[str, Any] = {"held": None, "off": None, "limit": None}
-    for name in dict.fromkeys([*after["laws"], *before["laws"]]):
-        old, new = (side["laws"].get(name, untested) for side in (before, after))
+    for name, new in after["laws"].items():  # a law that does not apply to both tells nothing
+        old = before["laws"].get(name, untested)
         was, now = _share(old), _share(new)
         verdict: Verdict
         if old["held"] != new["held"]:
@@ -70,7 +76,7 @@ def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Chang
             lost = new["held"] is False or old["held"]
             verdict = "broken" if lost else "mended" if old["held"] is False else "changed"
         else:
-            verdict = _verdict(was, now, 0.0 if old["held"] else _LAW, _LAW, less=True)
+            verdict = _verdict(was, now, *_LAW, less=True)
         yield Change(
             kind="law",
             name=name,
@@ -106,10 +112,10 @@ def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Ch
         )
 
 
-def _at(values: Mapping[str, Any], place: str) -> float | None:
+def _at(values: Mapping[str, Any], place: Sequence[str]) -> float | None:
     found: Any = values
-    for key in place.split("."):
-        found = found[key]
+    for key in place:
+        found = found.get(key)
     return None if found is None else float(found)
 
 
@@ -146,14 +152,14 @@ def _verdict(
 
 def summary(found: Sequence[Change]) -> str:
     """Return which laws, figures and times got better and worse, as a sentence for each verdict."""
-    told = []
+    reasons = []
     for verdict in ("broken", "mended", "worse", "better"):
         names = [one.name for one in found if one.verdict == verdict and one.name != "together"]
         times = [one for one in found if one.verdict == verdict and one.name == "together"]
         names += [f"time ({_ratio(one)})" for one in times]
         if names:
-            told.append(f"{verdict}: {', '.join(names)}")
-    return "; ".join(told) or "nothing got better or worse"
+            reasons.append(f"{verdict}: {', '.join(names)}")
+    return "; ".join(reasons) or "nothing got better or worse"
 
 
 def _ratio(change: Change) -> str:

@@ -35,8 +35,6 @@ def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:
         The file does not exist or cannot be opened; the error names it.
     ValueError
         The file is damaged or not such an image; the error names it.
-    ModuleNotFoundError
-        OpenImageIO is missing: ``pip install vkbloom[images]``.
     """
     stored = image_reading.load(path)
     try:

@@ -86,16 +86,6 @@ class LawReport:
     untaken : tuple of str
         What the bloom does not take, of "region" and "time": `views` is not tested without a
         region; without a time, `history` tests the order of the images alone.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable())
-    >>> found = testing.report(bloom, size=(64, 64))
-    >>> [row.name for row in found.rows if not row.held]
-    ['bounded_fireflies', 'additive', 'energy', 'resolution', 'views']
-    >>> found.assert_held("superposition", "gain", "symmetric")
     """
 
     rows: tuple[LawRow, ...]
@@ -214,11 +204,6 @@ def report(
     Returns
     -------
     LawReport
-
-    Raises
-    ------
-    TypeError, ValueError
-        `bloom` is not such a callable, or a law is unknown.
 
     Examples
     --------

@@ -24,7 +24,7 @@ from vkbloom.testing._subject import TEXEL, Subject
 
 # Positions along the diagonal: a period of a chain of four halvings.
 _PERIOD: Final = 16
-# A mean shift that is told, in pixels, and how near its texel is to a whole number of pixels.
+# A mean shift that is named, in pixels, and how near its texel is to a whole number of pixels.
 _SHIFT: Final = 0.05
 _COLOUR: Final = (1.0, 0.5, 0.25)
 # Gains that are 1 but for roundings; the values whose mean gain is measured; and its limit.
@@ -229,8 +229,8 @@ def reference(subject: Subject, limit: float) -> None:
     found = subject.reference
     over = [name for name, off in found.items() if not is_within(law, off, limit, name)]
     if over:
-        told = ", ".join(f"{name} is off by {found[name]:.3g}" for name in over)
-        fail("assert_reference", law, f"{told} of its largest value, {limit:g} allowed")
+        names = ", ".join(f"{name} is off by {found[name]:.3g}" for name in over)
+        fail("assert_reference", law, f"{names} of its largest value, {limit:g} allowed")
 
 
 def shift_explained(subject: Subject, why: str) -> str:

@@ -345,20 +345,6 @@ def first_infected(
     -------
     str or None
         The name; None if no framebuffer is infected.
-
-    Raises
-    ------
-    TypeError, ValueError
-        The probe is of integers, or `bloom` returns no mapping.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> def frames(image):
-    ...     half = image[::2, ::2]
-    ...     return {"half": half, "final": image}
-    >>> testing.first_infected(frames, testing.Probe(size=(8, 8)))
-    'half'
     """
     if probe.dtype.kind == "u":
         raise ValueError(f"probe: {probe.dtype} has neither NaN nor infinity")

@@ -59,6 +59,7 @@ class Measured:
     report: LawReport
     spread: Spread
     veiling_glare_index: float
+    first_infected: str | None
     nearest: tuple[str, float]
 
 
@@ -164,6 +165,7 @@ def measured(
             patch=max(1, min(probe.size) // 8),
             value=probe.value,
         ),
+        first_infected=subject.first_infected,
         nearest=nearest_preset(name, subject.bloom, renderer),
     )
 
@@ -222,7 +224,7 @@ def spread_of(array: Array, probe: Probe) -> Spread:
 
 def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     """Return the difference from the reference by framebuffer, as a share of its largest value."""
-    if isinstance(settings, CustomMethod) and type(settings).twin is None:
+    if isinstance(settings, CustomMethod) and type(settings).numpy_reference is None:
         return {}
     image = noise((96, 64), 2).astype(np.float32)
     expected = reference.apply(image, settings)

@@ -264,7 +264,7 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
             "allowed",
         )
     check_inside(found.at_border, probe.size)
-    told = {
+    shown = {
         "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
         "jitter": (
             np.hypot(found.shift[..., 0], found.shift[..., 1]),
@@ -279,13 +279,13 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
         "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
     }
     laws = {
-        name: f"{told[name][1]} stays the same while a light smaller than a pixel moves"
+        name: f"{shown[name][1]} stays the same while a light smaller than a pixel moves"
         for name in limits
     }
     off = {name: getattr(found, name) for name in limits}
     over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
     for name in over[:1]:
-        values, what, how = told[name]
+        values, what, how = shown[name]
         fail(
             "assert_stable",
             laws[name],
@@ -297,14 +297,7 @@ def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) ->
 def area_sampled(
     size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
 ) -> Image:
-    """Return the share of each pixel that a rectangle covers.
-
-    - `size`: Width and height of the image in pixels.
-    - `centre`: x and y in pixels; the centre of the first pixel is (0, 0).
-    - `sides`: Width and height of the rectangle in pixels.
-    - Returns: ndarray of float64, shape (H, W): 0 to 1. Their sum is the rectangle's area, as far
-      as it is inside.
-    """
+    """Return the share of each pixel that a rectangle covers."""
     covered = []
     for count, place, side in zip(size, centre, sides, strict=True):
         edges = np.arange(count + 1) - 0.5

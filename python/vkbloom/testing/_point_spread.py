@@ -293,16 +293,6 @@ def response(
     Returns
     -------
     Response
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image, sigma):
-    ...     weights = vkbloom.gaussian_weights(sigma)
-    ...     settings = vkbloom.Separable(weights=weights, blur_strength=1.0)
-    ...     return reference.blur(image, settings)
-    >>> testing.response(bloom, "sigma", [1.0, 2.0]).sigma[:, 0].round(1)
-    array([1., 2.])
     """
     __tracebackhide__ = True
     if not len(values):

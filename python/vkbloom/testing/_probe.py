@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size
 
-__all__ = ["Bloom", "Image", "Probe"]
+__all__ = ["Bloom", "Image", "Probe", "beside_multiple", "small_probe"]
 
 #: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
@@ -56,14 +56,6 @@ class Probe:
         for float.
     seed : int
         Seed of the noise images.
-
-    Examples
-    --------
-    >>> from vkbloom import testing
-    >>> probe = testing.Probe(size=(32, 24), dtype="float16", value=4.0)
-    >>> probe.centre
-    (16, 12)
-    >>> testing.assert_gain(lambda image: image, 1.0, probe)
     """
 
     size: tuple[int, int] = (65, 65)
@@ -219,3 +211,15 @@ class Probe:
     def _real(array: NDArray[Any]) -> Image:
         values: Image = array.astype(np.float64)
         return values / np.iinfo(array.dtype).max if array.dtype.kind == "u" else values
+
+
+def small_probe(probe: Probe) -> Probe:
+    """Return the probe with an image of at most 64 x 64 pixels, where the size does not matter."""
+    width, height = probe.size
+    return replace(probe, size=(min(width, 64), min(height, 64)))
+
+
+def beside_multiple(side: int) -> int:
+    """Return a multiple of 16 up to a side that is no power of 2, at least 48."""
+    multiple = max(3, side // 16)
+    return 16 * (multiple - (multiple & (multiple - 1) == 0))

@@ -66,11 +66,6 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
         does not exist or writes nothing, ValueError if its file cannot be read, has another size,
         or has NaN or infinity where the image has none. A file of 8 bits is a UserWarning, once.
 
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is out of range, or `argv` lacks ``{input}`` or ``{output}``.
-
     Examples
     --------
     >>> from vkbloom import testing

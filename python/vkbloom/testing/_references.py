@@ -113,10 +113,7 @@ class ReferenceFolder:
     def write(
         self, name: str, images: Mapping[str, NDArray[Any]], origin: Origin, *, add: bool
     ) -> None:
-        """Write a reference.
-
-        `images`: (H, W) or (H, W, C) of up to 4 channels, uint8, uint16, float16 or float32.
-        """
+        """Write a reference."""
         check_name(name)
         for framebuffer, image in images.items():
             _check_image(framebuffer, image)

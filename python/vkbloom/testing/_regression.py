@@ -17,6 +17,7 @@ from vkbloom._checks import native_order
 from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
+from vkbloom.testing import _hashes as hashes
 from vkbloom.testing import _report_parts as report_parts
 from vkbloom.testing._judging import Verdict, first_failure, judge
 from vkbloom.testing._records import Record
@@ -50,6 +51,7 @@ class Mode:
     - `update`: Whether to replace the references of failed checks.
     - `add`: Whether to write further references for failed checks, and keep the existing ones.
     - `allow_missing`: Whether a check without a reference passes.
+    - `hashed`: Whether references are hashes, and every value must be equal.
     - `expect_adapter`: A part of the name or driver of the adapter that frames must come from.
     - `parts`: Folder for the report's pictures of failed checks; None: no report.
     """
@@ -57,6 +59,7 @@ class Mode:
     update: bool = False
     add: bool = False
     allow_missing: bool = False
+    hashed: bool = False
     expect_adapter: str | None = None
     parts: Path | None = None
 
@@ -85,15 +88,6 @@ class FrameRegression:
     mode : Mode
     records : list of dict
         Each check appends its result.
-
-    Examples
-    --------
-    A test in a module ``test_blur.py``, whose references are made by ``pytest --bloom-update``:
-
-    >>> def test_blur(bloom_renderer, frame_regression):
-    ...     image = np.full((16, 16, 4), 0.5, np.float32)
-    ...     frames = bloom_renderer.apply(image, vkbloom.Pyramid(levels=2))
-    ...     frame_regression.check(frames, atol=1e-3)
     """
 
     def __init__(
@@ -146,9 +140,6 @@ class FrameRegression:
         AssertionError
             The frames differ, or there is no reference. The message names the position and the
             remedy.
-        TypeError, ValueError
-            An argument is wrong, or a reference's file is damaged; with `exact`, the driver of the
-            frames has no hash, or no reference has the same one.
         OSError
             A file cannot be read or written.
         """
@@ -164,6 +155,9 @@ class FrameRegression:
             self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
         )
         self._check_adapter(given.origin)
+        if self._mode.hashed:
+            self._check_hashes(given)
+            return
         references = self._folder.load(given.name)
         if exact:
             references = self._of_one_driver(references, given)
@@ -204,8 +198,6 @@ class FrameRegression:
         ------
         AssertionError
             The frames differ.
-        TypeError, ValueError
-            An argument is wrong.
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)
@@ -263,6 +255,36 @@ class FrameRegression:
                 "vkbloom-lavapipe, or write a reference with --bloom-update or --bloom-add"
             )
         return same
+
+    def _check_hashes(self, given: _Given) -> None:
+        """Compare the hashes of the images with those that the same driver drew."""
+        __tracebackhide__ = True
+        driver = given.origin.driver_sha256
+        if not driver:
+            raise ValueError(
+                f"--bloom-hash: the driver of the frames has no hash ({given.origin.summary}); "
+                "use the driver of vkbloom-lavapipe"
+            )
+        file = self._folder.file(given.name).with_suffix(".hashes")
+        listed, found = hashes.load(file), hashes.hashes_of(given.images)
+        expected = listed.get(driver)
+        message = (
+            "there is no reference" if expected is None else hashes.difference(expected, found)
+        )
+        if message and (self._mode.update or self._mode.add):
+            hashes.save(file, {**(listed if self._mode.add else {}), driver: found})
+            self._record(given, "written", None)
+            return
+        missing = expected is None
+        outcome = "missing" if missing else "failed" if message else "passed"
+        record = self._record(given, outcome, None)
+        record["has_files"] = False
+        if message and not (missing and self._mode.allow_missing):
+            record["message"] = (
+                f"{given.name}: {message} of {file} for the driver {driver[:12]}. Compare images "
+                "without --bloom-hash, or write a reference with --bloom-update or --bloom-add"
+            )
+            raise AssertionError(record["message"])
 
     def _without_reference(self, given: _Given) -> None:
         __tracebackhide__ = True

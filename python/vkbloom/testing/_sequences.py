@@ -116,11 +116,6 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
     -------
     Flash
 
-    Raises
-    ------
-    TypeError, ValueError
-        There are less than two frames, they have different sizes, or a number is out of range.
-
     Notes
     -----
     Source: W3C, Web Content Accessibility Guidelines 2.2, success criterion 2.3.1 and "general
@@ -268,11 +263,6 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     Flicker
         With the package ``cvvdp``, `jod` compares the sequence with its mean picture, as
         ColorVideoVDP does for a standard display in 4K; all frames are then held in memory.
-
-    Raises
-    ------
-    TypeError, ValueError
-        There are less than two frames, they have different sizes, or `fps` is out of range.
 
     Notes
     -----

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
@@ -15,7 +14,7 @@ from vkbloom._checks import check_number
 from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within
 from vkbloom.testing._moving_light import area_sampled
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
 from vkbloom.testing._programs import RATE
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
@@ -30,10 +29,8 @@ HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 _FRAMES: Final = 60
 _FEW_FRAMES: Final = 8
 # Bisections of a threshold, and the lowest value that is tried, as a share of the probe's.
-_HALVINGS: Final = 12
+_HALVINGS: Final = 8
 _LEAST: Final = 2.0**-12
-# Of the images of thin scenes in pixels.
-_SIDE: Final = 64
 
 
 def halton(count: int) -> NDArray[np.float64]:
@@ -85,23 +82,21 @@ def assert_jitter(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable.
     """
     __tracebackhide__ = True
     check_number("feedback", feedback, 0.0, 1.0)
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
-    told = []
-    small = dataclasses.replace(probe, size=(min(probe.size[0], _SIDE), min(probe.size[1], _SIDE)))
+    reasons = []
+    small = small_probe(probe)
     for name, scene in _SCENES.items():
         frames = [scene(small, x, y) for x, y in halton(16)]
-        resolved = list(_taa(frames, feedback))[::4]
+        resolved = list(_taa(frames, feedback))[::6]
         lights, settled = (
             np.array([_light(bloom, small, frame) for frame in part]) for part in (frames, resolved)
         )
         if not lights.mean() > 0:
-            told.append(f"the bloom of a thin {name} is black in all frames")
+            reasons.append(f"the bloom of a thin {name} is black in all frames")
             is_within(law, math.inf, allowed["flicker"], "flicker")
             continue
         for kind, where, values in (
@@ -112,18 +107,18 @@ def assert_jitter(
             off = float(np.ptp(values) / values.mean())
             figure(f"{name}, {where}", off)
             if not is_within(law, off, allowed[kind], kind):
-                told.append(
+                reasons.append(
                     f"{name}, {where}: the light changes by {off:.3g} of its mean, "
                     f"{allowed[kind]:g} allowed"
                 )
     ratio = _threshold_ratio(bloom, small)
     if not is_within(law, ratio, allowed["threshold"], "threshold"):
-        told.append(
+        reasons.append(
             f"a lit pixel blooms from {ratio:.3g} times the value on that a flat image needs: the "
             "threshold reads an average"
         )
-    if told:
-        fail("assert_jitter", law, "; ".join(told))
+    if reasons:
+        fail("assert_jitter", law, "; ".join(reasons))
 
 
 def _point(probe: Probe, x: float, y: float) -> Image:
@@ -137,10 +132,17 @@ def _line(probe: Probe, x: float, y: float) -> Image:
 
 def _angled(probe: Probe, x: float, y: float) -> Image:
     """Return a line at an angle, as squares whose centres are a quarter of a pixel apart."""
-    total = np.zeros((probe.size[1], probe.size[0]))
-    for step in np.arange(-12, 12, 0.25):
-        at = (probe.centre[0] + x + step, probe.centre[1] + y + step / 3)
-        total += area_sampled(probe.size, at, (0.25, 0.5))
+    steps = np.arange(-12, 12, 0.25)
+    squares = (
+        (probe.centre[0] + x + steps, probe.size[0], 0.25),
+        (probe.centre[1] + y + steps / 3, probe.size[1], 0.5),
+    )
+    columns, rows = (
+        np.diff(np.clip(np.arange(count + 1) - 0.5, at - side / 2, at + side / 2))
+        for places, count, side in squares
+        for at in (places[:, np.newaxis],)
+    )
+    total: Image = rows.T @ columns
     return total
 
 
@@ -174,8 +176,8 @@ def _threshold_ratio(bloom: Bloom, probe: Probe) -> float:
         image = probe.point(probe.centre, value) if pixel else probe.flat(value)
         return bool(probe.apply(bloom, image)[0].max() > 1e-6 * value)
 
-    def least(pixel: bool) -> float:
-        low, high = _LEAST * probe.value, probe.value
+    def least(pixel: bool, low: float) -> float:
+        high = probe.value
         for _ in range(_HALVINGS):
             middle = math.sqrt(low * high)
             low, high = (low, middle) if blooms(middle, pixel) else (middle, high)
@@ -183,7 +185,8 @@ def _threshold_ratio(bloom: Bloom, probe: Probe) -> float:
 
     if blooms(_LEAST * probe.value, False) or not blooms(probe.value, True):
         return 1.0
-    return least(True) / least(False)
+    flat = least(False, _LEAST * probe.value)
+    return 1.0 if blooms(flat, True) else least(True, flat) / flat
 
 
 @checked
@@ -210,12 +213,11 @@ def assert_history(
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or the bloom is black.
     """
     __tracebackhide__ = True
     allowed = HISTORY_LIMITS | dict(limits or {})
     law = "the bloom of an image depends on that image alone"
+    probe = small_probe(probe)
     clock = iter(range(1 << 30))
 
     def at(image: Image) -> Image:
@@ -237,19 +239,19 @@ def assert_history(
     sums = np.array([image.sum() for image in images[count // 2 :]])
     steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
     figure("frames", float(sum(share > allowed["stays"] for share in left)))
-    told = []
+    reasons = []
     if not is_within(law, steady, allowed["steady"], "steady"):
-        told.append(
+        reasons.append(
             f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
         )
     if not is_within(law, left[0], allowed["stays"], "stays"):
-        told.append(
+        reasons.append(
             f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
             f"and {sum(share > allowed['stays'] for share in left)} frames are above "
             f"{allowed['stays']:g}"
         )
-    if told:
-        fail("assert_history", law, "; ".join(told))
+    if reasons:
+        fail("assert_history", law, "; ".join(reasons))
 
 
 def _square(probe: Probe, at: tuple[int, int]) -> Image:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, is_within
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
 
 __all__ = ["assert_alpha"]
 
@@ -42,20 +42,16 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
     ------
     AssertionError
         The law does not hold, or a result is not finite.
-    TypeError, ValueError
-        `bloom` is not such a callable, or does not take alpha.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)
     if probe.dtype.kind == "u" or probe.colours < 3:
         raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
-    glow, is_picture = _colours_alike(bloom, probe, *_lights(probe, (1.0, 0.5)), limit)
+    probe = small_probe(probe)
+    colours, alpha = _lights(probe)
+    glow, opaque, is_picture = _colours_alike(bloom, probe, colours, alpha, limit)
     if not is_picture:
         return
-    # Without half transparent lights: a threshold of their sum with the backdrop is not linear.
-    colours, alpha = _lights(probe, (1.0,))
-    glow = _apply(bloom, probe, colours, alpha)
-    alone = _apply(bloom, probe, colours, np.ones_like(alpha))[..., :3]
     law = "the picture over any backdrop looks as if it had been flattened first"
     for level in _BACKDROPS:
         behind = (1 - alpha) * level * np.ones(3)
@@ -64,18 +60,18 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
         backdrop = _apply(bloom, probe, behind, np.ones_like(alpha))[..., :3]
         off = seen - (flattened - backdrop + behind)
         # A threshold of an average of light and backdrop is not linear, whatever the alpha.
-        bend = np.abs(flattened - backdrop - alone)
+        bend = np.abs(flattened - backdrop - opaque)
         off = np.sign(off) * np.maximum(np.abs(off) - bend, 0)
         _judge(law, off, colours.max(), limit, f"over a backdrop of {level:g}, ")
 
 
-def _lights(probe: Probe, shares: tuple[float, ...]) -> tuple[Image, Image]:
-    """Return the colours and the alpha of lights, one for each alpha that is given."""
+def _lights(probe: Probe) -> tuple[Image, Image]:
+    """Return the colours and the alpha of two lights, one opaque and one half transparent."""
     width, height = probe.size
     alpha = np.zeros((height, width, 1))
     colours = np.zeros((height, width, 3))
     x, y = probe.centre
-    for share, (left, top) in zip(shares, ((x - 8, y - 8), (x + 4, y + 2)), strict=False):
+    for share, left, top in ((1.0, x - 8, y - 8), (0.5, x + 4, y + 2)):
         window = np.s_[max(0, top) : top + 5, max(0, left) : left + 5]
         alpha[window] = share
         colours[window] = share * probe.value * np.array([1.0, 0.5, 0.75])
@@ -84,21 +80,22 @@ def _lights(probe: Probe, shares: tuple[float, ...]) -> tuple[Image, Image]:
 
 def _colours_alike(
     bloom: Bloom, probe: Probe, colours: Image, alpha: Image, limit: float
-) -> tuple[Image, bool]:
-    """Return the result over transparent ground, and whether it is a picture with alpha."""
+) -> tuple[Image, Image, bool]:
+    """Return the results over transparent ground and with an alpha of 1.
+
+    And whether they are pictures with alpha.
+    """
     __tracebackhide__ = True
     try:
         found = _apply(bloom, probe, colours, alpha)
     except (TypeError, ValueError) as error:
         raise NotTaken(f"bloom: it takes no image of four channels ({error})") from None
-    opaque = _apply(bloom, probe, colours, np.ones_like(alpha))
+    opaque = _apply(bloom, probe, colours, np.ones_like(alpha))[..., :3]
     law = "the colours of a premultiplied bloom do not depend on alpha"
-    _judge(law, found[..., :3] - opaque[..., :3], colours.max(), limit, "")
-    # A picture contains its image; the bloom alone has another light, or no alpha of its own.
-    is_picture = found.shape[2] == 4 and bool(
-        (found[..., :3] >= colours - limit * colours.max()).all() and np.ptp(found[..., 3]) > 0
-    )
-    return found, is_picture
+    _judge(law, found[..., :3] - opaque, colours.max(), limit, "")
+    # A picture contains its image; the bloom alone has another light.
+    contains = bool((found[..., :3] >= colours - limit * colours.max()).all())
+    return found, opaque, contains and found.shape[2] == 4
 
 
 def _apply(bloom: Bloom, probe: Probe, colours: Image, alpha: Image) -> Image:

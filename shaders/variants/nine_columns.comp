@@ -11,7 +11,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = HDRP_OUTPUTS;  // COLUMNS: of a word
+const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = NINE_OUTPUTS;  // COLUMNS: of a word
 const int LOADED = COLUMNS;
 
 #include "variants/runs.glsl"
