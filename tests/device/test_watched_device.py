@@ -59,7 +59,7 @@ NONE = 1
 #: What rows need that others have replaced each time, and an image that was uploaded for any plan.
 LEFT = {
     "fragment": "",
-    "cpu": r"final|scene|down_\d(_across)?",
+    "cpu": r"final|scene|image|cotangents_0|down_\d(_across)?",
     "gpu": "image|adjoint_weights",
 }
 
