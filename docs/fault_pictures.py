@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom._io.srgb import encode_srgb
-from vkbloom._views.pictures import sheet
 from vkbloom.testing._law_table import LAWS
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.plugin.faults import FAULTS, Bloom, Image
 
 CELL = (192, 144)
+GREY = 40
 BACKDROP = 0.25
 
 
@@ -67,16 +67,21 @@ def drawn(bloom: Bloom, law: str, words: str) -> Image:
 
 
 def tile(image: Image, brightest: float) -> NDArray[np.uint8]:
-    """Return an image in sRGB, enlarged to a cell."""
+    """Return an image in sRGB, enlarged to the middle of a cell."""
     shown = encode_srgb(np.clip(image.astype(np.float64) / brightest, 0, 1))
     times = min(CELL[0] // image.shape[1], CELL[1] // image.shape[0])
-    return np.rint(255 * shown).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)
+    pixels = np.rint(255 * shown).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)
+    cell = np.full((CELL[1], CELL[0], 3), GREY, np.uint8)
+    top, left = (CELL[1] - pixels.shape[0]) // 2, (CELL[0] - pixels.shape[1]) // 2
+    cell[top : top + pixels.shape[0], left : left + pixels.shape[1]] = pixels
+    return cell
 
 
 def write(folder: Path) -> None:
     """Write a picture for each fault, and the text that shows them by law."""
     folder.mkdir(parents=True, exist_ok=True)
     text: list[str] = []
+    gap = np.full((CELL[1], 8, 3), GREY, np.uint8)
     for law in LAWS:
         faults = {name: fault for name, fault in FAULTS.items() if fault.law == law}
         if faults:
@@ -84,18 +89,13 @@ def write(folder: Path) -> None:
         for name, fault in faults.items():
             right, wrong = (drawn(make(), law, fault.words) for make in (fault.twin, fault.fault))
             off: Any = np.abs(wrong.astype(np.float64) - right)
-            brightest = float(right.max())
-            tiles = [
-                (tile(right, brightest), "correct", ""),
-                (tile(wrong, brightest), name, ""),
-                (
-                    tile(off, float(off.max()) or 1.0),
-                    f"difference x {brightest / off.max():.3g}",
-                    "",
-                ),
+            brightest, most = float(right.max()), float(off.max())
+            tiles = [tile(right, brightest), gap, tile(wrong, brightest), gap, tile(off, most)]
+            place = folder / f"{name.replace(' ', '_')}.png"
+            vkbloom.write(place, np.concatenate(tiles, axis=1))
+            text += [
+                f"{name.capitalize()}; the difference is {brightest / most:.3g} times as bright:\n",
+                f"![{name}: correct, with the fault, and the difference]"
+                f"({'/'.join(place.parts[-3:])})\n",
             ]
-            file = f"{name.replace(' ', '_')}.png"
-            vkbloom.write(folder / file, sheet(tiles, 3, CELL))
-            place = f"{folder.parent.name}/{folder.name}/{file}"
-            text.append(f"![{name}: correct, with the fault, and the difference]({place})\n")
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")

@@ -305,11 +305,11 @@
     INPUT(B, float, gain)
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
-#define OWN_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, OWN_VEC4S)
-#define OWN_VEC4S                         64
+#define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, CUSTOM_VEC4S)
+#define CUSTOM_VEC4S                         64
 
 #define PARAMETER_BLOCKS(BLOCK) \
-    BLOCK(own, OWN_BLOCK) \
+    BLOCK(custom, CUSTOM_BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(threshold, THRESHOLD_BLOCK) \
     BLOCK(blur, BLUR_BLOCK) \

@@ -190,7 +190,7 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
                             "needs",
                             device->adapter.name, pass->name);
         // Plans without a renderer know no limits.
-        if (pass->block == VKB_BLOCK_own && device->limits.maxPerStageResources
+        if (pass->block == VKB_BLOCK_custom && device->limits.maxPerStageResources
             && !check_pass(device, pass, error))
             return false;
     }

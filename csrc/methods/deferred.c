@@ -126,7 +126,7 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
         .lit = vkb_has_glare(settings),
     };
     // Passes that were given at run time may read the scene.
-    const bool scene_first = settings->method == VKB_METHOD_OWN;
+    const bool scene_first = settings->method == VKB_METHOD_CUSTOM;
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {

@@ -50,7 +50,7 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
     };
 
     // Passes that were given at run time may read the scene.
-    const bool scene_first = settings->method == VKB_METHOD_OWN;
+    const bool scene_first = settings->method == VKB_METHOD_CUSTOM;
 
     if (scene_first && !add_scene(source, &params, graph, &composite.scene, error))
         return false;

@@ -11,7 +11,7 @@ static const float MIN_WEIGHT = 1e-4f;
 static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                      uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_godot_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
 
     row.constants.groups = GROUPS_GODOT_BLUR;
     row.constants.direction = direction;

@@ -146,11 +146,10 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
                           uint32_t from, uint32_t to, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_hdrp_blur_frag, from, to);
+    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
-    vkb_drop_reads(&row, 1);
     row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;
     row.constants.first = first;

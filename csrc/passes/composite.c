@@ -37,12 +37,14 @@ static struct vkb_composite_source composited(const struct vkb_settings *setting
                                               const struct vkb_composite_source *source,
                                               const struct vkb_graph *graph)
 {
-    const uint32_t own =
-        settings->method == VKB_METHOD_OWN ? vkb_graph_find(graph, VKB_OWN_PICTURE) : VKB_NO_IMAGE;
+    const uint32_t custom = settings->method == VKB_METHOD_CUSTOM
+                              ? vkb_graph_find(graph, VKB_CUSTOM_PICTURE)
+                              : VKB_NO_IMAGE;
 
-    return own == VKB_NO_IMAGE ? *source
-                               : (struct vkb_composite_source){
-                                     .scene = own, .bloom = VKB_NO_IMAGE, .mask = VKB_NO_IMAGE};
+    return custom == VKB_NO_IMAGE ? *source
+                                  : (struct vkb_composite_source){.scene = custom,
+                                                                  .bloom = VKB_NO_IMAGE,
+                                                                  .mask = VKB_NO_IMAGE};
 }
 
 bool vkb_add_composite(const struct vkb_settings *settings,

@@ -14,9 +14,9 @@ struct vkb_composite_source {
     enum vkb_alpha alpha;
 };
 
-// The picture that a method of its own may write: the composite then finishes it in place of the
+// The picture that a custom method may write: the composite then finishes it in place of the
 // scene, and adds nothing.
-#define VKB_OWN_PICTURE "main"
+#define VKB_CUSTOM_PICTURE "main"
 
 // Adds the last pass. It writes the framebuffer "final" in this format, with the scene's channels.
 bool vkb_add_composite(const struct vkb_settings *settings,

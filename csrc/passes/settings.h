@@ -26,7 +26,7 @@
     METHOD(PMNDRS, pmndrs, true) \
     METHOD(BABYLON, babylon, true) \
     METHOD(PLAYCANVAS, playcanvas, true) \
-    METHOD(OWN, own, false)
+    METHOD(CUSTOM, custom, false)
 
 enum vkb_method {
 #define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
@@ -71,7 +71,7 @@ struct vkb_stage {
     uint32_t ghost_count;
 };
 
-// A pass of a method that was given at run time (methods/own.c). The owner of the settings keeps
+// A pass of a method that was given at run time (methods/custom.c). The owner of the settings keeps
 // the shader as long as there are rows of it.
 struct vkb_custom_pass {
     char name[VKB_NAME_SIZE];  // of the image that it writes
@@ -83,7 +83,7 @@ struct vkb_custom_pass {
     bool framebuffer;
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
     uint32_t read_count;
-    struct vkb_own_params params;
+    struct vkb_custom_params params;
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;
     uint64_t turn;
@@ -109,7 +109,7 @@ struct vkb_settings {
     // Python packs what is before here.
     struct vkb_kernel_data kernel;
     struct vkb_kernel_data dirt;           // the picture of the stage of dirt
-    const struct vkb_custom_pass *passes;  // of VKB_METHOD_OWN
+    const struct vkb_custom_pass *passes;  // of VKB_METHOD_CUSTOM
     uint32_t pass_count;
 };
 

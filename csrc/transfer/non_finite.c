@@ -2,8 +2,8 @@
 
 enum { COUNTED_AT_ONCE = 32768 };  // a sum of this many fits the 16-bit counters below
 
-// Whether no half is special. If all bits of its exponent are set, a sum carries to the sign.
-static bool has_no_special_half(const uint16_t *bits, size_t count)
+// Whether all halves are finite. If all bits of its exponent are set, a sum carries to the sign.
+static bool are_finite_halves(const uint16_t *bits, size_t count)
 {
     uint16_t sums = 0;
 
@@ -15,19 +15,19 @@ static bool has_no_special_half(const uint16_t *bits, size_t count)
 static struct vkb_non_finite count_halves(const uint16_t *bits, size_t count)
 {
     // The counters have the width of the elements, so that compilers use vectors of this width.
-    uint16_t special = 0, infinite = 0;
+    uint16_t non_finite = 0, infinite = 0;
 
     // Half the time of the count.
-    if (has_no_special_half(bits, count))
+    if (are_finite_halves(bits, count))
         return (struct vkb_non_finite){0};
     for (size_t i = 0; i < count; ++i) {
-        special = (uint16_t)(special + ((bits[i] & 0x7c00) == 0x7c00));
+        non_finite = (uint16_t)(non_finite + ((bits[i] & 0x7c00) == 0x7c00));
         infinite = (uint16_t)(infinite + ((bits[i] & 0x7fff) == 0x7c00));
     }
-    return (struct vkb_non_finite){(uint64_t)(special - infinite), infinite};
+    return (struct vkb_non_finite){(uint64_t)(non_finite - infinite), infinite};
 }
 
-static bool has_no_special_single(const uint32_t *bits, size_t count)
+static bool are_finite_singles(const uint32_t *bits, size_t count)
 {
     uint32_t sums = 0;
 
@@ -38,15 +38,15 @@ static bool has_no_special_single(const uint32_t *bits, size_t count)
 
 static struct vkb_non_finite count_singles(const uint32_t *bits, size_t count)
 {
-    uint32_t special = 0, infinite = 0;
+    uint32_t non_finite = 0, infinite = 0;
 
-    if (has_no_special_single(bits, count))
+    if (are_finite_singles(bits, count))
         return (struct vkb_non_finite){0};
     for (size_t i = 0; i < count; ++i) {
-        special += (bits[i] & 0x7f800000) == 0x7f800000;
+        non_finite += (bits[i] & 0x7f800000) == 0x7f800000;
         infinite += (bits[i] & 0x7fffffff) == 0x7f800000;
     }
-    return (struct vkb_non_finite){special - infinite, infinite};
+    return (struct vkb_non_finite){non_finite - infinite, infinite};
 }
 
 struct vkb_non_finite vkb_count_non_finite(enum vkb_format format, const void *values, size_t count)

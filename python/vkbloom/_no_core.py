@@ -43,9 +43,8 @@ def stand_in(reason: ImportError) -> ModuleType:
     types = ("Renderer", "Source", "Plan", "Resource", "Shader", "Submission", "Exported", "Pages")
     for name in types:
         setattr(module, name, type(name, (), {"__module__": "vkbloom._core", "__new__": refuse}))
-    functions = ("adapters", "image_source", "scene_source", "plan", "shader", "resource")
-    for name in (*functions, "read_dlpack", "dry_run"):
-        setattr(module, name, refuse)
+    # All else are functions.
+    module.__getattr__ = lambda name: refuse  # type: ignore[method-assign]
     module.absence = str(reason)  # type: ignore[attr-defined]
     sys.modules["vkbloom._core"] = module
     return module

@@ -125,9 +125,11 @@ class Named(Mapping[str, T]):
     def _repr_html_(self) -> str:
         from html import escape  # noqa: PLC0415  costs start-up time
 
+        # As in the tables of `markup`: some notebooks have no padding of their own.
+        cell = ' style="padding:2px 8px;text-align:left"'
         rows = "".join(
-            f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>"
+            f"<tr>{''.join(f'<td{cell}>{escape(text)}</td>' for text in row)}</tr>"
             for row in self._rows()
         )
-        head = f"<tr><th>{escape(self._kind)}</th><th>what</th><th>whose</th></tr>"
-        return f"<table>{head}{rows}</table>"
+        heads = "".join(f"<th{cell}>{escape(text)}</th>" for text in (self._kind, "what", "whose"))
+        return f"<table><tr>{heads}</tr>{rows}</table>"

@@ -3,7 +3,7 @@
 // added up. UPSAMPLE is what a tap samples there. The taps and kernels are TAP_COUNT and KERNELS in number.
 //
 // All variants of a filter add the WINDOW texels around a position in the same order, those without a
-// weight, too. Include sampling.glsl before this file. The including shader has FILTER_ROWS in its block,
+// weight, too, for each kernel by itself: one sum of all has a quarter more error. Include sampling.glsl before this file. The including shader has FILTER_ROWS in its block,
 // or defines FILTER_X(i) and FILTER_Y(i), the tap of number i along an axis: offset and weights.
 
 #ifndef FILTER_X
@@ -115,4 +115,12 @@ Window window_of(Axis axis, int count, bool along_x)
             window.weights[i] = vec3(weights[i]);
     }
     return window;
+}
+
+vec4 sum_of(vec4 sums[3])
+{
+    vec4 sum = sums[0];
+    [[unroll]] for (int kernel = 1; kernel < KERNELS; ++kernel)
+        sum += sums[kernel];
+    return sum;
 }

@@ -18,15 +18,18 @@ vec4 row_of(sampler2D image, int kernel, Axis row, int line)
 vec4 sparse(sampler2D image, Axis row, Axis column)
 {
     vec4 sum = vec4(0.0);
-    [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+    [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel) {
+        vec4 part_sum = vec4(0.0);
         [[unroll]] for (int i = 0; i < TAP_COUNT; ++i) {
             float moved = column.part + FILTER_Y(i).x, integer = floor(moved);
             float part = moved - integer, weight = FILTER_Y(i)[kernel + 1];
             int line = column.texel + int(integer);
             if (weight != 0.0)
-                sum += weight * (1.0 - part) * row_of(image, kernel, row, line)
-                     + weight * part * row_of(image, kernel, row, line + 1);
+                part_sum += weight * (1.0 - part) * row_of(image, kernel, row, line)
+                          + weight * part * row_of(image, kernel, row, line + 1);
         }
+        sum += part_sum;
+    }
     return sum;
 }
 
@@ -39,7 +42,7 @@ vec4 filtered(sampler2D image)
     if (WINDOW == 0)
         return sparse(image, row, column);
     Window x = window_of(row, WINDOW, true), y = window_of(column, WINDOW, false);
-    vec4 sum = vec4(0.0);
+    vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
         vec4 rows[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int j = 0; j < WINDOW; ++j) {
@@ -48,7 +51,7 @@ vec4 filtered(sampler2D image)
                 rows[kernel] += x.weights[j][kernel] * texel;
         }
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            sum += y.weights[i][kernel] * rows[kernel];
+            sums[kernel] += y.weights[i][kernel] * rows[kernel];
     }
-    return sum;
+    return sum_of(sums);
 }

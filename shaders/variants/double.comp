@@ -7,20 +7,7 @@
 UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
+#include "variants/nested.glsl"
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, smaller);
-READ_IMAGE(2, own);
-WRITE_IMAGE(3);
-
-#define HAS_OWN (ADD_OWN != 0)
 #define WORDS_COLUMNS DOUBLE_WORDS_COLUMNS
-
-uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
-{
-    if (ADD_OWN != 0)
-        sum += params.own * value_of(level);
-    return buffer_of(sum);
-}
-
 #include "variants/double.glsl"

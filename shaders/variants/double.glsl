@@ -1,9 +1,8 @@
 // Upsampling to exactly twice the size. An invocation writes a strip from top to bottom and loads
 // each texel once. `Pyramid(levels=5)` takes 47 ms, and 61 with
 // the general strips (filter.glsl) (processor time of 1920 x
-// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26). The including shader includes pixels.glsl and defines: `smaller`; `own`, an
-// image of the target's size (HAS_OWN: whether it is read); WORDS_COLUMNS; and shade(), which
-// computes a pixel from the pixel of `own` and the upsampled sum.
+// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26). The including shader includes
+// nested.glsl and defines WORDS_COLUMNS.
 #include "lib/doubling.glsl"
 
 const int COLUMNS = WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
@@ -12,8 +11,8 @@ const int COLUMNS = WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
 const int LOADED = COLUMNS / 2 + 4;
 const int KEPT = 5;
 
-#define LOAD load_smaller
-#define LOAD_IMAGE smaller
+#define LOAD load_source
+#define LOAD_IMAGE source
 #define LOAD_NUMBER 1
 #define LOAD_FROM -2
 #define LOAD_COUNT LOADED
@@ -24,7 +23,7 @@ const int KEPT = 5;
 void main()
 {
     read_words();
-    ivec2 last = READ_SIZE(smaller, 1) - 1, size = TARGET_SIZE();
+    ivec2 last = READ_SIZE(source, 1) - 1, size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y) / 2;
     vec4 rows[KEPT][COLUMNS];
@@ -39,7 +38,7 @@ void main()
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         pixels[i] = uvec4(0);
     for (int y = first.y / 2 - 2; y < end + 2; ++y) {
-        load_smaller(first.x / 2, clamp(y, 0, last.y), raw);
+        load_source(first.x / 2, clamp(y, 0, last.y), raw);
         [[unroll]] for (int i = 0; i < LOADED; ++i)
             texels[i] = value_of(raw[i]);
         [[unroll]] for (int row = 1; row < KEPT; ++row)

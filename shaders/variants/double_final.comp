@@ -1,7 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The last upsampling of the bloom, to exactly twice the size, fused with the composite.
+#pragma compile packed
+// The last upsampling of the bloom, to exactly twice the size, fused with the composite, or with its MIXED
+// cotangents.
 #include "lib/block.glsl"
 
 UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
@@ -9,25 +11,8 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, smaller);
-READ_IMAGE(2, own);
-#ifdef MIXED
-READ_IMAGE(3, cotangents);
-WRITE_IMAGE(4);
-#define COTANGENT(pixel) \
-    load_floats(cotangents, read_shapes[2], min(pixel.x, read_shapes[2].x - 1), pixel.y)
-#else
-WRITE_IMAGE(3);
-#endif
-#include "lib/ended.glsl"
+#define FINAL
+#include "variants/nested.glsl"
 
-#define HAS_OWN true
 #define WORDS_COLUMNS DOUBLE_FINAL_COLUMNS
-
-uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
-{
-    return ended(scene, as_stored(sum, FORMAT), pixel);
-}
-
 #include "variants/double.glsl"

@@ -1,8 +1,7 @@
 // A filter of an image of any size in strips. An invocation writes a strip from top to bottom. It filters
 // each row of the source along the row once, for each kernel, and keeps the filtered rows that a pixel
-// needs. The including shader includes sampling.glsl and pixels.glsl, and defines: `source`; `own`, an
-// image of the target's size (HAS_OWN: whether it is read); seen(), by which texels are changed; and
-// shade(), which computes a pixel from the pixel of `own` and the filtered sum.
+// needs. The including shader includes sampling.glsl and nested.glsl, and defines seen(), by which texels
+// are changed.
 #include "lib/filter.glsl"
 
 const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES);
@@ -63,11 +62,11 @@ void add_row(int row, int first)
 
 vec4 column_of(Window window, int i)
 {
-    vec4 sum = vec4(0.0);
+    vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     [[unroll]] for (int row = 0; row < KEPT; ++row)
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            sum += window.weights[row][kernel] * rows[row * KERNELS + kernel][i];
-    return sum;
+            sums[kernel] += window.weights[row][kernel] * rows[row * KERNELS + kernel][i];
+    return sum_of(sums);
 }
 
 void main()

@@ -1,7 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// A filter that makes the bloom, fused with the composite.
+#pragma compile packed
+// A filter that makes the bloom, fused with the composite, or with its MIXED cotangents.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -10,29 +11,12 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-READ_IMAGE(2, own);
-#ifdef MIXED
-READ_IMAGE(3, cotangents);
-WRITE_IMAGE(4);
-#define COTANGENT(pixel) \
-    load_floats(cotangents, read_shapes[2], min(pixel.x, read_shapes[2].x - 1), pixel.y)
-#else
-WRITE_IMAGE(3);
-#endif
-#include "lib/ended.glsl"
-
-#define HAS_OWN true
+#define FINAL
+#include "variants/nested.glsl"
 
 vec4 seen(uvec4 raw)
 {
     return value_of(raw);
-}
-
-uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
-{
-    return ended(scene, as_stored(sum, FORMAT), pixel);
 }
 
 #include "variants/filter.glsl"

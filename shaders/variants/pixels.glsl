@@ -149,18 +149,18 @@ uvec4 with_alpha_of(uvec4 own, vec4 value)
 }
 
 // All bits of the half floats that are NaN or infinity.
-uvec2 special_halves(uvec2 bits)
+uvec2 non_finite_halves(uvec2 bits)
 {
     // A carry is where all bits of the exponent are set.
-    uvec2 special = ((bits & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
-    return special | (special - (special >> 15));
+    uvec2 non_finite = ((bits & 0x7c007c00u) + 0x04000400u) & 0x80008000u;
+    return non_finite | (non_finite - (non_finite >> 15));
 }
 
 // The pixel with 0 in place of NaN and infinity in each channel.
 uvec4 finite_bits(uvec4 raw)
 {
 #if CHANNEL_BYTES == 2
-    raw.xy &= ~special_halves(raw.xy);
+    raw.xy &= ~non_finite_halves(raw.xy);
 #elif CHANNEL_BYTES != 1
     raw = mix(raw, uvec4(0), equal(raw & 0x7f800000u, uvec4(0x7f800000u)));
 #endif
@@ -188,8 +188,8 @@ uvec4 finished(uvec4 own, vec4 value)
     if (FINITE != 0)
         own = uvec4(0);
 #if CHANNEL_BYTES == 2
-    uvec2 special = special_halves(own.xy);
-    result.xy = (own.xy & special) | (result.xy & ~special);
+    uvec2 non_finite = non_finite_halves(own.xy);
+    result.xy = (own.xy & non_finite) | (result.xy & ~non_finite);
 #elif CHANNEL_BYTES == 4
     result = mix(result, own, equal(own & 0x7f800000u, uvec4(0x7f800000u)));
 #endif

@@ -27,20 +27,16 @@ def files(tmp_path: Path) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def test_best_first(files: tuple[str, str], tmp_path: Path) -> None:
-    report = tmp_path / "report.html"
+def test_best_first(files: tuple[str, str]) -> None:
     words = ["--method", "dual_kawase", "--method", "separable", "--vary", "threshold,intensity"]
     # Without a knee, as in the defaults, the fit is near and not exact.
-    options = ["--max-calls", "60", "--bounds", "threshold=0.5:3", "-o", str(report)]
-    done = CliRunner().invoke(program, ["fit", *files, *words, *options])
+    done = CliRunner().invoke(program, ["fit", *files, *words, "--max-calls", "60"])
     assert done.exit_code == 0, done.output
     lines = done.output.splitlines()
     assert lines[0].startswith("separable: relative loss 0.")
     assert lines[1].startswith("  vkbloom.Separable(threshold=")
     assert lines[2].strip().partition(":")[0] in ("good", "fair")
     assert lines[3].startswith("dual_kawase: ")
-    assert lines[-1] == f"wrote {report}"
-    assert report.read_text().count("radial profile") == 4
 
 
 def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
@@ -50,11 +46,6 @@ def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
     assert done.exit_code == 0
     verdict = done.stdout.splitlines()[2]
     assert verdict == "  poor: no bloom was found"
-    done = CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "0.001"])
-    assert done.exit_code == 1
-    assert "vkbloom: note: the smallest loss, " in done.stderr
-    assert done.stderr.endswith(", is over --max-loss 0.001\n")
-    assert CliRunner().invoke(program, ["fit", *wrong, *words, "--max-loss", "99"]).exit_code == 0
 
 
 def test_screenshots(tmp_path: Path) -> None:

@@ -157,8 +157,6 @@ ERRORS = """
 2 : explore --no-open --size 0x3 => size
 1 : explore --no-open no.exr => no.exr
 2 : fit a.exr a.exr --vary scatter => vary: the method bevy has no field 'scatter'
-2 : fit a.exr a.exr --bounds threshold => --bounds: 'threshold' is not NAME=LOW:HIGH
-2 : fit a.exr a.exr --bounds threshold=1:x => --bounds: 'threshold=1:x' is not NAME=LOW:HIGH
 2 : fit a.exr a.exr --loss ssim => 'ssim' is not one of 'relative'
 2 : translate --to kino => give what to translate: --preset NAME, --method NAME
 2 : translate --preset kino => Missing option '--to'

@@ -266,7 +266,7 @@ def test_methods_have_the_order_of_the_core() -> None:
     """Importing one method's module first does not change it."""
     header = Path(__file__).parents[2] / "csrc/passes/settings.h"
     rows = re.findall(r"^    METHOD\(\w+, (\w+), ", header.read_text(), re.MULTILINE)
-    assert rows.pop() == "own", "the method whose passes are given at run time has no class here"
+    assert rows.pop() == "custom", "the method whose passes are given at run time has no class here"
     registry = "from vkbloom._settings.registry import METHODS"
     code = f"import vkbloom._methods.pygfx; {registry}; print(*METHODS)"
     assert output("-c", code).split() == rows

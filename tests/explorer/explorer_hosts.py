@@ -1,4 +1,4 @@
-"""The hosts of the explorer's page: its own server, and JupyterLab."""
+"""The hosts of the explorer's page: its own server, JupyterLab and marimo."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import queue
 import re
 import secrets
 import shutil
+import socket
 import subprocess
 import sys
 import threading
@@ -110,6 +111,68 @@ def jupyterlab(folder: Path, cells: Sequence[str], environment: Mapping[str, str
             assert time.monotonic() < deadline, log.read_text()
             time.sleep(0.1)
         yield f"{found[0]}lab/tree/bloom.ipynb?reset&token={token}"
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+MARIMO = """
+import marimo
+
+app = marimo.App()
+
+
+@app.cell
+def _():
+    import marimo as mo
+    import vkbloom
+
+    explorer = mo.ui.anywidget(vkbloom.explore(size=(64, 36)))
+    explorer
+    return explorer, mo, vkbloom
+
+
+@app.cell
+def _(explorer, mo):
+    mo.md(f"loops: {explorer.value['settings']['loops']}, {explorer.settings.loops}")
+
+
+@app.cell
+def _(vkbloom):
+    vkbloom.default_renderer().plan(vkbloom.Scene.ufo(), vkbloom.Separable(), (64, 36))
+
+
+if __name__ == "__main__":
+    app.run()
+"""
+
+
+@contextmanager
+def marimo(folder: Path, theme: str) -> Iterator[str]:
+    """Run a notebook of marimo as an app in a theme, and yield where it is."""
+    (folder / "bloom.py").write_text(MARIMO)
+    (folder / "pyproject.toml").write_text(f'[tool.marimo.display]\ntheme = "{theme}"\n')
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "marimo", "run", "--headless", "--host", "127.0.0.1"]
+    package = str(Path(vkbloom.__file__).parents[1])
+    environment = {**os.environ, "HOME": str(folder), "PYTHONPATH": package}
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [*command, "--port", str(port), "bloom.py"],
+            cwd=folder,
+            env=environment,
+            stdout=log,
+            stderr=log,
+        )
+    try:
+        deadline = time.monotonic() + PATIENCE
+        while "URL:" not in (folder / "log").read_text():
+            assert process.poll() is None, (folder / "log").read_text()
+            assert time.monotonic() < deadline, (folder / "log").read_text()
+            time.sleep(0.1)
+        yield f"http://127.0.0.1:{port}"
     finally:
         process.terminate()
         process.wait(PATIENCE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import base64
 import dataclasses
 import itertools
 import json
@@ -23,7 +24,7 @@ from vkbloom._explorer.controls import as_code, controls, settings_from
 from vkbloom._explorer.fast_pictures import picture_of, texts_of
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._settings.registry import METHODS
-from vkbloom._views.pictures import reduced
+from vkbloom._views.pictures import png, reduced
 
 EXAMPLES = [
     *presets.values(),
@@ -531,7 +532,57 @@ class TestWidget:
         assert sent[0][0]["sides"]["a"] == Pyramid().to_dict()
         assert (explorer.settings, explorer.against) == (Pyramid(), Separable())
         with pytest.raises(TypeError, match="settings"):
-            explorer.settings = Pyramid  # type: ignore[assignment]
+            explorer.settings = Pyramid
+
+    def test_settings_are_traits(
+        self, scene: Scene, renderer: Renderer, sent: list[tuple[Any, Any]]
+    ) -> None:
+        """Cells react to what the page or code sets; wrong fields of a page change nothing."""
+        explorer = vkbloom.explore(scene, renderer=renderer)
+        seen: list[Any] = []
+        explorer.observe(lambda change: seen.append(change["new"]), "settings")
+        explorer.settings = Pyramid()
+        fields = Separable(loops=2).to_dict()
+        explorer._handle_custom_msg({"kind": "frame", "sides": {"a": fields}}, [])
+        explorer.set_state({"settings": Pyramid(levels=2).to_dict()})
+        explorer.set_state({"settings": {"method": "none"}})
+        assert seen == [Pyramid(), Separable(loops=2), Pyramid(levels=2)]
+        assert explorer.settings == Pyramid(levels=2)
+        assert explorer.get_state("settings")["settings"] == Pyramid(levels=2).to_dict()
+
+    def test_pictures_and_files_are_text_where_buffers_do_not_arrive(
+        self, scene: Scene, renderer: Renderer, sent: list[tuple[Any, Any]]
+    ) -> None:
+        explorer = vkbloom.explore(scene, size=(64, 36), renderer=renderer)
+        message = {"kind": "frame", "sides": {"a": Pyramid().to_dict()}}
+        explorer._handle_custom_msg(message, [])
+        explorer._handle_custom_msg({**message, "text": True}, [])
+        (binary, buffers), (text, nothing) = sent
+        assert (binary["count"], text["count"], nothing) == (1, 0, [])
+        assert [base64.b64decode(one) for one in text["pictures"]] == buffers
+        file = base64.b64encode(png(np.zeros((8, 8, 3), np.uint8))).decode()
+        opened = {"kind": "open", "name": "a.png", "text": True, "files": [file]}
+        explorer._handle_custom_msg(opened, [])
+        assert sent[-1][0]["name"] == "a.png"
+
+    def test_an_executed_notebook_has_the_first_picture(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As nbclient runs it, and as nbconvert writes it for readers without scripts."""
+        nbformat, nbclient = map(pytest.importorskip, ("nbformat", "nbclient"))
+        nbconvert = pytest.importorskip("nbconvert")
+        # Its templates, also where this Python finds it in another environment.
+        templates = Path(nbconvert.__file__).parents[4] / "share" / "jupyter"
+        monkeypatch.setenv("JUPYTER_PATH", str(templates))
+        cells = ["import vkbloom\nvkbloom.explore(size=(64, 36))", "vkbloom.Pyramid()"]
+        new = nbformat.v4
+        notebook = new.new_notebook(cells=[new.new_code_cell(one) for one in cells])
+        nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute()
+        widget, still = notebook.cells[0].outputs
+        assert "application/vnd.jupyter.widget-view+json" in widget.data
+        assert base64.b64decode(still.data["image/png"]).startswith(b"\x89PNG")
+        html, _ = nbconvert.HTMLExporter().from_notebook_node(notebook)
+        assert "data:image/png;base64," in html
 
     def test_without_anywidget(self, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "anywidget", None)

@@ -53,7 +53,7 @@ class Own:
         self.fields = {"format": "rgba32float", **fields}
 
     def _core_block(self) -> bytes:
-        return settings_block("own", self.fields)
+        return settings_block("custom", self.fields)
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> Any:
         self.asked.append((frame, buffers))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.resources
 import json
 from pathlib import Path
 from typing import Any
@@ -164,6 +165,8 @@ def test_check_judges_files(tmp_path: Path) -> None:
     done = CliRunner().invoke(program, [*words, "--json"])
     assert done.exit_code == 1, done.output
     found = json.loads(done.stdout)
+    schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
+    pytest.importorskip("jsonschema").validate(found, json.loads(schema.read_text()))
     assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
     assert "general flashes: fails" in CliRunner().invoke(program, words).stdout
     refused = CliRunner().invoke(program, [*words, "--preset", "kino"])

@@ -41,7 +41,7 @@ KEPT = 0.1
 
 def check(renderer: vkbloom.Renderer, quick: bool) -> str:
     """Return the laws and the figures of `vkbloom check` for each preset."""
-    size = "128x128" if quick else "512x512"  # wide blooms need large images
+    size = "128x128" if quick else "256x256"  # wide blooms need larger images, and minutes
     laws, figures = [], []
     for name in tqdm(vkbloom.presets):
         words = ["check", "--preset", name, "--json", "--measure-size", size]
@@ -54,12 +54,14 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
         broken = listed(law for law, held in verdicts.items() if held is False)
         untested = listed(law for law, held in verdicts.items() if held is None)
         laws.append([f"`{name}`", broken, untested])
+        border = found["laws"]["border"]["figures"]
         spread, steady, near = found["psf"], found["stability"], found["nearest_preset"]
         figures.append(
             [
                 f"`{name}`",
                 rounded(found["gain"]),
                 rounded(found["energy"]),
+                *(rounded(border.get(f"energy_{place}")) for place in ("left", "corner")),
                 *(rounded(spread[key]) for key in ("r50", "r90")),
                 rounded(steady["ripple"], 100),
                 rounded(steady["jitter"]),
@@ -69,8 +71,10 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
                 f"`{near['name']}`, {rounded(near['difference'], 100)} %",
             ]
         )
-    heads = "preset|gain|energy|50 % within, pixels|90 % within, pixels|ripple, %|jitter, pixels|"
-    heads += "shimmer, %|veiling glare, %|from its reference|nearest preset"
+    heads = "preset|gain|energy|at an edge|in a corner|50 % within, pixels|90 % within, pixels|"
+    heads += (
+        "ripple, %|jitter, pixels|shimmer, %|veiling glare, %|from its reference|nearest preset"
+    )
     of_laws = table(["preset", "breaks", "could not be tested"], laws)
     return f"{of_laws}\n{table(heads.split('|'), figures)}"
 

@@ -232,17 +232,6 @@ def _send(file: Path, target: str) -> None:
             shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
 
 
-@contextlib.contextmanager
-def _wrong_use_of(*names: str) -> Iterator[None]:
-    """Convert a ValueError that names one of these arguments to click.UsageError."""
-    try:
-        yield
-    except ValueError as error:
-        if str(error).startswith(tuple(f"{name}:" for name in names)):
-            raise click.UsageError(str(error)) from error
-        raise
-
-
 def _written(
     picture: Picture,
     frames: vkbloom.Frames,

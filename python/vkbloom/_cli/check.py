@@ -200,36 +200,30 @@ def command(
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
             )
-        all_found = [_measured(renderer, *source, options, bar) for source in sources.items()]
-        found = all_found[0]
+        found = [_measured(renderer, *source, options, bar) for source in sources.items()]
         # Some figures are rendered when they are read.
-        values, *others = map(showing.as_values, all_found)
+        values = [showing.as_values(one) for one in found]
         if page is not None:
-            safe_writing.write_file(Path(page), showing.as_page(found).encode())
+            safe_writing.write_file(Path(page), showing.as_page(found[0]).encode())
+            say(f"wrote {page}", err=as_json)
     if against is None:
-        written, text = values, showing.as_text(found)
-        table, failed = (
-            showing.as_markdown(found),
-            [row.name for row in showing.broken(found.report)],
-        )
+        failed = [row.name for row in showing.broken(found[0].report)]
+        text, table, written = showing.as_text(found[0]), showing.as_markdown(found[0]), values[0]
     else:
-        before = others[0]
-        changes = comparing.changes(before, values)
-        names = (all_found[1].name, found.name)
-        failed = comparing.newly_broken(changes, require)
-        written = comparing.as_values(changes, before, values, failed)
+        changes = comparing.changes(values[1], values[0])
+        failed, names = comparing.newly_broken(changes, require), (found[1].name, found[0].name)
         text = comparing.as_text(changes, names)
-        table = comparing.as_markdown(changes, names, found.device)
+        table = comparing.as_markdown(changes, names, found[0].device)
+        written = comparing.as_values(changes, values[1], values[0], failed)
     click.echo(json.dumps(written, indent=2) if as_json else text)
-    for name, content in {page: None, markdown: table}.items():
-        if name is not None:
-            if content is not None:
-                safe_writing.write_file(Path(name), content.encode())
-            say(f"wrote {name}", err=as_json)
-    laws = {row.name: row for row in found.report.rows}
+    if markdown is not None:
+        safe_writing.write_file(Path(markdown), table.encode())
+        say(f"wrote {markdown}", err=as_json)
+    held = {row.name: row.words for row in found[0].report.rows}
     for name in failed:
-        newly = "" if against is None else "newly broken, "
-        note(f"{found.name}: required law {name}: {newly}{laws[name].words}")
+        note(
+            f"{found[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
+        )
     return int(bool(failed))
 
 

@@ -150,13 +150,11 @@ _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
 
 
 def option_type(info: FieldInfo) -> _ParamType:
-    """Return the option type of a field, or raise TypeError if its kind has none."""
+    """Return the option type of a field."""
     if info.kind == "choice":
         kind: _ParamType = click.Choice(info.choices, case_sensitive=False)
-    elif info.kind in _OPTION_TYPES:
-        kind = _OPTION_TYPES[info.kind]
     else:
-        raise TypeError(f"{info.name}: a field of this type has no option")
+        kind = _OPTION_TYPES[info.kind]
     return or_none(kind) if info.optional else kind
 
 

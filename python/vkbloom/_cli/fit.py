@@ -68,12 +68,12 @@ def command(
     files: tuple[str, ...],
     framebuffer: str,
     search: dict[str, Any],
-    show_results: Callable[[Sequence[vkbloom.FitResult]], int],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     input_colour: Any,
     layer: str | None,
     adapter: str,
     validation: bool,
-) -> int:
+) -> None:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
     Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
@@ -100,7 +100,7 @@ def command(
                 image_of, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
             )
         ]
-    return show_results(sorted(found, key=lambda one: one.loss))
+    show_results(sorted(found, key=lambda one: one.loss))
 
 
 def _searches(

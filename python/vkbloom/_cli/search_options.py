@@ -5,22 +5,17 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, get_args
 
 import click
 from rich.console import Console
 
 import vkbloom
-from vkbloom._cli.terminal import is_quiet, note, say
+from vkbloom._cli.terminal import is_quiet
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
-from vkbloom._io import safe_writing
-from vkbloom._views import markup
 
 __all__ = ["search_options"]
-
-_RULE: Final = markup.element("hr")
 
 
 def search_options(
@@ -29,7 +24,7 @@ def search_options(
     """Add the options of a search; the arguments are their defaults.
 
     The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
-    `show_results`, a function that prints results and returns the exit status.
+    `show_results`, a function that prints results.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -37,27 +32,21 @@ def search_options(
         def run(
             *,
             vary: str | None,
-            bounds: tuple[str, ...],
-            max_loss: float | None,
-            out: str | None,
             as_json: bool,
             **rest: Any,
         ) -> Any:
             search: dict[str, Any] = {
                 "loss": rest.pop("loss"),
-                "bounds": _bounds(bounds),
                 "max_calls": rest.pop("max_calls"),
                 "progress": Console(stderr=True).is_terminal and not is_quiet(),
             }
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
-            show_results = functools.partial(
-                _show_results, max_loss=max_loss, out=out, as_json=as_json
-            )
+            show_results = functools.partial(_show_results, as_json=as_json)
             return command(search=search, show_results=show_results, **rest)
 
-        for option in reversed((*_of_search(vary, loss, max_calls), *_OF_RESULTS)):
+        for option in reversed(_of_search(vary, loss, max_calls)):
             run = option(run)
         return run
 
@@ -76,12 +65,6 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
             + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
         ),
         click.option(
-            "--bounds",
-            metavar="NAME=LOW:HIGH",
-            multiple=True,
-            help="A narrower range for one of these settings; may be repeated.",
-        ),
-        click.option(
             "--loss",
             type=click.Choice(get_args(LossName)),
             default=loss,
@@ -98,47 +81,12 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
             show_default=True,
             help="Limit of the renders of each search.",
         ),
+        click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
     )
 
 
-_OF_RESULTS: Final = (
-    click.option(
-        "--max-loss",
-        metavar="X",
-        type=click.FloatRange(min=0),
-        help="Exit status 1 if the smallest loss is larger [default: any loss is status 0]",
-    ),
-    click.option(
-        "-o",
-        "--out",
-        metavar="REPORT",
-        type=click.Path(),
-        help="Write the pictures, radial profiles and losses as an HTML file.",
-    ),
-    click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
-)
-
-
-def _bounds(words: Sequence[str]) -> dict[str, Sequence[Any]]:
-    """Parse each ``NAME=LOW:HIGH``, or ``NAME=A,B`` for choices, into the bounds of a fit."""
-    found: dict[str, Sequence[Any]] = {}
-    for word in words:
-        name, sign, text = word.partition("=")
-        low, colon, high = text.partition(":")
-        try:
-            values: Sequence[Any] = (float(low), float(high)) if colon else text.split(",")
-        except ValueError:
-            sign = ""
-        if not sign or not text:
-            raise click.UsageError(f"--bounds: {word!r} is not NAME=LOW:HIGH or NAME=A,B,...")
-        found[name.strip().replace("-", "_")] = values
-    return found
-
-
-def _show_results(
-    found: Sequence[vkbloom.FitResult], *, max_loss: float | None, out: str | None, as_json: bool
-) -> int:
-    """Print results, the best one first, and return the exit status."""
+def _show_results(found: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
+    """Print results, the best one first."""
     if as_json:
         click.echo(json.dumps([_object(one) for one in found], indent=2))
     else:
@@ -149,13 +97,6 @@ def _show_results(
             )
             click.echo(f"  {as_code(one.settings)}")
             click.echo(f"  {one.words}")
-    if out is not None:
-        _write(found, Path(out))
-        say(f"wrote {out}", err=as_json)
-    if max_loss is not None and found[0].loss > max_loss:
-        note(f"the smallest loss, {found[0].loss:.4g}, is over --max-loss {max_loss:g}")
-        return 1
-    return 0
 
 
 def _begun(found: vkbloom.FitResult) -> str:
@@ -182,10 +123,3 @@ def _object(found: vkbloom.FitResult) -> dict[str, Any]:
         "calls": found.calls,
         "seconds": found.seconds,
     }
-
-
-def _write(found: Sequence[vkbloom.FitResult], path: Path) -> None:
-    """Write the reports of all results as one page."""
-    reports = [part for one in found for part in (markup.Markup(one._repr_html_()), _RULE)]
-    page = markup.page("vkbloom fit", *reports[:-1], style="body{font-family:sans-serif}")
-    safe_writing.write_file(path, page.encode())

@@ -42,11 +42,11 @@ def command(
     target: str,
     size: tuple[int, int],
     search: dict[str, Any],
-    show_results: Callable[[Sequence[vkbloom.FitResult]], int],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
-) -> int:
+) -> None:
     """Find another method's parameters whose bloom comes closest.
 
     --preset, --method or --settings, with further options, are the settings to translate; --to
@@ -61,4 +61,4 @@ def command(
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
         found = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
-    return show_results([found])
+    show_results([found])

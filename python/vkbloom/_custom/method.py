@@ -69,7 +69,7 @@ class CustomMethod(Settings, metaclass=CustomType):
     def _core_block(self) -> bytes:
         """Return the fields of all settings: others may have the names of other methods' fields."""
         shared = {field.name: getattr(self, field.name) for field in dataclasses.fields(Settings)}
-        return settings_block("own", shared)
+        return settings_block("custom", shared)
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Row, ...]:
         """Return the passes of a frame, as rows."""

@@ -1108,12 +1108,47 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   };
 }
 
+// Some hosts do not transport binary buffers: there, files and pictures are text.
+const encoded = (bytes) => {
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 0x8000) {
+    text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
+  }
+  return btoa(text);
+};
+const decoded = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
 export default {
   render({ model, el }) {
-    const page = mount(el, (message, files = []) => model.send(message, undefined, files));
-    model.on("msg:custom", page.receive);
+    let text = false;
+    let last = null;
+    const send = (message, files = []) => {
+      if (["frame", "save"].includes(message.kind)) last = [message, files];
+      if (text) model.send({ ...message, text, files: files.map(encoded) });
+      else model.send(message, undefined, files);
+      if (message.kind !== "frame") return;
+      // Cells of a notebook react to the settings as traits.
+      const traits = { a: "settings", b: "against" };
+      for (const side of Object.keys(message.sides)) model.set(traits[side], message.sides[side]);
+      model.save_changes();
+    };
+    const receive = (message, buffers) => {
+      const pictures = message.pictures ? message.pictures.map(decoded) : (buffers ?? []);
+      if ((message.count ?? 0) > pictures.length) {
+        text = true;
+        send(...last);
+      } else page.receive(message, pictures);
+    };
+    const page = mount(el, send);
+    model.on("msg:custom", receive);
+    // marimo's theme, which the style sheet does not reach.
+    const follow = () => (el.style.colorScheme = document.body.dataset.theme ?? "");
+    const themes = new MutationObserver(follow);
+    themes.observe(document.body, { attributeFilter: ["data-theme"] });
+    follow();
     return () => {
-      model.off("msg:custom", page.receive);
+      themes.disconnect();
+      model.off("msg:custom", receive);
       page.unmount();
     };
   },

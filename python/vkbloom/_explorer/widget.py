@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Mapping
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 import anywidget
+import traitlets
 
-from vkbloom._explorer.controls import as_fields
+from vkbloom._explorer.controls import as_fields, settings_from
 from vkbloom._settings.settings import check_settings
 
 if TYPE_CHECKING:
@@ -18,6 +21,22 @@ if TYPE_CHECKING:
 __all__ = ["Explorer"]
 
 _FILES: Final = resources.files("vkbloom._explorer")
+# Traits of the sides' settings.
+_TRAITS: Final = {"settings": "a", "against": "b"}
+# Of the picture that stands in a notebook until the page is there.
+_STILL: Final = (640, 640)
+
+
+def _settings_trait(side: str) -> Any:
+    """Return a trait for settings; what a page sends and is no settings leaves them as they are."""
+
+    def read(fields: object, widget: Explorer) -> Settings:
+        try:
+            return settings_from(fields)
+        except (TypeError, ValueError):
+            return widget._viewer.settings[side]
+
+    return traitlets.Any().tag(sync=True, to_json=lambda one, _: as_fields(one), from_json=read)
 
 
 class Explorer(anywidget.AnyWidget):
@@ -30,49 +49,74 @@ class Explorer(anywidget.AnyWidget):
     Attributes
     ----------
     settings, against : Settings
-        The settings of A and B on the page. Setting them changes the page.
+        The settings of A and B on the page, as traits. Setting them changes the page.
     frames : Frames or None
         The framebuffer of A that was shown last.
     """
 
     _esm = (_FILES / "page.js").read_text("utf-8")
     _css = (_FILES / "page.css").read_text("utf-8")
+    settings: Any = _settings_trait("a")
+    against: Any = _settings_trait("b")
 
     def __init__(self, viewer: Viewer) -> None:
-        super().__init__()
         self._viewer = viewer
+        self._still: Any = None
+        super().__init__(settings=viewer.settings["a"], against=viewer.settings["b"])
         self.on_msg(self._received)
+        self.observe(self._set, list(_TRAITS))
 
-    def _received(self, widget: object, message: object, buffers: list[Any]) -> None:
-        header, pictures = self._viewer.answer(message, [bytes(buffer) for buffer in buffers])
+    def _received(self, widget: object, message: Any, buffers: list[Any]) -> None:
+        self._remove_still()
+        # Where binary buffers do not arrive, files are text.
+        is_text = isinstance(message, Mapping) and bool(message.get("text"))
+        files = [bytes(buffer) for buffer in buffers]
+        if is_text:
+            files = [base64.b64decode(one) for one in message.get("files", ())]
+        header, pictures = self._viewer.answer(message, files)
+        if is_text:
+            header["pictures"] = [base64.b64encode(one).decode() for one in pictures]
+            pictures = []
+        header["count"] = len(pictures)
+        for name, side in _TRAITS.items():
+            setattr(self, name, self._viewer.settings[side])
         self.send(header, pictures)
 
-    @property
-    def settings(self) -> Settings:
-        """The settings of A."""
-        return self._viewer.settings["a"]
+    @traitlets.validate("settings", "against")
+    def _checked(self, proposal: Any) -> Settings:
+        return check_settings(proposal["value"])
 
-    @settings.setter
-    def settings(self, settings: Settings) -> None:
-        self._set("a", settings)
-
-    @property
-    def against(self) -> Settings:
-        """The settings of B."""
-        return self._viewer.settings["b"]
-
-    @against.setter
-    def against(self, settings: Settings) -> None:
-        self._set("b", settings)
-
-    def _set(self, side: str, settings: Settings) -> None:
-        self._viewer.settings[side] = check_settings(settings)
-        self.send({"kind": "settings", "sides": {side: as_fields(settings)}}, [])
+    def _set(self, change: Any) -> None:
+        side = _TRAITS[change["name"]]
+        if self._viewer.settings[side] != change["new"]:
+            self._viewer.settings[side] = change["new"]
+            self.send({"kind": "settings", "sides": {side: as_fields(change["new"])}}, [])
 
     @property
     def frames(self) -> Frames | None:
         """The framebuffer of A that was shown last."""
         return self._viewer.frames.get("a")
+
+    def _ipython_display_(self) -> None:
+        """Show the page, and below it the first picture until the page asks for one.
+
+        A notebook that is executed without a browser keeps the picture.
+        """
+        from IPython.display import Image, display  # noqa: PLC0415  of notebooks alone
+
+        bundle = self._repr_mimebundle_()
+        data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
+        display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
+        asked = {"kind": "frame", "sides": {"a": as_fields(self.settings)}, "size": _STILL}
+        _, pictures = self._viewer.answer({**asked, "framebuffer": "final"})
+        if pictures:
+            still = Image(pictures[0])  # type: ignore[no-untyped-call]
+            self._still = display(still, display_id=True)  # type: ignore[no-untyped-call]
+
+    def _remove_still(self) -> None:
+        if self._still is not None:
+            self._still.update({"text/plain": ""}, raw=True)
+            self._still = None
 
     def close(self) -> None:
         """Remove the page from the notebook, and close the renderer unless the caller passed it."""

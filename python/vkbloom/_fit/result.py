@@ -138,7 +138,7 @@ class FitResult:
             f", from a loss ({self.loss_name}) of {self.start_loss:.3g}, in {self.seconds:.1f} s"
         )
         code = "color:inherit;background:none;padding:0;white-space:pre-wrap"
-        return element(
+        report = element(
             "div",
             element("div", element("b", repr(self)[1:-1]), summary),
             element("div", self.words),
@@ -146,6 +146,7 @@ class FitResult:
             element("code", repr(self.settings), style=code),
             style="color:inherit;font-size:13px;max-width:68em",
         )
+        return str(report)
 
 
 def radial_profiles(

@@ -119,7 +119,7 @@ class Plan:
         from vkbloom._views import markup  # noqa: PLC0415  costs start-up time
 
         rows = [[_text(part) for part in one] for one in self.passes]
-        return markup.table(rows, Pass._fields, caption=self._title)
+        return str(markup.table(rows, Pass._fields, caption=self._title))
 
 
 def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:

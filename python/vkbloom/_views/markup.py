@@ -13,10 +13,12 @@ from typing import Final
 __all__ = ["Markup", "element", "encoded_image", "figure", "image", "joined", "page", "table"]
 
 _NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
+# Of cells: some notebooks, such as marimo, have no padding of their own.
+_CELL: Final = "padding:2px 8px"
 
 
 class Markup(str):
-    """HTML, which is not escaped again."""
+    """HTML, which is not escaped again. Notebooks get str(markup): some refuse other types."""
 
     __slots__ = ()
 
@@ -67,6 +69,7 @@ def table(
     **attributes: object,
 ) -> Markup:
     """Return rows whose first value is their name; `name`, `cell`: attributes of the cells."""
+    name, cell = ({**given, "style": f"{_CELL};{given.get('style', '')}"} for given in (name, cell))
     body = [
         element(
             "tr",
@@ -75,7 +78,7 @@ def table(
         )
         for first, *rest in rows
     ]
-    heads = [element("th", text, scope="col") for text in head]
+    heads = [element("th", text, scope="col", style=_CELL) for text in head]
     return element(
         "table",
         *([] if caption is None else [element("caption", caption)]),

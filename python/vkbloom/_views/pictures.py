@@ -66,7 +66,7 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         )
     columns = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
-    return element(
+    sheet = element(
         "div",
         element("div", *thumbnails, style=columns),
         *([_timings_html(frames)] if frames.timings else []),
@@ -79,6 +79,7 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         ),
         style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em",
     )
+    return str(sheet)
 
 
 def _timings_html(frames: Framebuffers) -> Markup:

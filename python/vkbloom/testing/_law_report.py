@@ -167,7 +167,7 @@ class LawReport:
         head = ("law", "held", "off by", "allowed", "why it may be broken")
         caption = str(self).splitlines()[0]
         name = {"style": "text-align:left"}
-        return markup.table(rows, head, caption=caption, name=name, style="color:inherit")
+        return str(markup.table(rows, head, caption=caption, name=name, style="color:inherit"))
 
 
 def _cells(row: LawRow) -> tuple[str, str]:

@@ -43,8 +43,8 @@ static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
         row.block_width = pass->block_width;
         row.block_height = pass->block_height;
     }
-    row.block = VKB_BLOCK_own;
-    row.params.own = pass->params;
+    row.block = VKB_BLOCK_custom;
+    row.params.custom = pass->params;
     row.resources = pass->resources;
     row.resource_count = pass->resource_count;
     row.turn = pass->turn;
@@ -56,8 +56,8 @@ static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
     return pass->width == size.width && pass->height == size.height;
 }
 
-bool vkb_add_own(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                 struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+bool vkb_add_custom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
+                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
     const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
 
@@ -72,14 +72,14 @@ bool vkb_add_own(const struct vkb_settings *settings, const struct vkb_bloom_sou
             return false;
         if (strcmp(pass->name, BLOOM) == 0)
             *bloom = image;
-        else if (strcmp(pass->name, VKB_OWN_PICTURE) == 0 && !has_size(pass, source->final))
+        else if (strcmp(pass->name, VKB_CUSTOM_PICTURE) == 0 && !has_size(pass, source->final))
             return vkb_fail(error, VKB_ERROR_VALUE,
                             "passes: %s is %u x %u, which is not the frame's size, %u x %u",
-                            VKB_OWN_PICTURE, pass->width, pass->height, source->final.width,
+                            VKB_CUSTOM_PICTURE, pass->width, pass->height, source->final.width,
                             source->final.height);
     }
-    if (*bloom == VKB_NO_IMAGE && vkb_graph_find(graph, VKB_OWN_PICTURE) == VKB_NO_IMAGE)
+    if (*bloom == VKB_NO_IMAGE && vkb_graph_find(graph, VKB_CUSTOM_PICTURE) == VKB_NO_IMAGE)
         return vkb_fail(error, VKB_ERROR_VALUE, "passes: none writes %s or %s", BLOOM,
-                        VKB_OWN_PICTURE);
+                        VKB_CUSTOM_PICTURE);
     return true;
 }

@@ -1,0 +1,70 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+// The blurs of nine taps in one direction, pixels of the target apart.
+//
+// HDRP's binomial filter reduces the image along this direction (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.high-definition, BloomBlur.compute @ 0e4ca4d79b2c). Before the first texel of the
+// first level, the first two texels alternate. Before the first texel of other levels, and after the last pixel,
+// the outermost sample is repeated.
+//
+// Of Godot's, the horizontal one samples the larger image at the level's pixels; the vertical one completes the
+// level (godotengine/godot, copy.glsl @ 0a5efd02df51).
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+#include "lib/storage.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+
+#define TARGET_BINDING 3
+#include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
+#include "lib/godot.glsl"
+#include "lib/hdrp.glsl"
+
+const ivec2 along = DIRECTION == DIRECTION_HORIZONTAL ? ivec2(1, 0) : ivec2(0, 1);
+
+// HDRP's position of a pixel of the target. SAMPLING_TEXEL: the source is twice as large along the direction,
+// which needs no division.
+Place place_of(ivec2 pixel, ivec2 size)
+{
+    if (SAMPLING == SAMPLING_TEXEL)
+        return Place(pixel * (1 + along), 0.5 * vec2(along));
+    return place_in(source, pixel, size);
+}
+
+vec4 hdrp_sample(ivec2 pixel, ivec2 size)
+{
+    bvec2 before = lessThan(pixel, ivec2(0));
+    if (FIRST != 0)
+        return fetch_clamped(source, mix(pixel, pixel & 1, before));
+    Place place = place_of(clamp(pixel, ivec2(0), size - 1), size);
+    place = Place(mix(place.texel, ivec2(0), before), mix(place.part, vec2(0.0), before));
+    if (SAMPLING == SAMPLING_FILTER)
+        return sample_at(source, place, vec2(0.0), SAMPLING);
+    // Across the direction, source and target have the same size.
+    return blended(fetch_clamped(source, place.texel), fetch_clamped(source, place.texel + along),
+                   dot(place.part, vec2(along)));
+}
+
+vec4 godot_sample(ivec2 pixel, ivec2 size)
+{
+    if (DIRECTION == DIRECTION_VERTICAL)
+        return texelFetch(source, ivec2(pixel.x, paired(pixel.y, size.y)), 0);
+    pixel.x = paired(pixel.x, size.x);
+    return dimmed(sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING));
+}
+
+vec4 shade()
+{
+    ivec2 size = ivec2(params.target_width, params.target_height);
+    vec4 sum = vec4(0.0);
+    for (int tap = -HDRP_RADIUS; tap <= HDRP_RADIUS; ++tap)
+        sum += GROUPS == GROUPS_HDRP_BLUR
+                 ? HDRP_WEIGHTS[tap + HDRP_RADIUS] * hdrp_sample(PIXEL + tap * along, size)
+                 : GODOT_WEIGHTS[abs(tap)] * godot_sample(PIXEL + tap * along, size);
+    if (GROUPS == GROUPS_HDRP_BLUR || DIRECTION == DIRECTION_HORIZONTAL)
+        return stored(sum);
+    return stored(FIRST == 0 ? params.strength * sum : mask_value() * glowing(sum));
+}
