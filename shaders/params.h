@@ -218,6 +218,12 @@
     INPUT(B, float, fade) \
     INPUT(B, float, limit)
 
+// A mean of pixels along rows or columns (box_mean.comp).
+#define BOX_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, across) \
+    INPUT(B, int, radius) \
+    INPUT(B, float, limit)
+
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
 // the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
@@ -324,6 +330,7 @@
     BLOCK(dirt, DIRT_BLOCK) \
     BLOCK(blender_end, BLENDER_END_BLOCK) \
     BLOCK(star, STAR_BLOCK) \
+    BLOCK(box, BOX_BLOCK) \
     BLOCK(sun_beams, SUN_BEAMS_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
@@ -673,6 +680,7 @@
     NAME(COMPOSITE_OFF, -1, off) \
     NAME(COMPOSITE_ADD_TO_POSITIVE, 5, add_to_positive) \
     NAME(COMPOSITE_UNCLAMPED_SCREEN, 6, unclamped_screen) \
+    NAME(COMPOSITE_LIGHTNESS_SCREEN, 7, lightness_screen) \
     NAME(THRESHOLD_NONE, 0, none) \
     NAME(THRESHOLD_HARD, 1, hard) \
     NAME(THRESHOLD_KNEE, 2, knee) \
@@ -715,6 +723,7 @@
     NAME(GROUPS_BABYLON, 15, babylon) \
     NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
     NAME(GROUPS_UNREAL, 17, unreal) \
+    NAME(GROUPS_DARKTABLE, 18, darktable) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \

@@ -2,7 +2,7 @@
 
 python tools/docs_pictures.py docs/pictures
 
-- gallery.jpg: the saucer with each preset
+- gallery.jpg: a street at night with each preset
 - presets.png, profiles.png: how the light of a point spreads with each preset
 - hero.jpg: the saucer without bloom beside the saucer with bloom
 - the flowchart of docs/plans.md, from a plan
@@ -28,7 +28,7 @@ SIZE = (640, 360)
 CELL = (480, 270)
 HERO = (1280, 640)
 # The square around a point in pixels, and the range of its logarithmic scale.
-SIDE, DECADES = 300, 5
+SIDE, DECADES = 240, 5
 
 
 def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
@@ -52,35 +52,60 @@ def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
 
 
 def write_sheet(path: Path, tiles: list[tuple[np.ndarray, str]], columns: int) -> None:
-    """Write pictures in rows, with their names below."""
+    """Write pictures in rows, with their names below, for light and dark pages."""
     height, width = tiles[0][0].shape[:2]
-    rows = -(-len(tiles) // columns)
-    size = (columns * width / 100, rows * (height / 100 + 0.3))
-    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained")
-    for axis in axes.flat:
-        axis.set_axis_off()
-    for axis, (tile, name) in zip(axes.flat, tiles, strict=False):
-        axis.imshow(tile)
-        axis.set_title(name, y=0, verticalalignment="top", fontsize=12)
-    figure.savefig(path, dpi=100)
+    rows, margin, name = -(-len(tiles) // columns), 6, 26
+    size = columns * (width + margin) + margin, rows * (height + name) + margin
+    figure = plt.figure(figsize=(size[0] / 100, size[1] / 100), facecolor="#222222")
+    for index, (tile, text) in enumerate(tiles):
+        x = margin + index % columns * (width + margin)
+        y = size[1] - margin - index // columns * (height + name)
+        # Pixel by pixel.
+        figure.figimage(tile, x, y - height)
+        place = (x + width / 2) / size[0], (y - height - name / 2) / size[1]
+        figure.text(*place, text, color="white", fontsize=12, ha="center", va="center")
+    figure.savefig(path, dpi=100, facecolor="#222222")
     plt.close(figure)
 
 
+def night() -> np.ndarray:
+    """Return a street at night, (H, W, 3): houses with windows, lamps, a moon, a sign, a car."""
+    width, height = CELL
+    random = np.random.default_rng(5)
+    y, x = np.mgrid[:height, :width]
+    picture = np.ones((height, width, 1)) * (0.004, 0.006, 0.014) * (1 + 2 * y / height)[..., None]
+    left = 0
+    while left < width:
+        right, top = left + random.integers(40, 90), random.integers(60, 150)
+        picture[top:230, left:right] = (0.012, 0.011, 0.010)
+        for row in range(top + 8, 222, 16):
+            for column in range(left + 6, min(right, width) - 8, 14):
+                if random.random() < 0.35:
+                    picture[row : row + 7, column : column + 6] = random.uniform(
+                        0.3, 2.5
+                    ) * np.array((1, 0.75, 0.4))
+        left = right
+    picture[230:] = 0.02
+    picture[(x - 400) ** 2 + (y - 36) ** 2 < 13**2] = (6, 6, 5.4)
+    for lamp in (50, 170, 290, 410):
+        picture[190:236, lamp - 1 : lamp + 1] = 0.03
+        picture[187:191, lamp - 4 : lamp + 4] = (60, 42, 20)
+        pool = np.exp(-(((x - lamp) / 40) ** 2) - ((y - 246) / 10) ** 2)[..., None]
+        picture += 0.25 * pool * (1, 0.7, 0.35)
+    picture[128:132, 205:262] = (0.5, 8, 6)
+    picture[150:154, 205:262] = (10, 0.4, 3)
+    picture[240:243, 226:230] = picture[240:243, 240:244] = (90, 88, 80)
+    return picture.astype(np.float32)
+
+
 def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
-    """Draw the deferred saucer with each preset, and without bloom."""
-    scene = dataclasses.replace(vkbloom.Scene.ufo(), glow_intensity=6.0)
+    """Draw the street with each preset, and without bloom."""
     tiles = []
     for name, settings in {"no bloom": vkbloom.Separable(bloom=False), **vkbloom.presets}.items():
-        changed = settings.replace(tonemap="aces", encoding="srgb", exposure=-0.5)
-        # Such a bloom stands for the whole picture, not for its lights alone. Without bloom a scene
-        # has no lamps, but its picture before the bloom has.
-        if not settings.bloom or (settings.composite == "mix" and settings.intensity == 1):
-            lit = renderer.render(scene, None, CELL, shading="deferred", framebuffers="scene")
-            final = renderer.apply(lit["scene"], changed, framebuffers="final")["final"]
-        else:
-            final = renderer.render(scene, changed, CELL, shading="deferred")["final"]
+        changed = settings.replace(tonemap="aces", encoding="srgb")
+        final = renderer.apply(night(), changed, framebuffers="final")["final"]
         tiles.append((pictures.picture(final, "final", encoded=True), name))
-    write_sheet(path, tiles, 3)
+    write_sheet(path, tiles, 4)
 
 
 def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
@@ -90,8 +115,8 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     y, x = height // 2, width // 2
     # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
-    figure, axes = plt.subplots(figsize=(8, 4.6), layout="constrained")
-    tiles = []
+    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
+    random, tiles = np.random.default_rng(1), []
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
         exact = settings.replace(format="rgba32float", bloom=True)
         bloom = renderer.apply(image, exact, framebuffers="bloom")["bloom"][..., 0]
@@ -107,8 +132,8 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
         )
         middle = bloom[y - SIDE // 2 : y + SIDE // 2, x - SIDE // 2 : x + SIDE // 2]
         decades = np.log10(np.maximum(middle / bloom.max(), 10.0**-DECADES))
-        # 32 levels of grey show the shape and keep the file small.
-        grey = np.rint(31 * (1 + decades / DECADES)) * (255 / 31)
+        # Dithered, since levels of 8 bits would be rings that no bloom has.
+        grey = 254 * np.maximum(1 + decades / DECADES, 0) + random.random(decades.shape)
         tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name))
     axes.set_xlabel("distance, pixels (+ 0.5)")
     axes.set_ylabel("share of the light of the point, per pixel")
@@ -117,7 +142,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     figure.legend(fontsize=7, loc="outside right upper")
     figure.savefig(folder / "profiles.png", dpi=110)
     plt.close(figure)
-    write_sheet(folder / "presets.png", tiles, 4)
+    write_sheet(folder / "presets.png", tiles, 5)
 
 
 def write_flowchart(page: Path) -> None:

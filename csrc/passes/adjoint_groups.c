@@ -92,6 +92,7 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
     case GROUPS_URP:
     case GROUPS_POST_PROCESSING:
     case GROUPS_UNREAL:
+    case GROUPS_DARKTABLE:
     case GROUPS_THREE:
     case GROUPS_BABYLON:
     case GROUPS_PYGFX:

@@ -28,6 +28,8 @@ static int composite_of(const struct vkb_settings *settings,
     if (settings->method == VKB_METHOD_PMNDRS && composite == COMPOSITE_SCREEN
         && source->bloom != VKB_NO_IMAGE)
         return COMPOSITE_UNCLAMPED_SCREEN;
+    if (settings->method == VKB_METHOD_DARKTABLE && source->bloom != VKB_NO_IMAGE)
+        return COMPOSITE_LIGHTNESS_SCREEN;
     return source->bloom == VKB_NO_IMAGE               ? COMPOSITE_OFF
          : composite == COMPOSITE_MIX && source->apart ? COMPOSITE_ADD
                                                        : composite;

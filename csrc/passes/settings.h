@@ -26,6 +26,7 @@
     METHOD(PMNDRS, pmndrs, true) \
     METHOD(BABYLON, babylon, true) \
     METHOD(PLAYCANVAS, playcanvas, true) \
+    METHOD(DARKTABLE, darktable, true) \
     METHOD(CUSTOM, custom, false)
 
 enum vkb_method {

@@ -23,6 +23,7 @@ from ._methods.babylon import BabylonBloom
 from ._methods.bevy import BevyBloom
 from ._methods.blender import BlenderGlare
 from ._methods.convolution import Convolution
+from ._methods.darktable import DarktableBloom
 from ._methods.filament import FilamentBloom
 from ._methods.godot import GodotBloom
 from ._methods.halation import Halation
@@ -55,6 +56,7 @@ __all__ = [
     "BlenderGlare",
     "Camera",
     "Convolution",
+    "DarktableBloom",
     "DeviceArray",
     "DeviceLostError",
     "Dirt",

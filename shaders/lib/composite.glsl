@@ -3,6 +3,7 @@
 
 #include "lib/dither.glsl"
 #include "lib/finite.glsl"
+#include "lib/lab.glsl"
 #include "lib/tonemap.glsl"
 
 // The light of the bloom, or with glare of both, which the image then has the sum of.
@@ -30,6 +31,8 @@ vec3 composite(vec3 s, vec3 b, float share)
     // Of pmndrs/postprocessing: above 1 it adds, less 1.
     if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
         return s + light_of(b) - min(s * light_of(b), vec3(1.0));
+    if (COMPOSITE == COMPOSITE_LIGHTNESS_SCREEN)
+        return lightness_screen(s, light_of(b).r);
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
         return max(s, vec3(0.0)) + light_of(b);
     if (COMPOSITE == COMPOSITE_ADD)

@@ -1,6 +1,7 @@
 // What downsamplings that are not linear, and the first passes of published methods, make of their bilinear taps,
 // by GROUPS.
 #include "lib/groups.glsl"
+#include "lib/lab.glsl"
 #include "lib/highlights.glsl"
 #include "lib/kino.glsl"
 
@@ -127,6 +128,14 @@ float unreal_share(vec4 value)
     return THRESHOLDED == 0 ? 1.0 : dot(value.rgb, LUMINANCE) + 1.0 - params.threshold;
 }
 
+// darktable's: a step of the lightness (darktable 4.2.1, src/iop/bloom.c).
+vec4 darktable_prefiltered(vec4 value)
+{
+    float light = params.strength * lightness_of(value.rgb);
+    bool bright = THRESHOLDED == 0 || light > params.threshold;
+    return bright ? vec4(vec3(light / 100.0), value.a) : vec4(0.0);
+}
+
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 vec4 three_prefiltered(vec4 value)
@@ -152,6 +161,8 @@ int group_count()
     if (GROUPS == GROUPS_POST_PROCESSING)
         return 1;
     if (GROUPS == GROUPS_UNREAL)
+        return 1;
+    if (GROUPS == GROUPS_DARKTABLE)
         return 1;
     if (GROUPS == GROUPS_THREE)
         return 1;
@@ -216,5 +227,7 @@ vec4 made(vec4 found[5], vec4 shares)
         return three_prefiltered(found[0]);
     if (GROUPS == GROUPS_UNREAL)
         return clamp(unreal_share(found[0]), 0.0, 1.0) * found[0];
+    if (GROUPS == GROUPS_DARKTABLE)
+        return darktable_prefiltered(found[0]);
     return unity_prefiltered(found[0]);
 }

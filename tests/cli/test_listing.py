@@ -27,7 +27,7 @@ def run(*words: object) -> Result:
 
 
 NAMES = {
-    "presets": list(vkbloom.presets),
+    "presets": [entry.name for entry in presets_command.entries()],
     "glares": [*STAGES, *vkbloom.glares],
     "psfs": list(functions()),
 }
@@ -38,10 +38,21 @@ def test_one_line_each(command: str) -> None:
     result = run(command)
     assert result.exit_code == 0
     lines = [line.split() for line in result.stdout.splitlines() if line.strip()]
-    assert lines[0] == ["name", "composite", "needs", "HDR", "what", "whose"]
-    # Below the heading and its rule.
-    assert [words[0] for words in lines[2:]] == NAMES[command]
-    assert all(len(words) >= 5 for words in lines[2:])
+    confirmed = ["confirmed", "by"] if command == "presets" else []
+    assert lines[0] == ["name", "composite", "needs", "HDR", *confirmed, "what", "whose"]
+    # Below the heading and its rule. Names of engines end with a colon.
+    rows = [words for words in lines[2:] if not words[-1].endswith(":")]
+    assert [words[0] for words in rows] == NAMES[command]
+    assert all(len(words) >= 5 for words in rows)
+
+
+def test_presets_are_grouped_by_engine() -> None:
+    assert sorted(NAMES["presets"]) == sorted(vkbloom.presets)
+    lines = [line.strip() for line in run("presets").stdout.splitlines()]
+    engines = [line for line in lines if line.endswith(":")]
+    assert len(engines) == len(set(engines)) > 10
+    unity = lines[lines.index("Unity:") : lines.index("Godot:")]
+    assert [line.split()[3] for line in unity[1:]] == ["frames"] * 6
 
 
 def test_a_narrow_terminal_cuts_the_last_columns() -> None:
@@ -50,8 +61,9 @@ def test_a_narrow_terminal_cuts_the_last_columns() -> None:
     entries = list(presets_command.entries())
     console.print(listing._table(entries))
     lines = [line.split() for line in printed.getvalue().splitlines() if line.strip()]
-    assert [words[0] for words in lines[2:]] == NAMES["presets"]
-    for words, entry in zip(lines[2:], entries, strict=True):
+    rows = [words for words in lines[2:] if not words[-1].endswith(":")]
+    assert [words[0] for words in rows] == NAMES["presets"]
+    for words, entry in zip(rows, entries, strict=True):
         assert words[1:3] == [entry.composite, "yes" if entry.needs_hdr else "no"]
 
 
@@ -75,7 +87,8 @@ def test_json(command: str) -> None:
         assert one["whose"]
     if command == "presets":
         settings = [vkbloom.Settings.from_dict(one["settings"]) for one in found]
-        assert settings == list(vkbloom.presets.values())
+        assert settings == [vkbloom.presets[one["name"]] for one in found]
+        assert {one["confirmed"] for one in found} == {"frames", "binary", "formula"}
 
 
 def test_what_needs_values_above_1(renderer: vkbloom.Renderer) -> None:

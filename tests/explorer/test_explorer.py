@@ -86,6 +86,7 @@ class TestControls:
                 "pmndrs": {"knee"},
                 "babylon": {"knee"},
                 "playcanvas": {"knee"},
+                "darktable": {"knee"},
             }
             assert without == {"method", "bloom_size"} | refused.get(name, set())
             first = [field["name"] for field in method["fields"] if field["first"]]

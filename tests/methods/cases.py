@@ -12,6 +12,7 @@ from vkbloom import (
     BevyBloom,
     BlenderGlare,
     Convolution,
+    DarktableBloom,
     DualKawase,
     FilamentBloom,
     GodotBloom,
@@ -94,6 +95,7 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "unreal-standard-mask": (UnrealBloom(threshold=0.4, alpha="blur"), MASK),
     "halation-mask": (Halation(alpha="blur"), MASK),
     "playcanvas-mask": (PlayCanvasBloom(threshold=0.5, alpha="blur"), MASK),
+    "darktable-mask": (DarktableBloom(threshold=60.0, alpha="blur"), MASK),
     "playcanvas-emission": (PlayCanvasBloom(), EMISSION),
     "godot-mask": (
         GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),

@@ -19,6 +19,7 @@ import vkbloom
 from vkbloom import testing
 from vkbloom._cli.program import program
 from vkbloom._gradients import on_device
+from vkbloom._presets.named_settings import ENGINES
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom.reference._derivatives import differentiable
@@ -35,6 +36,8 @@ PATH, STEPS, LIGHT = 16, 1.5, 1000.0
 # 720p, 1080p, 4K; a lamp of four pixels at 720p.
 SCALES = (1.0, 1.5, 3.0)
 LAMP, LAMP_SIDE = 100.0, 1 / 180
+# By engine.
+CONFIRMED = {name: how for _, how, names in ENGINES for name in names.split()}
 # Change of both radii, as a share of their mean, that a preset keeps its look with.
 KEPT = 0.1
 
@@ -91,25 +94,26 @@ def spread(bloom: NDArray[np.float64], light: float) -> tuple[float, list[float]
 
 
 def _cost(renderer: vkbloom.Renderer, settings: vkbloom.Settings, rounds: int) -> float:
-    """Return the seconds of one call; each has another image than the one before."""
+    """Return the processor seconds of one call; each has another image than the one before."""
     generator = np.random.default_rng(0)
     shape = (2, FRAME[1], FRAME[0], 3)
     images = (generator.random(shape) ** 8 * 10).astype(np.float16)
     seconds = []
     for index in range(rounds + 3):
-        began = time.perf_counter()
+        began = time.process_time()
         renderer.apply(images[index % 2], settings, framebuffers=["final"])
-        seconds.append(time.perf_counter() - began)
+        seconds.append(time.process_time() - began)
     return median(seconds[3:])
 
 
 def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
-    """Return gain, spread and cost of each preset at 1280 x 720, in half floats."""
+    """Return gain, spread, corner and cost of each preset at 1280 x 720, in half floats."""
     rows = []
     point = np.zeros((FRAME[1], FRAME[0], 3), np.float32)
     y, x = FRAME[1] // 2, FRAME[0] // 2
     point[y - 1 : y + 2, x - 1 : x + 2] = VALUE
-    for name, settings in vkbloom.presets.items():
+    for name, how in CONFIRMED.items():
+        settings = vkbloom.presets[name]
         exact = settings.replace(format="rgba32float")
         bloom = renderer.apply(point, exact)["bloom"]
         share, radii = spread(bloom[:, :, 0].astype(np.float64), 9 * VALUE)
@@ -117,19 +121,26 @@ def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
         flat = renderer.apply(np.full_like(point, FLAT), exact)
         gain = float(flat["bloom"][y, x, 0]) / FLAT
         adds = settings.composite == "add"
+        (border,) = testing.report(
+            lambda image, settings=settings: renderer.apply(image, settings)["bloom"][..., :3],
+            laws=["border"],
+        ).rows
         rows.append(
             [
                 f"`{name}`",
+                how,
                 f"{gain:.3g}",
                 f"{settings.intensity * gain:.3g}" if adds else settings.composite,
                 f"{share:.3g}",
+                f"{border.figures['corner']:.2g}",
                 *(f"{radius:.0f}" for radius in radii),
                 str(len(flat.timings)),
                 f"{1e3 * _cost(renderer, settings, 1 if quick else 15):.1f}",
             ]
         )
     within = (f"{share:.0%} within" for share in SHARES)
-    return table(["preset", "gain", "added", "light of a point", *within, "passes", "ms"], rows)
+    heads = ["preset", "confirmed by", "gain", "added", "light of a point", "corner", *within]
+    return table([*heads, "passes", "ms"], rows)
 
 
 def listed(names: Iterable[str]) -> str:

@@ -58,13 +58,21 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
 
 def _table(entries: Iterable[Entry]) -> Table:
     """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
+    listed = list(entries)
+    is_grouped = any("engine" in one.values for one in listed)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("name", "composite", "needs HDR"):
+    for title in ("name", "composite", "needs HDR", *["confirmed by"] * is_grouped):
         table.add_column(title, no_wrap=True)
     # Columns that rich makes narrower, with texts that it does not wrap.
     table.add_column("what")
     table.add_column("whose")
-    for one in entries:
+    engine = ""
+    for one in listed:
+        if one.values.get("engine", "") != engine:
+            engine = one.values["engine"]
+            table.add_row(Text(f"{engine}:", style="bold"))
         texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (one.what, one.whose))
-        table.add_row(one.name, one.composite, "yes" if one.needs_hdr else "no", *texts)
+        confirmed = [one.values["confirmed"]] if is_grouped else []
+        hdr = "yes" if one.needs_hdr else "no"
+        table.add_row(one.name, one.composite, hdr, *confirmed, *texts)
     return table

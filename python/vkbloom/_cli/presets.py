@@ -6,21 +6,27 @@ from collections.abc import Iterator
 
 from vkbloom._cli.listing import Entry, listing_command
 from vkbloom._cli.settings_options import PRESET_OF_PHOTOS
-from vkbloom._presets.named_settings import PRESETS
+from vkbloom._presets.named_settings import ENGINES, PRESETS
 
 
 def entries() -> Iterator[Entry]:
-    """Yield the presets."""
-    for name, one in PRESETS.items():
+    """Yield the presets, those of an engine after each other."""
+    places = {
+        name: (engine, confirmed) for engine, confirmed, names in ENGINES for name in names.split()
+    }
+    for name, (engine, confirmed) in places.items():
+        one = PRESETS[name]
         settings = one.make()
         # The command line expands the highlights of a photograph for the preset photo.
         needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
         values = {"intensity": settings.intensity, "settings": settings.to_dict()}
+        values |= {"engine": engine, "confirmed": confirmed}
         yield Entry(name, one.what, one.whose, settings.composite, needs_hdr, values)
 
 
 command = listing_command(
-    "List the presets: what they look like, whose they are, whether they mix or add, and whether "
-    "they need values above 1.",
+    "List the presets by engine: what they look like, their versions, what confirmed them (frames "
+    "of the engine's shaders, the program itself, or a formula alone), whether they mix or add, "
+    "and whether they need values above 1.",
     entries,
 )

@@ -35,5 +35,6 @@ METHODS.supply(
         "pmndrs": "pmndrs:PmndrsBloom",
         "babylon": "babylon:BabylonBloom",
         "playcanvas": "playcanvas:PlayCanvasBloom",
+        "darktable": "darktable:DarktableBloom",
     },
 )

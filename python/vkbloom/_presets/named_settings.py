@@ -34,6 +34,28 @@ def _psf() -> ModuleType:
     return psf
 
 
+#: Engines, how their presets were confirmed (docs/presets.md), and these. "frames": by pictures
+#: that the engine's own shaders drew. "binary": by the program itself. "formula": the source alone.
+ENGINES: Final[tuple[tuple[str, str, str], ...]] = (
+    ("Samples in C++", "binary", "tutorial"),
+    ("Samples in C++", "formula", "outline deferred"),
+    ("Unreal Engine", "formula", "unreal unreal_convolution"),
+    ("Unity", "frames", "unity_urp unity_urp_kawase unity_urp_dual unity_hdrp unity_ppv2 kino"),
+    ("Godot", "frames", "godot_4_5 godot_4_6"),
+    ("Bevy", "frames", "bevy_natural"),
+    ("Filament", "frames", "filament"),
+    ("three.js", "frames", "threejs_unreal threejs_r187 threejs_node pmndrs"),
+    ("Babylon.js", "frames", "babylon"),
+    ("PlayCanvas", "frames", "playcanvas"),
+    ("pygfx", "binary", "pygfx"),
+    ("Blender", "binary", "blender_bloom blender_fog_glow blender_ghosts blender_streaks"),
+    ("Blender", "binary", "blender_simple_star blender_sun_beams"),
+    ("Film", "frames", "halation"),
+    ("Optics", "formula", "spencer_photopic camera_lens iris_6"),
+    ("Articles", "formula", "jimenez2014 dual_kawase"),
+    ("vkbloom", "formula", "photo"),
+)
+
 #: The presets by name.
 PRESETS: Final[Mapping[str, Preset]] = {
     "tutorial": Preset(
@@ -87,7 +109,7 @@ PRESETS: Final[Mapping[str, Preset]] = {
     "unity_urp": Preset(
         lambda: METHODS["urp"](),
         "a narrow glow above a soft threshold, with the intensity 1",
-        "Unity URP, Bloom.cs @ a085de35f86e",
+        "Unity URP 17, Bloom.cs @ a085de35f86e",
     ),
     "unity_hdrp": Preset(
         lambda: METHODS["hdrp"](),

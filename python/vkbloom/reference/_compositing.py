@@ -10,6 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import ANY, SETTINGS, checked_as
 
+from ._darktable import screened
 from ._image import as_float, format_of, storage
 from ._sampling import Array
 from ._tape import joined
@@ -111,6 +112,8 @@ def composite_checked(
         elif settings.method == "blender":
             # max(0, s), whose derivative at black is the mean of both sides.
             rgb = curve(((rgb + np.abs(rgb)) / 2 + glow) * scale)
+        elif settings.method == "darktable":
+            rgb = curve(screened(rgb, glow) * scale)
         elif settings.method == "pmndrs" and settings.composite == "screen":
             rgb = curve((rgb + glow - np.minimum(rgb * glow, 1)) * scale)
         else:

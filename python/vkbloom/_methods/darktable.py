@@ -1,0 +1,65 @@
+"""Bloom of darktable."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+from vkbloom._settings.blocks import settings_block
+from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DarktableBloom(Settings):
+    """Bloom of darktable, on the lightness of CIE Lab.
+
+    Parameters
+    ----------
+    size : float
+        Width of the glow in percent, 0 to 100.
+    strength : float
+        Brightness of the glow in percent, 0 to 100.
+    threshold : float or None
+        Lightness after the strength, 0 to 100, that a colour must exceed.
+    composite : {"screen"}
+        Of lightness: L' = L + i b (100 - L). Above 100 it becomes darker.
+    **settings
+        The other fields of `Settings`; there is no knee.
+
+    Notes
+    -----
+    ``bright`` is L 2^(min(100, strength + 1) / 100) / 100 where that is above the threshold, else
+    0. L is that of CIE Lab (D50). ``bloom`` is ``bright``, eight times the mean of a box along x,
+    then along y, of floor(256 min(100, size + 1) / 100) pixels to each side, at most 256, as far
+    as these are inside of the frame. a and b of a colour do not change.
+
+    Source: darktable 4.2.1, src/iop/bloom.c.
+
+    Examples
+    --------
+    >>> vkbloom.DarktableBloom(size=5).radius
+    15
+    """
+
+    method: ClassVar[str] = "darktable"
+    published: ClassVar[bool] = True
+
+    threshold: float | None = number_field(default=90.0, range=(0, 100))
+    knee: float = no_knee("darktable")
+    composite: Composite = choice_field("composite", ("screen",))
+    format: BloomFormat | None = "rgba16float"
+    size: float = number_field(default=20.0, range=(0, 100))
+    strength: float = number_field(default=25.0, range=(0, 100))
+
+    @property
+    def radius(self) -> int:
+        """Pixels to each side of a box."""
+        return min(256, math.floor(256 * min(100.0, self.size + 1) / 100))
+
+    def _core_block(self) -> bytes:
+        """Return the settings with the core's names and units."""
+        gain = 2 ** (min(100.0, self.strength + 1) / 100)
+        values = {"size": self.radius / 256, "strength": gain}
+        return settings_block(self.method, vars(self) | values)
