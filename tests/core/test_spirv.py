@@ -105,7 +105,7 @@ def exp2_error(size: float) -> float:
 def power_error(exponent: float, logarithm: float) -> float:
     """Return that of a power of values whose logarithms to base 2 are up to `logarithm`."""
     of_logarithm = max(2.0**-21, 3 * UNIT * logarithm)
-    return exp2_error(exponent * logarithm) + np.log(2) * exponent * of_logarithm
+    return exp2_error(exponent * logarithm) + float(np.log(2)) * exponent * of_logarithm
 
 
 def test_every_loose_function_is_listed_and_within_the_promise() -> None:
@@ -125,7 +125,7 @@ def test_every_loose_function_is_listed_and_within_the_promise() -> None:
         "srgb, gamma22": power_error(1 / 2.2, 24),
         "agx": power_error(2.2, 24) + UNIT * 2.5,
         # From 1e-5 cd/m2 on; the second base is between C1 and 1.
-        "pq": power_error(0.159, 30) * 78.84 * 0.16 + power_error(78.84, -np.log2(0.8359)),
+        "pq": power_error(0.159, 30) * 78.84 * 0.16 + power_error(78.84, float(-np.log2(0.8359))),
         "phong": power_error(8, 16),
         "length, normalize, sqrt": 2 * 2.5 * UNIT,
     }

@@ -137,7 +137,7 @@ def test_a_gpu_imports_no_memory_that_a_fork_takes_away(
 ) -> None:
     """Before Linux 5.12 a fork leaves pinned pages to the child; a CPU pins none."""
     library, listed = tmp_path / "old.so", tmp_path / "usages"
-    command = [*compiler(), "-shared", "-fPIC", "-x", "c", "-", "-o", library]
+    command = [*compiler(), "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
     subprocess.run(command, input=OLD_LINUX, text=True, check=True)
     listed.touch()
     layers = layer_variables(layer, WATCHED)
