@@ -483,18 +483,18 @@
 // transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
 // 256 invocations composite 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one
 // of 32 x 16, 151 in one of 64 x 16.
-#define DOUBLE_TILE_COLUMNS    64
-#define DOUBLE_TILE_ROWS       16
-#define DOUBLE_TILE_RUNS       4
+#define DOUBLE_TILE_COLUMNS 64
+#define DOUBLE_TILE_ROWS    16
+#define DOUBLE_TILE_RUNS    4
 // Tiles of filters: their rows, and the invocations of a workgroup.
 #define FILTER_TILE_ROWS        16
 #define FILTER_TILE_INVOCATIONS 256
-#define ADJOINT_HALVE_COLUMNS  32
-#define ADJOINT_HALVE_ROWS     16
-#define ADJOINT_HALVE_RUNS     4
-#define ADJOINT_DOUBLE_COLUMNS 61
-#define ADJOINT_DOUBLE_ROWS    4
-#define FUSED_VEC4S            5
+#define ADJOINT_HALVE_COLUMNS   32
+#define ADJOINT_HALVE_ROWS      16
+#define ADJOINT_HALVE_RUNS      4
+#define ADJOINT_DOUBLE_COLUMNS  61
+#define ADJOINT_DOUBLE_ROWS     4
+#define FUSED_VEC4S             5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
@@ -543,19 +543,20 @@
 
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
-// that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too long
-// to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the source
-// is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl), and SOURCE_ROWS of their tiles. EXACT says that their images are in this ratio, or for strips the widths of
-// these. With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
-// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
-// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
-// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
-// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
-// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
-// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
-// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
-// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
+// that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
+// long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
+// source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
+// (lib/filter.glsl), and SOURCE_ROWS of their tiles. EXACT says that their images are in this
+// ratio, or for strips the widths of these. With FROM_IMAGE, a downsampling to half the size
+// reads the image itself and applies the threshold, and an adjoint pass writes the cotangents of
+// a source's image. BY is what these are of. With ENLARGED the target has more rows than the
+// source. STORED is the format of the target (STORED_*). FIRST marks an engine's first level.
+// LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling makes of its
+// taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH
+// x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage that is
+// PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1 to
+// RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
+// GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
