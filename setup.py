@@ -83,14 +83,15 @@ class Module(NamedTuple):
 def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to, with those for the images of a batch.
 
-    Adjoints and Fourier transforms run for one image. A shader that uses MIXED is also compiled for
-    the adjoint of what it ends with, in single floats.
+    Adjoints and Fourier transforms run for one image. A shader that includes ended.glsl is
+    also compiled for the adjoint of what it ends with, in single floats.
     """
     plain = list(plain_modules(shader))
     adjoints = [
         Module(name.replace(shader.stem, f"{shader.stem}_mixed"), shader, (*options, "-DMIXED"))
         for name, _, options in plain
-        if "MIXED" in shader.read_text() and name.endswith(("_comp", "_words_rgba32float"))
+        if '"lib/ended.glsl"' in shader.read_text()
+        and name.endswith(("_comp", "_words_rgba32float"))
     ]
     if shader.stem.startswith(("adjoint", "fft")):
         return plain

@@ -23,7 +23,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinxcontrib.mermaid",
 ]
-exclude_patterns = ["README.md", "evidence/*_table.md"]
+exclude_patterns = ["README.md", "evidence/*_table.md", "examples/faults.md"]
 
 # Sphinx reads what is in this folder alone. The notebooks are shown with the outputs that they are
 # stored with (tools/run_notebooks.py).

@@ -1,5 +1,6 @@
 #include "execute/frame.h"
 
+#include "execute/probe.h"
 #include "share/exported_images.h"
 #include "transfer/sources.h"
 
@@ -199,6 +200,7 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
         .plan = request->plan,
         .next = next ? &next->plan->graph : NULL,
         .contents = run->contents,
+        .unfused = run->device->texels == VKB_TEXELS_OTHER,
         .source = vkb_sources_version(run),
         .scene = frame->scene.serial,
     };
@@ -285,7 +287,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
     find_usages(run, source, requests, request_count);
     return (!source->scene || load_scene(run, source->scene, error))
         && vkb_sources_stage(run, source, requests, request_count, error)
-        && stage_constants(run, error) && reserve(run, requests, request_count, error)
+        && stage_constants(run, error) && vkb_probe_texels(run, requests, request_count, error)
+        && reserve(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 

@@ -358,6 +358,13 @@ static bool reads_finite(const struct vkb_run *run, const struct vkb_pass_row *p
         && non_finite->inf == 0;
 }
 
+// Whether a fused pass keeps 8-bit levels, and the device reads them as products.
+static bool keeps_levels(const struct vkb_run *run, const struct vkb_pass_row *pass)
+{
+    return pass->fused && pass->constants.format == STORED_UNORM8
+        && run->device->texels == VKB_TEXELS_SCALED;
+}
+
 static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,
                         struct vkb_error *error)
 {
@@ -376,11 +383,13 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
             known.shader = known.shader->packed;
         known.constants.finite = reads_finite(run, pass);
         pass = &known;
-    } else if (reads_finite(run, pass)) {
+    } else if (reads_finite(run, pass) || keeps_levels(run, pass)) {
         memcpy(&known, pass, sizeof known);
-        known.constants.finite = true;
+        known.constants.finite = reads_finite(run, pass);
         pass = &known;
     }
+    if (keeps_levels(run, pass))
+        known.constants.format = STORED_UNORM8_SCALED;
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
                            error))
         return false;

@@ -239,7 +239,7 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
         skipped[i] = graph->passes[i].fused;
     mark(step->plan, skipped, needed, wanted);
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        if (!graph->passes[i].fused)
+        if (!graph->passes[i].fused || step->unfused)
             continue;
         memcpy(plain, needed, graph->pass_count * sizeof *plain);
         skipped[i] = false;

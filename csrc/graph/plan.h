@@ -32,6 +32,7 @@ struct vkb_plan_step {
     const struct vkb_plan *plan;
     const struct vkb_graph *next;   // graph of the next plan with the same source; NULL: not known
     struct vkb_content **contents;  // by image; NULL: there is no cached image
+    bool unfused;                   // no fused pass may run
     uint64_t source;                // version of the source's data
     uint64_t scene;                 // serial of the meshes and textures that draws read
 };

@@ -65,37 +65,6 @@ static bool add_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
     return vkb_graph_add_image(adjoint->graph, &row, &adjoint->table_image, error);
 }
 
-// Texels are four words of 32 bits, taken by two.
-static uint64_t hash_of(const struct vkb_table *table, size_t count)
-{
-    uint64_t hash = VKB_HASH_START;
-
-    for (size_t i = 0; i < count; ++i)
-        for (size_t half = 0; half < 2; ++half) {
-            uint64_t word;
-            memcpy(&word, &table->texels[i][2 * half], sizeof word);
-            hash = vkb_hash_word(hash, word);
-        }
-    return hash ? hash : 1;
-}
-
-// Fills the rest of the last row of weights, and gives them to the graph.
-static bool end_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
-{
-    struct vkb_table *table = &adjoint->table;
-    const size_t rows = table->count / TABLE_WIDTH + 1, texels = rows * TABLE_WIDTH;
-    struct vkb_image_row *row = &adjoint->graph->images[adjoint->table_image];
-
-    if (!vkb_grow(error, &table->texels, &table->capacity, texels, sizeof *table->texels))
-        return false;
-    memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
-    row->height = (uint32_t)rows;
-    row->pixels = adjoint->graph->owned[0] = table->texels;
-    row->serial = hash_of(table, texels);
-    *table = (struct vkb_table){0};
-    return true;
-}
-
 // Adds the adjoint passes, from the last pass to the first.
 static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                        bool *possible, struct vkb_error *error)
@@ -195,7 +164,8 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     for (uint32_t i = 0; done && i < cotangents->count; ++i)
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
-    done = done && add_passes(&adjoint, settings, possible, error) && end_table(&adjoint, error);
+    done = done && add_passes(&adjoint, settings, possible, error)
+        && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error);
     end_at_last(graph, pass_count);
     if (done && !cotangents->sums)
         show_results(&adjoint, image_count);

@@ -281,3 +281,38 @@ bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_ta
     vkb_free(readers);
     return done;
 }
+
+// Texels are four words of 32 bits, taken by two.
+static uint64_t hash_of(const struct vkb_table *table)
+{
+    uint64_t hash = VKB_HASH_START;
+
+    for (size_t i = 0; i < 2 * table->count; ++i) {
+        uint64_t word;
+        memcpy(&word, &table->texels[i / 2][i % 2 * 2], sizeof word);
+        hash = vkb_hash_word(hash, word);
+    }
+    return hash ? hash : 1;
+}
+
+bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
+                   struct vkb_error *error)
+{
+    const size_t rows = table->count / TABLE_WIDTH + 1, texels = rows * TABLE_WIDTH;
+    struct vkb_image_row *row = &graph->images[image];
+    const bool done =
+        vkb_grow(error, &table->texels, &table->capacity, texels, sizeof *table->texels);
+
+    if (done) {
+        memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
+        table->count = texels;
+        row->height = (uint32_t)rows;
+        row->serial = hash_of(table);
+        vkb_free(graph->owned[0]);
+        row->pixels = graph->owned[0] = table->texels;
+    } else {
+        vkb_free(table->texels);
+    }
+    *table = (struct vkb_table){0};
+    return done;
+}

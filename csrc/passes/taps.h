@@ -82,6 +82,11 @@ struct vkb_table {
     size_t count, capacity;
 };
 
+// Fills the rest of the last row of the table, and gives its texels to the graph as the pixels of
+// the image, in place of earlier ones. On failure they are freed.
+bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
+                   struct vkb_error *error);
+
 // Whether the axis leaves an image as it is.
 bool vkb_axis_is_identity(const struct vkb_axis *axis);
 

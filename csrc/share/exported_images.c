@@ -54,17 +54,15 @@ static struct span span_of(const struct vkb_device *device, const struct vkb_inp
     return (struct span){(VkDeviceSize)first / align * align, ((VkDeviceSize)last + 3) / 4 * 4};
 }
 
-bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input *input,
-                        struct vkb_error *error)
+static VkDeviceSize larger(VkDeviceSize a, VkDeviceSize b)
 {
-    const struct span span = span_of(device, input);
-    const VkDeviceSize size = span.end - span.start;
+    return a > b ? a : b;
+}
 
-    return (size <= device->limits.maxStorageBufferRange && size <= INT_MAX)
-        || vkb_fail(error, VKB_ERROR_VALUE,
-                    "image: its pixels lie in %.4g MiB of memory, more than the device reads at "
-                    "once; make it contiguous",
-                    (double)size / (1 << 20));
+// An invocation of strided_copy.glsl writes 16 bytes.
+static VkDeviceSize whole_stores(VkDeviceSize size)
+{
+    return (size + 15) / 16 * 16;
 }
 
 static VkDeviceSize input_scratch(const struct vkb_device *device, const struct vkb_input *input)
@@ -72,6 +70,31 @@ static VkDeviceSize input_scratch(const struct vkb_device *device, const struct 
     return dispatches(device) || is_direct(device, input)
              ? 0
              : (VkDeviceSize)input->width * input->height * vkb_pixel_size(input->format);
+}
+
+// Descriptors cover no more than the adapter's limit, and offsets in shaders have 32 bits.
+static bool check_range(const struct vkb_device *device, const char *name, VkDeviceSize size,
+                        const char *advice, struct vkb_error *error)
+{
+    const uint32_t range = device->limits.maxStorageBufferRange;
+
+    return (size <= range && size <= INT_MAX)
+        || vkb_fail(error, VKB_ERROR_VALUE,
+                    "%s: its pixels lie in %.4g MiB of memory, and a dispatch of the adapter %s "
+                    "reaches %.4g (maxStorageBufferRange); %s",
+                    name, (double)size / (1 << 20), device->adapter.name,
+                    (double)(range < INT_MAX ? range : INT_MAX) / (1 << 20), advice);
+}
+
+bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input *input,
+                        struct vkb_error *error)
+{
+    const struct span span = span_of(device, input);
+
+    return check_range(device, "image", span.end - span.start,
+                       "make it contiguous, or give it from the host", error)
+        && check_range(device, "image", input_scratch(device, input), "give it from the host",
+                       error);
 }
 
 static bool reads_image(const struct vkb_device *device, enum vkb_format format)
@@ -90,6 +113,28 @@ static VkDeviceSize output_scratch(const struct vkb_device *device, const struct
     return reads_image(device, output->format) || vkb_readback_is_complete(output)
              ? 0
              : (VkDeviceSize)output->width * output->row_count * vkb_pixel_size(output->format);
+}
+
+// What the framebuffer takes in exported memory.
+static VkDeviceSize exported_size(const struct vkb_run *run, const struct vkb_output *output)
+{
+    const uint32_t layers = run->graph->layers;
+
+    return (VkDeviceSize)output->width * output->row_count * output->channels
+             * element_size(output->format)
+         + (layers ? (layers - 1) * (VkDeviceSize)output->layer_stride : 0);
+}
+
+static bool check_output(const struct vkb_run *run, uint32_t image, const struct vkb_output *output,
+                         struct vkb_error *error)
+{
+    const VkDeviceSize scratch = output_scratch(run->device, output);
+    const bool copied =
+        !reads_image(run->device, output->format) && vkb_readback_is_complete(output);
+
+    return copied
+        || check_range(run->device, run->graph->images[image].name,
+                       larger(scratch, exported_size(run, output)), "use device=\"host\"", error);
 }
 
 // Dispatches do not write to the scratch memory, nor do copies, before `last` has read it.
@@ -168,7 +213,8 @@ static bool copy_strided_input(struct vkb_run *run, const struct vkb_staged_inpu
             },
         .from = {input->exported->buffer.handle, span.start, span.end - span.start},
         .to = {stores ? run->submission->readback.scratch.handle : VK_NULL_HANDLE, 0,
-               VK_WHOLE_SIZE},
+               stores && !dispatches(run->device) ? whole_stores(input_scratch(run->device, input))
+                                                  : VK_WHOLE_SIZE},
     };
 
     return copy_strided(run, &work, error);
@@ -193,14 +239,13 @@ static void copy_to_image(struct vkb_run *run, const struct vkb_input *input,
         });
 }
 
-bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
-                               struct vkb_error *error)
+static bool record_input(struct vkb_run *run, struct vkb_staged_input *staged,
+                         struct vkb_error *error)
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
     const struct vkb_input *input = staged->input;
     const bool direct = is_direct(run->device, input), stores = staged->send && !direct;
 
-    vkb_barrier_record_acquire(run->device, commands, input->exported->buffer.handle);
     if (dispatches(run->device))
         vkb_image_transition(run->device, commands, &staged->image->image,
                              VKB_ACCESS_DISPATCH_STORED);
@@ -220,6 +265,20 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     return true;
 }
 
+bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
+                               struct vkb_error *error)
+{
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const VkBuffer buffer = staged->input->exported->buffer.handle;
+
+    vkb_barrier_record_acquire(run->device, commands, buffer);
+    if (!record_input(run, staged, error))
+        return false;
+    // CUDA may fill it again, and another submission acquire it.
+    vkb_barrier_record_release(run->device, commands, buffer, VKB_ACCESS_ANY_READ);
+    return true;
+}
+
 // The next exported output from `*output` of `*request` on; NULL: there is none. Both are advanced.
 static struct vkb_export *next_output(const struct vkb_request *requests, uint32_t request_count,
                                       uint32_t *request, uint32_t *output)
@@ -231,11 +290,6 @@ static struct vkb_export *next_output(const struct vkb_request *requests, uint32
                 return exported;
         }
     return NULL;
-}
-
-static VkDeviceSize larger(VkDeviceSize a, VkDeviceSize b)
-{
-    return a > b ? a : b;
 }
 
 // Reserves what is between images and exported memory, if the requests use any, and the point at
@@ -258,6 +312,8 @@ static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t 
         for (uint32_t output = 0; output < requests[i].plan->output_count; ++output)
             if (requests[i].outputs[output].exported) {
                 const struct vkb_output *one = &requests[i].outputs[output];
+                if (!check_output(run, requests[i].plan->outputs[output], one, error))
+                    return false;
                 scratch = larger(scratch, output_scratch(run->device, one));
                 readback->counted = true;
             }
@@ -267,9 +323,8 @@ static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     const struct vkb_export *output = next_output(requests, request_count, &request, &at);
     if (output)
         vkb_export_signal(output, &run->sync.signals[VKB_EXTERNAL_CUDA]);
-    // An invocation of strided_copy.glsl writes 16 bytes.
     if (!vkb_buffer_reserve(run->device, VKB_MEMORY_DEVICE, vkb_device_export_usage(),
-                            (scratch + 15) / 16 * 16, &readback->scratch, error)
+                            whole_stores(scratch), &readback->scratch, error)
         || !vkb_buffer_reserve(run->device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                                counts_size, &readback->counts, error))
         return false;
@@ -338,8 +393,10 @@ static bool record_output(struct vkb_run *run, struct vkb_image *image,
                 .layer_stride = (int32_t)output->layer_stride,
             },
         .layers = run->graph->layers,
-        .from = {run->submission->readback.scratch.handle, 0, VK_WHOLE_SIZE},
-        .to = {output->exported->buffer.handle, 0, VK_WHOLE_SIZE},
+        .from = {run->submission->readback.scratch.handle, 0,
+                 from_image || copied ? VK_WHOLE_SIZE
+                                      : whole_stores(output_scratch(run->device, output))},
+        .to = {output->exported->buffer.handle, 0, whole_stores(exported_size(run, output))},
     };
 
     if (from_image) {

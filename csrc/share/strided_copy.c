@@ -26,6 +26,8 @@ static const struct kind {
                                     {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
     [VKB_STRIDED_COPY_FROM_LAYERS] = {&vkb_shader_strided_copy_from_image_comp_layers,
                                       {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
+    [VKB_FETCH_TEXELS] = {&vkb_shader_fetch_texels_comp,
+                          {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, BUFFER, BUFFER}},
 };
 
 static bool create_layouts(const struct vkb_device *device, const struct kind *kind,

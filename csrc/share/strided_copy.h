@@ -12,6 +12,7 @@ enum vkb_strided_copy_kind {
     VKB_STRIDED_COPY_FROM_IMAGE,
     VKB_STRIDED_COPY_TO_LAYERS,
     VKB_STRIDED_COPY_FROM_LAYERS,
+    VKB_FETCH_TEXELS,  // of 64 x 1 texels, as floats
     VKB_STRIDED_COPY_COUNT,
 };
 

@@ -1,5 +1,7 @@
-// Variants of adjoint passes: transposed filters in blocks of texels, and pixels as words.
+// Variants of adjoint passes: transposed filters in blocks of texels.
 #include "variants/variant.h"
+
+#include "passes/taps.h"
 
 #include <math.h>
 #include <string.h>
@@ -72,15 +74,9 @@ static uint32_t span_of(const struct axis *axis)
     return most;
 }
 
-// The weights of blocks of texels: one table more in the image.
-struct blocks {
-    float (*texels)[4];
-    size_t count, capacity;
-};
-
 // Adds the entries of an axis, and a list of weights for each that differs from the one before.
-static bool add_blocks(const struct axis *axis, uint32_t span, struct blocks *to, uint32_t *start,
-                       struct vkb_error *error)
+static bool add_blocks(const struct axis *axis, uint32_t span, struct vkb_table *to,
+                       uint32_t *start, struct vkb_error *error)
 {
     const uint32_t blocks = (axis->size + ADJOINT_SIDE - 1) / ADJOINT_SIDE;
     const uint32_t kernels = axis->kernels ? (uint32_t)axis->kernels : 1, list = span * kernels;
@@ -110,23 +106,6 @@ static bool add_blocks(const struct axis *axis, uint32_t span, struct blocks *to
     return true;
 }
 
-// Replaces the table of the image by one that is longer.
-static void set_table(struct vkb_graph *graph, uint32_t image, struct blocks *table)
-{
-    struct vkb_image_row *row = &graph->images[image];
-
-    for (size_t i = (size_t)row->width * row->height; i < table->count; ++i)
-        for (size_t half = 0; half < 2; ++half) {
-            uint64_t word;
-            memcpy(&word, &table->texels[i][2 * half], sizeof word);
-            row->serial = vkb_hash_word(row->serial, word);
-        }
-    row->serial += row->serial == 0;
-    row->height = (uint32_t)(table->count / row->width);
-    vkb_free(graph->owned[0]);
-    row->pixels = graph->owned[0] = table->texels;
-}
-
 // Adds tables of blocks for the axes of a filter.
 static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        struct vkb_pass_row *row, struct vkb_error *error)
@@ -135,9 +114,8 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
     const struct vkb_image_row *image = &graph->images[pass->reads[1]];
     const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
     const size_t texels = (size_t)image->width * image->height;
-    const uint32_t width = image->width;
     const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
-    struct blocks table = {0};
+    struct vkb_table table = {0};
     uint32_t start_x = 0, start_y = 0;
 
     bool done = vkb_grow(error, &table.texels, &table.capacity, texels, sizeof *table.texels);
@@ -154,20 +132,13 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
         row->constants.radix_2 = (int32_t)span - 1;
         done = add_blocks(&y, span, &table, &start_y, error);
     }
-    const size_t rest = (width - table.count % width) % width;
-    done = done
-        && vkb_grow(error, &table.texels, &table.capacity, table.count + rest,
-                    sizeof *table.texels);
     if (!done) {
         vkb_free(table.texels);
         return false;
     }
-    memset(table.texels[table.count], 0, rest * sizeof *table.texels);
-    table.count += rest;
-    set_table(graph, pass->reads[1], &table);
     row->params.adjoint_filter.start_x = (int32_t)start_x;
     row->params.adjoint_filter.start_y = (int32_t)start_y;
-    return true;
+    return vkb_table_end(&table, graph, pass->reads[1], error);
 }
 
 // The most weights that an invocation keeps along an axis, in vec4s. More than GPUs have registers
@@ -192,14 +163,6 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
     for (uint32_t i = 0; i < pass->read_count; ++i)
         fits = fits && choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT;
     return fits;
-}
-
-// Removes an image from those that the pass reads.
-static void drop_read(struct vkb_pass_row *row, uint32_t number)
-{
-    for (uint32_t i = number; i + 1 < row->read_count; ++i)
-        row->reads[i] = row->reads[i + 1];
-    vkb_drop_reads(row, row->read_count - 1);
 }
 
 bool vkb_is_factor(const struct vkb_pass_row *pass)
@@ -249,31 +212,17 @@ static void read_words_of_composite(const struct vkb_variant_choice *choice,
 bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
-    const bool filter = pass->block == VKB_BLOCK_adjoint_filter;
-    const bool threshold = vkb_transposes(pass, VKB_BLOCK_threshold) && !pass->constants.masked
-                        && pass->constants.by <= BY_BLOOM && pass->constants.alpha != ALPHA_BLUR
-                        && vkb_same_size(choice->graph, pass->reads[0], pass->targets[0]);
     struct vkb_pass_row row;
 
-    *fits = (threshold || (filter && fits_lists(choice->graph, pass, MAX_WORDS)))
+    *fits = pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass, MAX_WORDS)
          && vkb_are_floats(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    if (threshold) {
-        drop_read(&row, 1);  // the mask
-        row.constants.sampling = 0;
-        vkb_make_words(&row, &vkb_shader_adjoint_threshold_words_rgba32float, ADJOINT_SIDE,
-                       TEXEL_ROWS);
-    } else {
-        read_words_of_composite(choice, &row);
-        vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE,
-                       ADJOINT_ROWS);
-        if (!add_tables(choice, pass, &row, error))
-            return false;
-    }
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    read_words_of_composite(choice, &row);
+    vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
+    return add_tables(choice, pass, &row, error) && vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 // An invocation for all groups of a pixel, which fragments would compute anew for each.

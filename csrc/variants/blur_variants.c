@@ -170,7 +170,7 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     row.block = VKB_BLOCK_fused_bloom;
     VKB_TAKE_COMPOSITE(&row, fused_bloom, nest->composite);
     VKB_TAKE_THRESHOLD(&row, fused_bloom, nest->threshold);
-    row.constants.format = vkb_stored_as(choice->device, format);
+    row.constants.format = vkb_storage_mode(format);
     params->vertical_radius = nest->vertical->constants.radius;
     params->horizontal_radius = nest->horizontal->constants.radius;
     memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
@@ -246,8 +246,7 @@ bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vk
     memcpy(&row, pass, sizeof row);
     row.reads[1] = enlarging->reads[0];
     row.constants.bloom = BLOOM_LINES;
-    row.constants.format =
-        vkb_stored_as(choice->device, choice->plain.images[pass->reads[1]].format);
+    row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[1]].format);
     row.fused = true;
     return vkb_add_fullscreen(choice, pass, error) && vkb_add_fullscreen(choice, &row, error);
 }

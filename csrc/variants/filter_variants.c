@@ -172,7 +172,7 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
     PLACE_ROWS(filter_final, TAKE_INPUT)
     FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);
-    row.constants.format = vkb_stored_as(choice->device, format);
+    row.constants.format = vkb_storage_mode(format);
     return row;
 }
 

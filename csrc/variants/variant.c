@@ -2,14 +2,6 @@
 
 #include <string.h>
 
-enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format)
-{
-    return format == VKB_FORMAT_RGBA8_UNORM
-                && device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
-             ? STORED_UNORM8_SCALED
-             : vkb_storage_mode(format);
-}
-
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 {
     return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
@@ -90,8 +82,7 @@ bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vk
     row.fused = true;
     row.constants.from_image = true;
     if (is_filter) {
-        row.constants.format =
-            vkb_stored_as(choice->device, choice->plain.images[pass->reads[0]].format);
+        row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);
         VKB_TAKE_THRESHOLD(&row, filter, threshold);
     }
     return vkb_graph_add_pass(choice->graph, &row, error);

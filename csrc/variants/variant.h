@@ -54,9 +54,6 @@ vkb_variant_add vkb_add_pixels;
 // The same for images as words.
 #define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)
 
-// How the device rounds a value that is stored in an image of this format, as a STORED_* mode.
-enum vkb_mode vkb_stored_as(const struct vkb_device *device, enum vkb_format format);
-
 // Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 

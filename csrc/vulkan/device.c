@@ -1,6 +1,7 @@
 #include "vulkan/device.h"
 
 #include "vulkan/barrier.h"
+#include "vulkan/process.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -177,7 +178,10 @@ static bool choose_extensions(struct vkb_device *device, struct extensions *exte
     // Must be enabled where it is. What such devices lack, no pass needs.
     if (is_subset)
         extensions->names[extensions->count++] = PORTABILITY_SUBSET;
-    if (has_import && imports_buffers(device)) {
+    // A CPU reads and writes through the parent's own pages.
+    const bool keeps_pages =
+        device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU || vkb_fork_leaves_pinned();
+    if (has_import && keeps_pages && imports_buffers(device)) {
         device->import_alignment = import_alignment(device);
         extensions->names[extensions->count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
     }

@@ -10,6 +10,11 @@
 
 #include <stdatomic.h>
 
+// The float of an 8-bit level, as a shader reads it: the nearest to level / 255; the product with
+// the float nearest to 1 / 255. Other ones, or half floats that are not theirs, have no fused
+// passes.
+enum vkb_texels { VKB_TEXELS_UNKNOWN, VKB_TEXELS_DIVIDED, VKB_TEXELS_SCALED, VKB_TEXELS_OTHER };
+
 struct vkb_device {
     struct vkb_instance *instance;
     struct vkb_messages messages;  // readable after the device is destroyed
@@ -23,6 +28,7 @@ struct vkb_device {
     atomic_uint *allocations;                         // of memory, that are not freed
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
+    enum vkb_texels texels;                           // found when it is first needed (probe.c)
     bool dispatch;       // compute shaders can write images of every format
     bool scalar_layout;  // VK_EXT_scalar_block_layout is enabled
     // Colour images have linear tiling and lie in host-visible memory, which shaders also access as

@@ -2,7 +2,9 @@
 
 #include <pthread.h>
 #include <sched.h>
-#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/utsname.h>
 #include <unistd.h>
 
 // One more in each child of a fork. Process ids do not tell a child from its parent in another
@@ -26,6 +28,17 @@ long vkb_current_process(void)
 
     pthread_once(&once, count_in_children);
     return counts ? atomic_load(&current) : (long)getpid();
+}
+
+bool vkb_fork_leaves_pinned(void)
+{
+    struct utsname name;
+    int major = 0, minor = 0;
+
+    return uname(&name) == 0
+        && (strcmp(name.sysname, "Linux") != 0
+            || (sscanf(name.release, "%d.%d", &major, &minor) == 2
+                && (major > 5 || (major == 5 && minor >= 12))));
 }
 
 void vkb_lock_acquire(struct vkb_lock *lock)

@@ -3,9 +3,14 @@
 #define VKB_PROCESS_H
 
 #include <stdatomic.h>
+#include <stdbool.h>
 
 // A number that none of the processes has from which this one was forked; never 0.
 long vkb_current_process(void);
+
+// Whether a fork leaves pages that a GPU has pinned to the parent. Before Linux 5.12 the parent
+// gets a copy at its next write, and the GPU goes on with the page of the child.
+bool vkb_fork_leaves_pinned(void);
 
 // A spinlock, for short times. Zeroed: free.
 struct vkb_lock {

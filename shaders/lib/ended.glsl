@@ -1,15 +1,32 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture
-// before exposure and curves, of which COTANGENT(pixel) are those of the finished one. The including shader
-// has composite.glsl.
+// before exposure and curves, from those of the finished one, the image at ENDED_BINDING. ENDED_TARGET is the
+// binding of the target. The including shader has composite.glsl and, for words, pixels.glsl.
 #ifdef MIXED
 #include "lib/where_finite.glsl"
 #include "lib/adjoint_composite.glsl"
+#define ENDED_TARGET (ENDED_BINDING + 1)
+#ifdef WORDS
+READ_IMAGE(ENDED_BINDING, cotangents);
+vec4 cotangent_at(ivec2 pixel)
+{
+    ivec4 shape = read_shapes[ENDED_BINDING - 1];
+    return load_floats(cotangents, shape, clamp(pixel.x, 0, shape.x - 1), pixel.y);
+}
+#else
+layout(set = 0, binding = ENDED_BINDING) uniform sampler2D cotangents;
+vec4 cotangent_at(ivec2 pixel)
+{
+    return texelFetch(cotangents, pixel, 0);
+}
+#endif
+#else
+#define ENDED_TARGET ENDED_BINDING
 #endif
 
 vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 {
 #ifdef MIXED
-    return back_composite(scene, bloom, 1.0, COTANGENT(pixel), BY_MIXED);
+    return back_composite(scene, bloom, 1.0, cotangent_at(pixel), BY_MIXED);
 #else
     return finish(scene, bloom, pixel);
 #endif

@@ -11,6 +11,7 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
+// It ends with "lib/ended.glsl".
 #define FINAL
 #include "variants/nested.glsl"
 

@@ -10,14 +10,9 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D smaller;
 layout(set = 0, binding = 2) uniform sampler2D own;
-#ifdef MIXED
-layout(set = 0, binding = 3) uniform sampler2D cotangents;
-layout(set = 0, binding = 4) uniform writeonly image2D target;
-#define COTANGENT(pixel) texelFetch(cotangents, pixel, 0)
-#else
-layout(set = 0, binding = 3) uniform writeonly image2D target;
-#endif
+#define ENDED_BINDING 3
 #include "lib/ended.glsl"
+layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
 
 #define HAS_OWN true
 

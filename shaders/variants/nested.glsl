@@ -3,17 +3,11 @@
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, own);
-#ifdef MIXED
-READ_IMAGE(3, cotangents);
-WRITE_IMAGE(4);
-#define COTANGENT(pixel) \
-    load_floats(cotangents, read_shapes[2], min(pixel.x, read_shapes[2].x - 1), pixel.y)
-#else
-WRITE_IMAGE(3);
-#endif
 
 #ifdef FINAL
+#define ENDED_BINDING 3
 #include "lib/ended.glsl"
+WRITE_IMAGE(ENDED_TARGET);
 
 #define HAS_OWN true
 
@@ -22,6 +16,7 @@ uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
     return ended(scene, as_stored(sum, FORMAT), pixel);
 }
 #else
+WRITE_IMAGE(3);
 #define HAS_OWN (ADD_OWN != 0)
 
 uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)

@@ -6,16 +6,10 @@
 #include "variants/pixels.glsl"
 
 #define STRIP_CHANNELS SOURCE_CHANNELS
-#ifdef MIXED
-#define STRIP_TARGET 3
-READ_IMAGE(2, cotangents);
-#define COTANGENT(pixel) \
-    load_floats(cotangents, read_shapes[1], clamp(pixel.x, 0, read_shapes[1].x - 1), pixel.y)
-#else
-#define STRIP_TARGET 2
-#endif
-#include "variants/strip.glsl"
+#define STRIP_TARGET ENDED_TARGET
+#define ENDED_BINDING 2
 #include "lib/ended.glsl"
+#include "variants/strip.glsl"
 
 float weights[STRIP_RADIUS + 1], row_weights[STRIP_RADIUS + 1];
 

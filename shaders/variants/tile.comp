@@ -8,14 +8,9 @@ const int RUN = TILE_ROWS / TILE_RUNS;
 
 layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
 layout(set = 0, binding = 1) uniform sampler2D image;
-#ifdef MIXED
-layout(set = 0, binding = 2) uniform sampler2D cotangents;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
-#define COTANGENT(pixel) texelFetch(cotangents, pixel, 0)
-#else
-layout(set = 0, binding = 2) uniform writeonly image2D target;
-#endif
+#define ENDED_BINDING 2
 #include "lib/ended.glsl"
+layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
 // that neighbours are in neighbouring banks.

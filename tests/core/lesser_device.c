@@ -35,6 +35,8 @@
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
+    FUNCTION(vkCmdClearColorImage) \
+    FUNCTION(vkCmdCopyBufferToImage) \
     FUNCTION(vkQueueSubmit) \
     FUNCTION(vkWaitForFences) \
     FUNCTION(vkAcquireNextImageKHR) \
@@ -409,6 +411,18 @@ static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAl
     return below.vkAllocateMemory(handle, &changed, callbacks, memory);
 }
 
+// Without "texels", the 64 texels with which the core finds out how they are read are others.
+static VKAPI_ATTR void VKAPI_CALL copy_to_image(VkCommandBuffer commands, VkBuffer buffer,
+                                                VkImage image, VkImageLayout layout, uint32_t count,
+                                                const VkBufferImageCopy *regions)
+{
+    below.vkCmdCopyBufferToImage(commands, buffer, image, layout, count, regions);
+    if (lacks("texels") && regions->imageExtent.width == 64 && regions->imageExtent.height == 1)
+        below.vkCmdClearColorImage(
+            commands, image, layout, &(VkClearColorValue){.float32 = {0.3f, 0.3f, 0.3f, 0.3f}}, 1,
+            &(VkImageSubresourceRange){VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1});
+}
+
 static void object(const char *text)
 {
     below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
@@ -677,6 +691,7 @@ static const struct entry {
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
+    ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
     ENTRY(vkQueueSubmit, submit, true),
     ENTRY(vkWaitForFences, wait, true),
     ENTRY(vkAcquireNextImageKHR, acquire, true),

@@ -68,6 +68,10 @@ CUSTOM = {
 }
 
 
+#: Passes of a frame of `final` alone, by method.
+PASSES: dict[str, int] = {}
+
+
 def use_handles(renderer: Renderer) -> None:
     """One of each size and dtype, more than have memory at once, each used twice."""
     images = [picture(28 + i, 20, 3 + i % 2, dtype) for dtype in DTYPES for i in range(3)]
@@ -116,6 +120,18 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         alone = renderer.apply(image, settings, framebuffers=("final",))["final"]
         np.testing.assert_array_equal(alone, renderer.apply(image, settings)["final"])
 
+    def fuse() -> None:
+        """Compare fused passes, which keep what an image would hold, with those of the method."""
+        # Half of an odd level more, which is between two: the last bit of a level decides.
+        between = Separable(weights=(1.0,), blur_strength=1.0, intensity=0.5)
+        image = np.tile(np.arange(170, dtype=np.uint8)[:, np.newaxis], (20, 1, 4))
+        for settings in (between, Separable(threshold=0.3), Pyramid(levels=2)):
+            whole = renderer.apply(image, settings)["final"]
+            renderer.apply(image[::-1, ::-1], settings)
+            alone = renderer.apply(image, settings, framebuffers=("final",))
+            np.testing.assert_array_equal(alone["final"], whole)
+            PASSES[type(settings).__name__] = len(alone.timings)
+
     scene = Scene.ufo()
     for number, (name, settings) in enumerate(SETTINGS.items()):
         # The first with all types of pixels, the others by turns, of which layers need float32.
@@ -128,6 +144,7 @@ def try_all(renderer: Renderer) -> dict[str, str]:
                 f"{name} {shading}",
                 lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
             )
+    attempt("fuse", fuse)
     attempt("handles", lambda: use_handles(renderer))
     attempt("large", lambda: apply(picture(*LARGE, 4, "uint8"), Separable()))
     # A GPU gets its first rows while the others are packed.
@@ -156,7 +173,8 @@ def main() -> None:
     wrong = try_all(renderer)
     # Other settings than before, so that passes run.
     frames = renderer.apply(picture(9, 9, 3, "uint8"), Separable(blur_strength=0.125))
-    print(json.dumps({"type": renderer.info.type, "wrong": wrong, "timed": timed(frames)}))
+    about = {"type": renderer.info.type, "timed": timed(frames), "passes": PASSES}
+    print(json.dumps({**about, "wrong": wrong}))
     renderer.close()
 
 

@@ -149,6 +149,19 @@ def test_no_storage_of_a_format(layer: Path, name: str, format: str) -> None:
     assert "compute shaders of" in done.stderr
 
 
+def test_fused_passes_read_levels_as_the_device_does(layer: Path, name: str) -> None:
+    """As products on a GPU, too; on a device that reads neither products nor quotients, no passes
+    are fused."""
+    passes = []
+    for lesser in ("", "cpu", "cpu,texels"):
+        done = run(layer, name, lesser, (*WORK, "fuse"), VKBLOOM_VARIANT="gpu")
+        assert done.returncode == 0, done.stderr
+        result = json.loads(done.stdout)
+        assert result["wrong"] == {}
+        passes.append(sum(result["passes"].values()))
+    assert passes[0] == passes[1] < passes[2], passes
+
+
 def test_an_adapter_of_the_portability_subset_is_found(tmp_path: Path) -> None:
     """The loader hides such drivers, MoltenVK among them, unless an instance asks for them."""
     manifest = json.loads(lavapipes()[0].read_text())

@@ -495,6 +495,20 @@ def missing(renderer: Any) -> None:
     raises(ValueError, part, lambda: renderer.apply(OnDevice(picture(24, 16))))
 
 
+def ranges(renderer: Any) -> None:
+    """Images and framebuffers that no descriptor of the adapter covers."""
+    image, levels = picture(600, 500, 3, "float32"), picture(600, 500, 3, "uint8")
+    words = r": its pixels lie in .* MiB of memory, .* reaches 1 \(maxStorageBufferRange\); "
+    for names, advice, given in (
+        ("image", "make it contiguous", image),
+        # Of four channels: in the dispatch's scratch memory, or of a bloom.
+        ("image|glow", "(give it from the |use device=.)host", levels),
+    ):
+        with pytest.raises(ValueError, match=f"({names}){words}{advice}"):
+            renderer.apply(OnDevice(given), Separable())
+    same(renderer.apply(OnDevice(image[:9])), renderer.apply(image[:9]))
+
+
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
     *(gradients, gradient_places),
@@ -529,4 +543,4 @@ def main(everything: Sequence[Callable[[Any], None]] = WORK) -> None:
 
 
 if __name__ == "__main__":
-    main((*WORK, missing) if "missing" in sys.argv else WORK)
+    main((*WORK, *(work for work in (missing, ranges) if work.__name__ in sys.argv)))

@@ -55,6 +55,18 @@ def test_a_renderer_on_another_gpu(folder: Path, software: AdapterInfo) -> None:
     check(python(*program, cwd=ROOT, **variables), folder)
 
 
+@pytest.mark.parametrize("lesser", ["bands", "bands,cpu"])
+def test_what_exceeds_the_range_of_buffers(
+    folder: Path,
+    software: AdapterInfo,
+    layer: Path,  # noqa: F811
+    lesser: str,
+) -> None:
+    program = ("-m", "tests.device.device_work", "validated", "ranges")
+    variables = stand_in.variables(folder, software)
+    check(run(layer, software.name, lesser, program, **variables), folder)
+
+
 WORK = ("layouts", "sequences", "layers", "places", "gradients")
 
 

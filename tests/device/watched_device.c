@@ -1,5 +1,6 @@
-// A Vulkan layer for tests: it writes how images may be used and are, and objects to acquires of
-// buffers from CUDA that nothing has released. test_usages.py and test_cuda_path.py use it.
+// A Vulkan layer for tests: it writes how images may be used and are,
+// and which buffers are of the host's memory, and objects to acquires of
+// buffers from CUDA that nothing has released. test_watched_device.py uses it.
 #define _GNU_SOURCE
 #include <stdbool.h>
 #include <stdio.h>
@@ -68,6 +69,16 @@ static void use_view(VkImageView view, VkImageUsageFlags usage)
         }
 }
 
+static void write_line(const char *name, VkImageUsageFlags usage, VkImageUsageFlags used)
+{
+    FILE *file = getenv("VKBLOOM_USAGES") ? fopen(getenv("VKBLOOM_USAGES"), "a") : NULL;
+
+    if (!file)
+        return;
+    fprintf(file, "%s %x %x\n", name, usage, used);
+    fclose(file);
+}
+
 static VKAPI_ATTR VkResult VKAPI_CALL create_image(VkDevice device, const VkImageCreateInfo *info,
                                                    const VkAllocationCallbacks *callbacks,
                                                    VkImage *image)
@@ -85,11 +96,8 @@ static VKAPI_ATTR void VKAPI_CALL destroy_image(VkDevice device, VkImage image,
 {
     struct watched_image *watched = find_image(image);
 
-    if (image && watched->name[0] && getenv("VKBLOOM_USAGES")) {
-        FILE *file = fopen(getenv("VKBLOOM_USAGES"), "a");
-        fprintf(file, "%s %x %x\n", watched->name, watched->usage, watched->used);
-        fclose(file);
-    }
+    if (image && watched->name[0])
+        write_line(watched->name, watched->usage, watched->used);
     if (image)
         watched->image = VK_NULL_HANDLE;
     below.vkDestroyImage(device, image, callbacks);
@@ -164,6 +172,10 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_buffer(VkDevice device, const VkBuf
                                                     VkBuffer *buffer)
 {
     const VkResult result = below.vkCreateBuffer(device, info, callbacks, buffer);
+    const VkExternalMemoryBufferCreateInfo *external = info->pNext;
+
+    if (external && external->handleTypes == VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT)
+        write_line("imported", 0, 0);
 
     if (result == VK_SUCCESS && buffer_count < 1 << 14) {
         buffers[buffer_count].buffer = *buffer;

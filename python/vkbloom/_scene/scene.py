@@ -196,27 +196,12 @@ class Scene:
         """
         return dataclasses.replace(self, camera=camera)
 
-    def _rows(self) -> list[tuple[str, str]]:
-        camera = self.camera
-        sky_levels = (
-            "none"
-            if self.skybox is None
-            else f"{self.skybox.size} x {self.skybox.size} {self.skybox.dtype}, "
-            f"levels: {len(self.skybox.levels)}"
-        )
-        return [
-            ("body", self.body.summary),
-            ("glow", "none" if self.glow is None else self.glow.summary),
-            ("glow intensity", f"{self.glow_intensity:g}"),
-            ("skybox", sky_levels),
-            (
-                "camera",
-                (
-                    f"position {camera.position}, rotation {camera.rotation}, "
-                    f"fov {camera.fov:g}, near {camera.near:g}, far {camera.far:g}"
-                ),
-            ),
-        ]
-
     def __repr__(self) -> str:
-        return f"Scene({'; '.join(f'{name}: {value}' for name, value in self._rows())})"
+        camera, sky = self.camera, self.skybox
+        size = f"{sky.size} x {sky.size} {sky.dtype}, levels: {len(sky.levels)}" if sky else "none"
+        return (
+            f"Scene(body: {self.body.summary}; glow: {self.glow.summary if self.glow else 'none'}; "
+            f"glow intensity: {self.glow_intensity:g}; skybox: {size}; "
+            f"camera: position {camera.position}, rotation {camera.rotation}, "
+            f"fov {camera.fov:g}, near {camera.near:g}, far {camera.far:g})"
+        )
