@@ -372,7 +372,6 @@ class TestRefused:
             ({"reduce": {**REDUCE, "mean": count_frames}}, "reduce.mean"),
             ({"chunks": {}}, r"chunk: \[3, 1, 2\] in the store, \[1, 1, 1\] requested"),
         ],
-        ids=str,
     )
     def test_another_grid_is_refused_with_its_differences(
         self, copy: Path, changes: Any, message: str
