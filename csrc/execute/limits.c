@@ -197,12 +197,9 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
     return true;
 }
 
-// All images must fit the largest heap of the device together. Those of a convolution are many
-// times larger than the frame.
-static bool check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
-                         struct vkb_error *error)
+bool vkb_limits_check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
+                             uint64_t needed, struct vkb_error *error)
 {
-    const uint64_t needed = vkb_graph_size(graph);
     uint64_t largest = 0;
     bool convolves = false;
 
@@ -234,5 +231,5 @@ bool vkb_limits_check_graph(const struct vkb_device *device, const struct vkb_gr
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (!check_format(device, graph, i, error))
             return false;
-    return check_passes(device, graph, error) && check_memory(device, graph, error);
+    return check_passes(device, graph, error);
 }

@@ -169,6 +169,25 @@ static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed,
     }
 }
 
+bool vkb_plan_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    // Which passes are skipped, which needed, and which images wanted.
+    bool *marks = vkb_alloc(error, 2 * graph->pass_count + graph->image_count, sizeof *marks);
+
+    if (!marks)
+        return false;
+    bool *wanted = marks + 2 * graph->pass_count;
+    mark(plan, marks, marks + graph->pass_count, wanted);
+    *size = 0;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (wanted[i])
+            *size += (uint64_t)graph->images[i].width * graph->images[i].height
+                   * vkb_pixel_size(graph->images[i].format);
+    vkb_free(marks);
+    return true;
+}
+
 static uint32_t count_running(const struct vkb_graph *graph, const bool *needed,
                               const bool *current)
 {

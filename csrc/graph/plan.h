@@ -55,6 +55,10 @@ struct vkb_planner {
     uint64_t previous_source;
 };
 
+// Bytes of the images that the plan's framebuffers need. Those of passes that fused ones may
+// replace count, too.
+bool vkb_plan_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error);
+
 // Destroying a zeroed or half-created planner is safe.
 void vkb_planner_destroy(struct vkb_planner *planner);
 

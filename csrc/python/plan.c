@@ -214,7 +214,8 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
         if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))
             return false;
         const bool fits = build_graph(device, VKB_VARIANTS_FRAGMENT, &self->source, settings, NULL,
-                                      &graph, &error);
+                                      &graph, &error)
+                       && vkb_limits_check_memory(device, &graph, vkb_graph_size(&graph), &error);
         vkb_graph_destroy(&graph);
         if (fits)
             return vkb_read_kernel(settings_object, frame, buffers, &self->kernel,
@@ -260,6 +261,12 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
         || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;
+    }
+    uint64_t needed;
+    if (!vkb_plan_size(&self->plan, &needed, &error)
+        || !vkb_limits_check_memory(device, &self->plan.graph, needed, &error)) {
+        Py_DECREF(self);
+        return vkb_raise(state, &error);
     }
     return (PyObject *)self;
 }

@@ -21,7 +21,7 @@ static const char *leave_fences(struct vkb_device *device, unsigned count)
 {
     struct vkb_error error;
 
-    if (!vkb_device_create(device, "software", "", true, &error))
+    if (!vkb_device_create(device, 0, "", true, &error))
         return "cannot be created";
     const struct vkb_messages *before = vkb_messages_begin(&device->messages);
     for (unsigned i = 0; i < count; ++i)
@@ -58,8 +58,8 @@ static const char *use_two(void)
     static struct vkb_device one, other;
     struct vkb_error error;
 
-    if (!vkb_device_create(&one, "software", "", true, &error)
-        || !vkb_device_create(&other, "software", "", true, &error))
+    if (!vkb_device_create(&one, 0, "", true, &error)
+        || !vkb_device_create(&other, 0, "", true, &error))
         return "cannot be created";
     const struct vkb_messages *outer = vkb_messages_begin(&one.messages);
     const struct vkb_messages *inner = vkb_messages_begin(&other.messages);

@@ -85,6 +85,7 @@ LOOSE: dict[str, str] = {
     "godot.glsl": "exp2",
     "godot_blend.glsl": "sqrt",
     "godot_final.frag": "exp2",
+    "lab.glsl": "pow",
     "lighting.frag": "normalize",
     "lit_mesh.glsl": "normalize",
     "phong.glsl": "normalize pow",

@@ -60,7 +60,7 @@ FRAMES: dict[str, tuple[Settings, float]] = {
         1.0,
     ),
     "darktable/0_odd_final_f4": (DarktableBloom(), 1.0),
-    "darktable/5_wide_final_f4": (DarktableBloom(size=5.0), 1.0),
+    "darktable/5_wide_final_f4": (DarktableBloom(blur_size=5.0), 1.0),
     "unreal_standard/0_odd_f4": (UnrealBloom(), 0.675),
     "unreal_standard/1_wide_f4": (UnrealBloom(), 0.675),
     "babylon/0_odd_f4": (BabylonBloom(), 1.0),

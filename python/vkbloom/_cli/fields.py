@@ -154,6 +154,8 @@ def option_type(info: FieldInfo) -> _ParamType:
     if info.kind == "choice":
         kind: _ParamType = click.Choice(info.choices, case_sensitive=False)
     else:
+        if info.kind not in _OPTION_TYPES:
+            raise ValueError(f"{info.name}: {info.kind} has no option; use vkbloom.grid in Python")
         kind = _OPTION_TYPES[info.kind]
     return or_none(kind) if info.optional else kind
 

@@ -27,7 +27,7 @@ Q, Escape      close\
 """
 
 # A key changes the first of these fields that the settings have.
-_SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "size")
+_SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "blur_size")
 _STRENGTHS: Final = ("blur_strength", "intensity")
 _STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0

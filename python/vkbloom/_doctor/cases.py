@@ -241,13 +241,14 @@ def _requests() -> Iterator[tuple[str, str, Settings, dict[str, Any]]]:
     for name, stages in glares.items():
         yield "glares", name, Pyramid(threshold=0.5, glare=stages), {}
     for name in (*_SMOOTH, "knee", "direct", "longest"):
-        yield "fragment shaders", name, METHODS[name], {}
+        # 8 bits would hide a weight that is wrong by a hundredth.
+        yield "fragment shaders", name, METHODS[name], {"dtype": "float32"}
 
 
 def cases() -> Iterator[Case]:
     """Return all cases, by group."""
     for number, (group, name, settings, kept) in enumerate(_requests()):
-        dtype = DTYPES[(number + number // 3) % 3]
+        dtype = kept.pop("dtype", DTYPES[(number + number // 3) % 3])
         width, height = size = kept.pop("size", _SIZE)
         check = partial(_apply, size=size, dtype=dtype, settings=settings, **kept)
         variant = "fragment" if group == "fragment shaders" else "auto"

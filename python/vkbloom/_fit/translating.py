@@ -40,7 +40,7 @@ _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "pmndrs": ("threshold", "radius"),
     "babylon": ("threshold", "kernel"),
     "playcanvas": ("threshold", "blur_level"),
-    "darktable": ("threshold", "size", "strength"),
+    "darktable": ("threshold", "blur_size", "strength"),
     "godot": ("threshold", "strength", "glow_bloom"),
     "blender": ("threshold", "size"),
     "pygfx": ("levels", "filter_radius"),

@@ -73,6 +73,10 @@ class BabylonBloom(Settings):
         middle = (max(count, 3) - 1) // 2
         sides = [math.exp(-4.5 * (i / middle) ** 2) for i in range(middle + 1)]
         total = sides[0] + 2 * sum(sides[1:])
+        if middle % 2:
+            # The middle is half of two samples, whose position is that of the whole middle.
+            share, pair = sides[0] / (sides[0] + sides[1]), sides[1] + sides[0] / 2
+            sides[:2] = 2 * share * pair, (1 - share) * pair
         return tuple(weight / total for weight in sides)
 
     def _core_block(self) -> bytes:

@@ -17,7 +17,7 @@ class DarktableBloom(Settings):
 
     Parameters
     ----------
-    size : float
+    blur_size : float
         Width of the glow in percent, 0 to 100.
     strength : float
         Brightness of the glow in percent, 0 to 100.
@@ -32,14 +32,14 @@ class DarktableBloom(Settings):
     -----
     ``bright`` is L 2^(min(100, strength + 1) / 100) / 100 where that is above the threshold, else
     0. L is that of CIE Lab (D50). ``bloom`` is ``bright``, eight times the mean of a box along x,
-    then along y, of floor(256 min(100, size + 1) / 100) pixels to each side, at most 256, as far
+    then along y, of floor(256 min(100, blur_size + 1) / 100) pixels to each side, at most 256, as far
     as these are inside of the frame. a and b of a colour do not change.
 
     Source: darktable 4.2.1, src/iop/bloom.c.
 
     Examples
     --------
-    >>> vkbloom.DarktableBloom(size=5).radius
+    >>> vkbloom.DarktableBloom(blur_size=5).box_radius
     15
     """
 
@@ -50,16 +50,16 @@ class DarktableBloom(Settings):
     knee: float = no_knee("darktable")
     composite: Composite = choice_field("composite", ("screen",))
     format: BloomFormat | None = "rgba16float"
-    size: float = number_field(default=20.0, range=(0, 100))
+    blur_size: float = number_field(default=20.0, range=(0, 100))
     strength: float = number_field(default=25.0, range=(0, 100))
 
     @property
-    def radius(self) -> int:
+    def box_radius(self) -> int:
         """Pixels to each side of a box."""
-        return min(256, math.floor(256 * min(100.0, self.size + 1) / 100))
+        return min(256, math.floor(256 * min(100.0, self.blur_size + 1) / 100))
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""
         gain = 2 ** (min(100.0, self.strength + 1) / 100)
-        values = {"size": self.radius / 256, "strength": gain}
+        values = {"size": self.box_radius / 256, "strength": gain}
         return settings_block(self.method, vars(self) | values)

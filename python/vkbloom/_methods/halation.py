@@ -58,7 +58,7 @@ class Halation(GaussianSum):
     Examples
     --------
     >>> vkbloom.Halation(pixel_size=20).kernel((640, 480)).shape
-    (175, 175, 3)
+    (163, 163, 3)
     """
 
     method: ClassVar[str] = "halation"

@@ -227,6 +227,8 @@ class Renderer:
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not adapter:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
+        if "\0" in adapter:
+            raise ValueError("adapter: embedded null character")
         if adapter == "auto":
             adapter = os.environ.get("VKBLOOM_ADAPTER") or adapter
         from vkbloom._io.disk_cache import DiskCache  # noqa: PLC0415  costs start-up time

@@ -40,7 +40,7 @@ def passes(source: BlurInput, settings: DarktableBloom) -> dict[str, Array]:
     image = bright
     for _ in range(8):
         for _ in range(2):
-            image = contiguous(_mean(image, settings.radius).swapaxes(0, 1))
+            image = contiguous(_mean(image, settings.box_radius).swapaxes(0, 1))
         image = contiguous(image)
     return {"bright": bright, "bloom": source.store.end(sample(image, source.size))}
 

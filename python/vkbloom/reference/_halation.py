@@ -23,5 +23,7 @@ def gain(settings: Any, size: tuple[int, int]) -> float:
 
 def passes(source: BlurInput, settings: Any) -> dict[str, Array]:
     """Return "kernel" and "bloom"."""
+    if source.mask is None:
+        return convolution.passes(source, settings)
     image = source.store(masked(source.image, source.mask))
     return convolution.passes(dataclasses.replace(source, image=image), settings)

@@ -23,6 +23,8 @@ def gain(settings: Any, size: tuple[int, int]) -> float:
 
 def passes(source: BlurInput, settings: Any) -> dict[str, Array]:
     """Return "kernel" and "bloom"."""
+    if source.mask is None and settings.threshold in (None, -1):
+        return convolution.passes(source, settings)
     image = masked(_prefilter(source.image, settings), source.mask)
     return convolution.passes(dataclasses.replace(source, image=source.store(image)), settings)
 
