@@ -32,8 +32,8 @@ class DarktableBloom(Settings):
     -----
     ``bright`` is L 2^(min(100, strength + 1) / 100) / 100 where that is above the threshold, else
     0. L is that of CIE Lab (D50). ``bloom`` is ``bright``, eight times the mean of a box along x,
-    then along y, of floor(256 min(100, blur_size + 1) / 100) pixels to each side, at most 256, as far
-    as these are inside of the frame. a and b of a colour do not change.
+    then along y, of floor(256 min(100, blur_size + 1) / 100) pixels to each side, at most 256, as
+    far as these are inside of the frame. a and b of a colour do not change.
 
     Source: darktable 4.2.1, src/iop/bloom.c.
 
