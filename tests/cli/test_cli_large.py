@@ -59,5 +59,5 @@ def test_pictures_of_any_shape(tmp_path: Path, size: tuple[int, int]) -> None:
 def test_longer_than_an_image_of_the_device(tmp_path: Path, size: tuple[int, int]) -> None:
     path = stored(tmp_path / "a.png", *size)
     result = run(path, tmp_path / "b.png")
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "1 to 16384 a side; it must be smaller" in result.stderr

@@ -132,7 +132,7 @@ vkbloom.apply(np.ones((8, 8, 3), np.float32))
 vkbloom.default_renderer().close()
 os.environ["VKBLOOM_TIMEOUT"] = "1e-6"
 try:
-    vkbloom.apply(np.ones((512, 512, 3), np.float32))
+    vkbloom.apply(np.ones((2048, 2048, 3), np.float32))
 except vkbloom.DeviceLostError as error:
     print("VKBLOOM_TIMEOUT" in str(error))
 del os.environ["VKBLOOM_TIMEOUT"]

@@ -28,7 +28,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     np.save("picture.npy", photo)
     custom = ROOT / "docs" / "custom_methods.md"
     (passes,) = blocks(custom, "glsl")
-    Path("soft.hook").write_text(passes)
+    for name in ("soft.hook", "old/soft.hook", "new/soft.hook"):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(passes)
     (function,) = [text for text in blocks(custom, "python") if "def soft" in text]
     Path("soft_reference.py").write_text(function)
     return tmp_path

@@ -35,6 +35,7 @@ NOT_RUN: Final = {
     "python -m benchmarks --beside": "the same",
     "python -m benchmarks --quick": "the same",
     "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
+    "vkbloom check --preset unity_urp --against": "needs an engine; test_check.py does",
     "vkbloom view": "does not end, and needs a screen; tests/cli/test_view.py does",
     "vkbloom grid --axis time=0:1:24": "needs the scheduler of a cluster",
 }
