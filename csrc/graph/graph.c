@@ -104,15 +104,18 @@ static bool is_used(const struct vkb_graph *graph, uint32_t image)
     return used;
 }
 
+uint64_t vkb_image_size(const struct vkb_image_row *row)
+{
+    return (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
+}
+
 uint64_t vkb_graph_size(const struct vkb_graph *graph)
 {
     uint64_t size = 0;
 
-    for (uint32_t i = 0; i < graph->image_count; ++i) {
-        const struct vkb_image_row *row = &graph->images[i];
+    for (uint32_t i = 0; i < graph->image_count; ++i)
         if (is_used(graph, i))
-            size += (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
-    }
+            size += vkb_image_size(&graph->images[i]);
     return size;
 }
 

@@ -181,7 +181,8 @@ bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error);
 // fills it once or reads it. How inputs are filled is the source's business.
 void vkb_graph_set_usages(struct vkb_graph *graph);
 
-// Bytes of all images that passes use, without layers.
+// Bytes of an image, and of all images that passes use, without layers.
+uint64_t vkb_image_size(const struct vkb_image_row *row);
 uint64_t vkb_graph_size(const struct vkb_graph *graph);
 
 // Whether both graphs have the same images in the same order; their passes may differ.

@@ -182,8 +182,7 @@ bool vkb_plan_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error
     *size = 0;
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (wanted[i])
-            *size += (uint64_t)graph->images[i].width * graph->images[i].height
-                   * vkb_pixel_size(graph->images[i].format);
+            *size += vkb_image_size(&graph->images[i]);
     vkb_free(marks);
     return true;
 }

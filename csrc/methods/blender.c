@@ -213,13 +213,7 @@ static bool add_line(const struct glare *glare, int direction, int step_x, int s
         if (!add_step(glare, "star_%u", (uint32_t)(direction * passes + i), light, error))
             return false;
         struct vkb_pass_row row =
-            vkb_fetching_row(&glare->levels, &vkb_shader_simple_star_comp, from, *light);
-        row.geometry = VKB_GEOMETRY_DISPATCH;
-        row.vertex = NULL;
-        row.variant = "dispatch";
-        row.block_width = row.block_height = 1;
-        row.groups_width = (lines + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
-        row.groups_height = 1;
+            vkb_row_of_lines(&glare->levels, &vkb_shader_simple_star_comp, lines, from, *light);
         row.reads[1] = adds ? before : from;
         row.read_count = 2;
         row.constants.add_own = adds;

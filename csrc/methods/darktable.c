@@ -16,13 +16,8 @@ static bool add_box(const struct vkb_levels *levels, uint32_t number, uint32_t *
 
     if (!vkb_levels_step(levels, "box_%u", number, size, image, error))
         return false;
-    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_box_mean_comp, from, *image);
-    row.geometry = VKB_GEOMETRY_DISPATCH;
-    row.vertex = NULL;
-    row.variant = "dispatch";
-    row.block_width = row.block_height = 1;
-    row.groups_width = (lines + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
-    row.groups_height = 1;
+    struct vkb_pass_row row =
+        vkb_row_of_lines(levels, &vkb_shader_box_mean_comp, lines, from, *image);
     row.block = VKB_BLOCK_box;
     row.params.box = (struct vkb_box_params){
         .across = across,

@@ -15,6 +15,21 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
     return row;
 }
 
+struct vkb_pass_row vkb_row_of_lines(const struct vkb_levels *levels,
+                                     const struct vkb_shader *shader, uint32_t lines, uint32_t from,
+                                     uint32_t to)
+{
+    struct vkb_pass_row row = vkb_fetching_row(levels, shader, from, to);
+
+    row.geometry = VKB_GEOMETRY_DISPATCH;
+    row.vertex = NULL;
+    row.variant = "dispatch";
+    row.block_width = row.block_height = 1;
+    row.groups_width = (lines + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
+    row.groups_height = 1;
+    return row;
+}
+
 struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                                    double gain)
 {

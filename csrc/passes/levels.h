@@ -56,6 +56,10 @@ bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t
 // yet; with the prefilter's block.
 struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
                                      const struct vkb_shader *fragment, uint32_t from, uint32_t to);
+// The same for a compute shader with one invocation for each of `lines` lines.
+struct vkb_pass_row vkb_row_of_lines(const struct vkb_levels *levels,
+                                     const struct vkb_shader *shader, uint32_t lines, uint32_t from,
+                                     uint32_t to);
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
                                       const struct vkb_shader *fragment, uint32_t from,
                                       uint32_t to);

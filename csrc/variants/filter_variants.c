@@ -163,18 +163,19 @@ static uint32_t tile_columns(const struct vkb_variant_choice *choice,
 bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                           bool *fits, struct vkb_error *error)
 {
+    const bool filters =
+        vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
+        && choice->device->limits.maxComputeWorkGroupInvocations >= FILTER_TILE_INVOCATIONS;
+    const uint32_t columns = filters ? tile_columns(choice, pass) : 0;
     struct vkb_pass_row row;
 
-    *fits = vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
-         && choice->device->limits.maxComputeWorkGroupInvocations >= FILTER_TILE_INVOCATIONS
-         && tile_columns(choice, pass) > 0;
+    *fits = columns > 0;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
-    row.constants.group_width = (int32_t)tile_columns(choice, pass);
-    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, (uint32_t)row.constants.group_width,
-                      FILTER_TILE_ROWS);
+    row.constants.group_width = (int32_t)columns;
+    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, columns, FILTER_TILE_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
