@@ -19,8 +19,8 @@ _CELL: Final = "padding:2px 8px"
 _STYLE: Final = (
     ":root{color-scheme:light dark;font:15px/1.4 sans-serif}body{max-width:80em;margin:2em auto;"
     "padding:0 1em;background:canvas}pre{white-space:pre-wrap}"
-    "td,th,pre{overflow-wrap:anywhere;text-align:left}figure{display:inline-block;margin:0 12px 12px 0}"
-    "img{max-width:100%;image-rendering:pixelated}"
+    "td,th,pre{overflow-wrap:anywhere;text-align:left}"
+    "figure{display:inline-block;margin:0 12px 12px 0}img{max-width:100%;image-rendering:pixelated}"
 )
 
 
