@@ -121,10 +121,7 @@ ERRORS = """
 2 : compare a.png b.png --min-ssim 2 => ssim: 2.0 is out of range, -1 to 1
 2 : compare a.png b.png --min-ssim high => '--min-ssim': 'high'
 2 : compare a.png b.png --max-error nan => max_error: nan is out of range
-2 : compare a.png b.png --data-range 0 => data_range: 0.0 is out of range
 2 : compare a.png b.png --diff d.unknown => '.unknown' is not the extension of a writable
-2 : compare a.png b.png --diff d.png --diff-scale 0 => scale: 0.0 is out of range
-2 : compare a.png b.png --diff-scale 2 => --diff-scale needs --diff
 1 : compare a.png b.png --diff none/d.png => none/d.png: there is no folder none
 2 : grid a.exr -o g => there is no --axis; give one
 2 : grid -o g --axis blur_scale => NAME=FIRST:LAST:COUNT
