@@ -1,4 +1,4 @@
-"""References of the pytest plugin: written, compared, unused."""
+"""References of the pytest plugin: written and compared."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shutil
 import OpenImageIO as oiio
 import pytest
 
-from tests.plugin.projects import ONE, PROJECT, edit, references, run, run_workers, write
+from tests.plugin.projects import ONE, PROJECT, edit, references, run, write
 from vkbloom.testing._references import cpu_vendor
 from vkbloom.testing._regression import name_of_test
 
@@ -235,46 +235,6 @@ def test_second_needs_a_name(frame_regression):
         names = {name_of_test(f"test[{'x' * 200}{end}]") for end in "ab"}
         assert len(names) == 2
         assert all(len(name) <= 100 for name in names)
-
-
-class TestUnused:
-    TWO = PROJECT + (
-        "def test_frames(frame_regression): frame_regression.check(frames())\n"
-        "def test_other(frame_regression):\n"
-        "    if not os.environ.get('IDLE'): frame_regression.check(frames(), 'other')\n"
-    )
-    LINE = "unused: bloom_references/test_one/other.json"
-
-    @pytest.fixture(autouse=True)
-    def idle(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-        write(project, self.TWO)
-        run(project, "--bloom-update").assert_outcomes(passed=2)
-        monkeypatch.setenv("IDLE", "1")
-
-    def test_is_listed(self, project: pytest.Pytester) -> None:
-        run(project).stdout.fnmatch_lines([self.LINE])
-
-    def test_is_listed_of_workers(self, project: pytest.Pytester) -> None:
-        result = run_workers(project)
-        result.assert_outcomes(passed=2)
-        result.stdout.fnmatch_lines([self.LINE])
-
-    @pytest.mark.parametrize("arguments", [("-k", "other"), ("test_one.py::test_other",)])
-    def test_not_where_tests_were_left_out(
-        self, project: pytest.Pytester, arguments: tuple[str, ...]
-    ) -> None:
-        run(project, *arguments).stdout.no_fnmatch_line("unused:*")
-
-    def test_not_where_a_test_failed_before(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setenv("SHIFT", "0.5")
-        run(project).stdout.no_fnmatch_line("unused:*")
-
-    def test_a_module_that_is_gone(self, project: pytest.Pytester) -> None:
-        folder = project.path / "bloom_references"
-        shutil.copytree(folder / "test_one", folder / "test_gone")
-        run(project).stdout.fnmatch_lines(["unused: bloom_references/test_gone"])
 
 
 class TestChecks:

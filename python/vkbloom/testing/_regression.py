@@ -278,7 +278,6 @@ class FrameRegression:
         missing = expected is None
         outcome = "missing" if missing else "failed" if message else "passed"
         record = self._record(given, outcome, None)
-        record["has_files"] = False
         if message and not (missing and self._mode.allow_missing):
             record["message"] = (
                 f"{given.name}: {message} of {file} for the driver {driver[:12]}. Compare images "
@@ -324,7 +323,6 @@ class FrameRegression:
         __tracebackhide__ = True
         failure = first_failure(verdicts)
         record = self._record(given, "failed" if failure else "passed", reference)
-        record["has_files"] = count is not None
         record["first_failure"] = failure.name if failure else None
         record["framebuffers"] = [
             test_report.figures(verdict, given.images) for verdict in verdicts
@@ -347,7 +345,6 @@ class FrameRegression:
             "test": self._test,
             "name": given.name,
             "folder": str(self._folder.path),
-            "has_files": True,
             "outcome": outcome,
             "origin": given.origin.summary,
             "reference_origin": reference.origin.summary if reference else None,

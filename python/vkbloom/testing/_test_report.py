@@ -31,7 +31,6 @@ class Record(TypedDict):
     test: str
     name: str
     folder: str  # of the references
-    has_files: bool  # not where a test gave what it expects
     outcome: str  # "passed", "failed", "missing" or "written"
     origin: str
     reference_origin: str | None
