@@ -13,7 +13,15 @@ from vkbloom._views.comparison import Comparison, compare
 from vkbloom._views.diagnosis import Diagnosis, diagnose
 from vkbloom._views.tolerances import Stage, Tolerances, failures, worst
 
-__all__ = ["Verdict", "first_failure", "judge", "judge_image"]
+__all__ = [
+    "Diagnosis",
+    "Tolerances",
+    "Verdict",
+    "diagnose",
+    "first_failure",
+    "judge",
+    "judge_image",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
