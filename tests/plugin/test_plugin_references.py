@@ -351,15 +351,6 @@ def test_more(frame_regression):
         result.stdout.fnmatch_lines(["*  bloom: FAILED (shape and dtype): it is missing"])
         result.stdout.fnmatch_lines(["*  extra: FAILED (shape and dtype): the reference does not*"])
 
-    def test_warns(self, project: pytest.Pytester) -> None:
-        write(project, self.text([("image + np.float16(0.01)", "atol=0.02, warn=0.005")]))
-        run(project, "--bloom-update", "-k", "right")
-        # Else the outer run's filter makes an error of it. The other warning is about the process.
-        filters = ("-W", "default", "-W", "ignore::pytest.PytestAssertRewriteWarning")
-        result = run(project, "-k", "changed", *filters)
-        result.assert_outcomes(passed=1, deselected=1, warnings=1)
-        result.stdout.fnmatch_lines(["*FrameDifferenceWarning: one-0: image: largest difference*"])
-
     def test_compares_what_a_test_has_made(self, project: pytest.Pytester) -> None:
         write(
             project,

@@ -71,14 +71,11 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     metavar="'PROGRAM {input} {output}'",
     help="Measure a program, which reads one image file and writes another.",
 )
-@click.option(
-    "--suffix", default=".exr", show_default=True, help="The type of the program's image files."
-)
+@click.option("--suffix", default=".exr", help="The type of the program's image files.")
 @click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     default=60.0,
-    show_default=True,
     help="Seconds that one run of the program may take.",
 )
 @click.option(
@@ -103,10 +100,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     "measured",
     type=SIZE,
     default="256x256",
-    show_default=True,
     help="Size of the test images; a wide bloom needs a large one.",
 )
-@click.option("--size", type=SIZE, default="1280x720", show_default=True, help="Size of the times.")
+@click.option("--size", type=SIZE, default="1280x720", help="Size of the times.")
 @click.option(
     "--require",
     metavar="LAW,...",
@@ -130,14 +126,12 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     "--fps",
     type=click.FloatRange(0, min_open=True),
     default=60.0,
-    show_default=True,
     help="Frames a second of --sequence.",
 )
 @click.option(
     "--degrees",
     type=click.FloatRange(0, 360, min_open=True),
     default=40.0,
-    show_default=True,
     help="Width of the picture of --sequence in the field of view.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")

@@ -59,7 +59,6 @@ subimage_option: Final = click.option(
     metavar="N",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Index of the part to read from a file with several parts.",
 )
 layer_option: Final = click.option(

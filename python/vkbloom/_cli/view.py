@@ -28,9 +28,9 @@ _KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"12
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
 @click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
-@click.option("--shading", type=click.Choice(SHADINGS), default="forward", show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default="forward")
 @click.option("--mailbox", is_flag=True, help="Each refresh shows the newest frame, not the next.")
-@click.option("-o", "--out", default="view", show_default=True, help="Folder of screenshots.")
+@click.option("-o", "--out", default="view", help="Folder of screenshots.")
 @live_options(image_has_size=True)
 def command(
     *,

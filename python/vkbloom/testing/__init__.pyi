@@ -21,7 +21,7 @@ from ._point_spread import (
 )
 from ._probe import Probe
 from ._programs import command
-from ._regression import FrameDifferenceWarning, FrameRegression
+from ._regression import FrameRegression
 from ._scaled_scene import (
     ResolutionResponse,
     assert_resolution_independent,
@@ -37,7 +37,6 @@ __all__ = [
     "Diagnosis",
     "Flash",
     "Flicker",
-    "FrameDifferenceWarning",
     "FrameRegression",
     "LawReport",
     "LawRow",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,11 +22,7 @@ from vkbloom.testing._judging import Verdict, first_failure, judge
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
 from vkbloom.testing._test_report import Record
 
-__all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
-
-
-class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``."""
+__all__ = ["FrameRegression", "Mode", "name_of_test"]
 
 
 class Limits(TypedDict, total=False):
@@ -37,7 +32,6 @@ class Limits(TypedDict, total=False):
     rtol: float | None
     fail_percent: float
     hard_fail: float | None
-    warn: float | None
     ssim: float | None
     psnr: float | None
     flip: float | None
@@ -133,7 +127,7 @@ class FrameRegression:
             reference. `Frames` have their own.
         **limits
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
-            decide. A difference above `warn` that passes issues a `FrameDifferenceWarning`.
+            decide.
 
         Raises
         ------
@@ -328,10 +322,6 @@ class FrameRegression:
             test_report.figures(verdict, given.images) for verdict in verdicts
         ]
         if failure is None:
-            for verdict in verdicts:
-                if verdict.warning:
-                    text = f"{given.name}: {verdict.warning}"
-                    warnings.warn(text, FrameDifferenceWarning, stacklevel=3)
             return
         record["message"] = _message(given, verdicts, reference, count)
         if self._mode.parts is not None:
