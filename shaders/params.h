@@ -167,7 +167,7 @@
     VEC4S(B, weights, MAX_TAPS)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
-// ghosts. SUMMED_ROWS are of adjoints.
+// ghosts.
 #define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
     INPUT(B, float, limit) \
@@ -178,20 +178,7 @@
     INPUT(B, float, vignette) \
     INPUT(B, float, width) \
     INPUT(B, int, count) \
-    SUMMED_ROWS(B, INPUT) \
     VEC4S(B, ghosts, MAX_GHOSTS)
-
-// Of an adjoint pass that reads many pixels for the texels of a block, which is `summed_width` x
-// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each
-// texel and each group of rows, in blocks of which `summed_columns` are beside each other
-// (summed.glsl).
-#define SUMMED_ROWS(B, INPUT) \
-    INPUT(B, int, summed_x) \
-    INPUT(B, int, summed_y) \
-    INPUT(B, int, summed_width) \
-    INPUT(B, int, summed_height) \
-    INPUT(B, int, summed_rows) \
-    INPUT(B, int, summed_columns)
 
 // What a picture of dirt leaves of the light: base + share * dirt (dirt.frag).
 #define DIRT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -225,13 +212,12 @@
     INPUT(B, float, limit)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
-// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
+// the sides; the share of the samples that jitter leaves.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
     INPUT(B, float, left) \
-    SUMMED_ROWS(B, INPUT) \
     INPUT(B, float, limit)
 
 // The light of the deferred system.
