@@ -128,7 +128,11 @@ def plain_modules(shader: Path) -> list[Module]:
                 found.append(Module(f"{name}_{ours}", shader, options))
             linear = ("-DLINEAR_TEXELS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             if "TARGET_BYTES" in text:
-                stored = ("-DLINEAR_TEXELS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
+                stored = (
+                    "-DLINEAR_TEXELS",
+                    "-DCHANNEL_BYTES=4",
+                    f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}",
+                )
                 found.append(Module(f"{shader.stem}_stored_linear_{ours}", shader, stored))
             kinds = [("", ())]
             if "SOURCE_CHANNELS" in text and ours == "rgba32float":
