@@ -108,7 +108,7 @@ def plain_modules(shader: Path) -> list[Module]:
     """Return the modules of a shader for one image.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for images with linear texels, of each format. Lines of it say more: with `#pragma compile
+    is compiled for linear texels of each format. Lines of it say more: with `#pragma compile
     floats` it is for single floats alone, with `#pragma compile images` also for storage images.
     If it calls finished() or ended(), or has `#pragma compile packed`, it can make the caller's
     array, and is also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can
