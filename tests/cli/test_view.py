@@ -120,10 +120,3 @@ def test_without_a_display_it_says_so() -> None:
     done = view("vkbloom._cli", "view", env=env)
     assert (done.returncode, done.stdout) == (1, "")
     assert "no window was opened: " in done.stderr
-
-
-def test_a_scene_s_options_are_refused_with_an_image() -> None:
-    pytest.importorskip("glfw")
-    done = view("vkbloom._cli", "view", "x.png", "--shading", "forward", env=dict(os.environ))
-    assert done.returncode == 2
-    assert "leave it out with an IMAGE" in done.stderr

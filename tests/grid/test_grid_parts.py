@@ -23,7 +23,6 @@ from tests.images import noise
 from vkbloom import check_grid
 from vkbloom._cli.program import program
 from vkbloom._grid.order import blocks
-from vkbloom._grid.parts import read_part
 
 SCRIPT = "tests.grid.grid_in_parts"
 ROOT = Path(__file__).resolve().parents[2]
@@ -157,15 +156,3 @@ def test_command_line(tmp_path: Path) -> None:
     done = CliRunner().invoke(program, [*words, "--part", "1/3"])
     assert contents(tmp_path / "whole") == contents(tmp_path / "parts")
     assert CliRunner().invoke(program, [*words, "--part", "4/3"]).exit_code == 2
-
-
-@pytest.mark.parametrize("part", [(0, 0), (17, 16), (-1, 16), "3", "3/", "a/b", "1/2/3", ""])
-def test_wrong_values(part: Any) -> None:
-    with pytest.raises(ValueError, match="part: "):
-        read_part(part)
-
-
-@pytest.mark.parametrize("part", [3, (1.0, 2), (True, 2), (1, 2, 3)])
-def test_wrong_types(part: Any) -> None:
-    with pytest.raises(TypeError, match="part: "):
-        read_part(part)

@@ -24,8 +24,6 @@ from vkbloom._grid.store import (
     read_json,
 )
 
-__all__ = ["GridReport", "check_grid"]
-
 
 @dataclass(frozen=True)
 class GridReport:

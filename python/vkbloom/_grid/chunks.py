@@ -17,8 +17,6 @@ from vkbloom._checks import import_extra
 from vkbloom._grid.keys import Keys
 from vkbloom._grid.order import Block, Index
 
-__all__ = ["DONE", "Chunks"]
-
 DONE: Final = "done"
 
 

@@ -33,8 +33,6 @@ from vkbloom._renderer.renderer import Renderer
 Client: TypeAlias = Any
 Future: TypeAlias = Any
 
-__all__ = ["check_client", "lay_out_there", "run_there", "shared_grid"]
-
 _PURPOSE: Final = "A grid on a Dask cluster"
 _PLUGIN: Final = "vkbloom-renderers"
 # Submitted runs per worker: one that runs, one that waits.

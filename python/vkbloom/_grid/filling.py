@@ -15,8 +15,6 @@ from vkbloom._grid.sources import visit
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 
-__all__ = ["Filler", "Tally"]
-
 
 @dataclass
 class Tally:

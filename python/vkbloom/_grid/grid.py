@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from vkbloom._scene import Scene
 
-__all__ = ["grid"]
-
 
 @checked
 def grid(

@@ -11,8 +11,6 @@ from vkbloom._grid.layout import Grid, Layout
 from vkbloom._grid.order import Index
 from vkbloom._settings.fields import plain_value
 
-__all__ = ["FORMAT", "chunk_in", "differences", "fingerprint", "identity", "short"]
-
 #: Version of the store's layout. A store with another version cannot be read.
 FORMAT: Final = 3
 

@@ -13,8 +13,6 @@ from vkbloom._checks import import_extra
 if TYPE_CHECKING:
     from zarr.abc.store import Store
 
-__all__ = ["Keys", "open_keys"]
-
 _PURPOSE: Final = "Grids on disk"
 # The end of the names of LocalStore's temporary files.
 _PARTIAL: Final = ".partial"

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 
 from vkbloom._grid.parts import WHOLE, Part
 
-__all__ = ["Block", "Index", "blocks", "default_chunk", "points", "ranking_of", "walk"]
-
 Index = tuple[int, ...]
 
 

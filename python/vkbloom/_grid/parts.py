@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Final, TypeAlias
 
-__all__ = ["WHOLE", "Part", "read_part"]
-
 #: The number of a part, from 1, and the number of parts.
 Part: TypeAlias = tuple[int, int]
 

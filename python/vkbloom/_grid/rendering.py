@@ -13,8 +13,6 @@ from vkbloom._grid.running import run_here
 from vkbloom._grid.store import GridStore
 from vkbloom._renderer.renderer import Renderer
 
-__all__ = ["Workers", "render_grid"]
-
 
 class Workers(NamedTuple):
     """The workers of a Dask cluster, and the arguments of the renderers that they open."""

@@ -21,8 +21,6 @@ from vkbloom._grid.store import GridStore
 if TYPE_CHECKING:
     from vkbloom._renderer.renderer import Renderer
 
-__all__ = ["empty_arrays", "run_here", "written"]
-
 # Blocks are flushed and marked as done after this time, or this number of blocks.
 _COMMIT_SECONDS: Final = 2.0
 _COMMIT_BLOCKS: Final = 64

@@ -35,18 +35,6 @@ from vkbloom._grid.layout import Grid, Layout, Variable, attributes_of
 from vkbloom._grid.order import Block, Index, blocks
 from vkbloom._grid.parts import WHOLE, Part
 
-__all__ = [
-    "IDENTITY",
-    "METADATA",
-    "PARTS",
-    "GridStore",
-    "checked_identity",
-    "mark_of",
-    "normal",
-    "read_json",
-    "stored_identity",
-]
-
 METADATA: Final = "zarr.json"
 IDENTITY: Final = "vkbloom_grid"
 # In the folder of an array, where readers of Zarr expect chunks and list no members.
