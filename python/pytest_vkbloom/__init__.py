@@ -16,8 +16,8 @@ import pytest
 
 if TYPE_CHECKING:
     from vkbloom import Renderer
-    from vkbloom.testing._records import Record
     from vkbloom.testing._regression import FrameRegression
+    from vkbloom.testing._test_report import Record
 
 __all__ = ["bloom_renderer", "frame_regression"]
 
@@ -238,7 +238,7 @@ class _Run:
         """Write the report; if that fails, the summary says so and the run goes on."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
-        from vkbloom.testing._report_page import write_report  # noqa: PLC0415  costs start-up time
+        from vkbloom.testing._test_report import write_report  # noqa: PLC0415  costs start-up time
 
         try:
             self._page = write_report(self._report, self.parts, self._records)

@@ -69,11 +69,6 @@ class TestPng:
         shown = decode(make({"depth": depth})._repr_png_(), tmp_path)
         assert shown[0, :, 0].tolist() == [255, 128, 0, 0]
 
-    def test_stretches_by_the_range_of_another(self) -> None:
-        depth = np.array([[0.5, 0.75, 1.0, 1.5]], np.float32)
-        wider = np.array([[0.0, 1.0]], np.float32)
-        assert picture(depth, range_of=wider).ravel().tolist() == [128, 64, 0, 0]
-
     def test_shows_16_bits_as_stored(self) -> None:
         image = np.array([[[0, 32896, 65535]]], np.uint16)
         assert picture(image).ravel().tolist() == [0, 128, 255]

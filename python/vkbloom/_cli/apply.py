@@ -23,7 +23,6 @@ from vkbloom._cli.image_files import (
     expand_option,
     input_colour_option,
     layer_option,
-    silenced,
     subimage_option,
 )
 from vkbloom._cli.program import as_wrong_use, described
@@ -140,7 +139,7 @@ def command(
     work = _planned(options, inputs, target)
     if not work:
         return 0
-    with tempfile.TemporaryDirectory() as folder, silenced(), ExitStack() as stack:
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
         def renderer() -> vkbloom.Renderer:

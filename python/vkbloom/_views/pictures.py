@@ -117,19 +117,17 @@ def picture(
     *,
     encoded: bool = False,
     size: tuple[int, int] | None = None,
-    range_of: NDArray[Any] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture, as `leading_png` documents."""
     values = np.atleast_3d(array).astype(np.float32)
-    ranged = values if range_of is None else np.atleast_3d(range_of).astype(np.float32)
     linear = False
     if array.dtype.kind == "u":
         shown = values / np.float32(np.iinfo(array.dtype).max)
     elif array.ndim == 2:
-        shown = np.float32(1) - _stretched(values, ranged)
+        shown = np.float32(1) - _stretched(values)
     elif name == "position":
-        shown = _stretched(values, ranged)
+        shown = _stretched(values)
     elif name == "normal":
         shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
     else:
@@ -196,11 +194,11 @@ def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.clip(finite, 0.0, 1.0)
 
 
-def _stretched(values: NDArray[np.float32], ranged: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Map the finite range that each channel has in `ranged` to 0..1; one value gives 0."""
-    finite = np.isfinite(ranged)
-    low: NDArray[np.float32] = ranged.min(axis=(0, 1), where=finite, initial=np.inf)
-    high: NDArray[np.float32] = ranged.max(axis=(0, 1), where=finite, initial=-np.inf)
+def _stretched(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Map the finite range of each channel to 0..1; one value gives 0."""
+    finite = np.isfinite(values)
+    low: NDArray[np.float32] = values.min(axis=(0, 1), where=finite, initial=np.inf)
+    high: NDArray[np.float32] = values.max(axis=(0, 1), where=finite, initial=-np.inf)
     # Stays positive if no value is finite and the range is inf to -inf.
     span = np.maximum(high - low, np.finfo(np.float32).tiny)
     return _clipped((np.clip(values, low, high) - low) / span)

@@ -25,12 +25,10 @@ from vkbloom.testing._laws import (
 )
 from vkbloom.testing._moving_light import Stability, assert_stable, stability
 from vkbloom.testing._point_spread import (
-    Response,
     assert_centroid_kept,
     assert_separable,
     assert_spread,
     point_spread,
-    response,
 )
 from vkbloom.testing._probe import Probe
 from vkbloom.testing._programs import command
@@ -56,7 +54,6 @@ __all__ = [
     "LawRow",
     "Probe",
     "ResolutionResponse",
-    "Response",
     "Stability",
     "Tolerances",
     "assert_additive",
@@ -87,7 +84,6 @@ __all__ = [
     "read_frame",
     "report",
     "resolution_response",
-    "response",
     "roundness",
     "stability",
     "veiling_glare_index",

@@ -18,10 +18,10 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import _hashes as hashes
-from vkbloom.testing import _report_parts as report_parts
+from vkbloom.testing import _test_report as test_report
 from vkbloom.testing._judging import Verdict, first_failure, judge
-from vkbloom.testing._records import Record
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
+from vkbloom.testing._test_report import Record
 
 __all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
 
@@ -327,7 +327,7 @@ class FrameRegression:
         record["has_files"] = count is not None
         record["first_failure"] = failure.name if failure else None
         record["framebuffers"] = [
-            report_parts.figures(verdict, given.images) for verdict in verdicts
+            test_report.figures(verdict, given.images) for verdict in verdicts
         ]
         if failure is None:
             for verdict in verdicts:
@@ -337,7 +337,7 @@ class FrameRegression:
             return
         record["message"] = _message(given, verdicts, reference, count)
         if self._mode.parts is not None:
-            record["part"] = report_parts.write(
+            record["part"] = test_report.write_part(
                 self._mode.parts, verdicts, reference.images, given.images
             )
         raise AssertionError(record["message"])
