@@ -17,7 +17,7 @@ from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
-from vkbloom._grid import filling, identity, layout, order, parts, progress, sources
+from vkbloom._grid import filling, identity, layout, order, progress, sources
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
@@ -63,7 +63,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")
-        part = parts.read_part(given["part"])
+        part = order.read_part(given["part"])
     if not is_store and Path(out).suffix and not Path(out).is_dir():
         hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
         raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
