@@ -36,8 +36,7 @@ def leading_png(frames: Framebuffers) -> bytes:
 def contact_sheet_html(frames: Framebuffers) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
-    Pictures are made as in `leading_png`, without alpha, and reduced to at most 320 pixels by
-    averaging. The caption gives the range of floats. Text inherits the page's colours.
+    Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
     """
     thumbnails = []
     for name, array in frames.items():

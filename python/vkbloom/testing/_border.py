@@ -78,11 +78,6 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
         "edge": the larger of the middle of the left and of the upper edge; "corner": the upper left
         corner. 1 in a bloom that loses no light and adds none. A bloom that repeats the outermost
         pixels has more, one that reads black outside less.
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite, or the bloom of the light in the middle is black.
     """
     __tracebackhide__ = True
     lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
@@ -114,11 +109,6 @@ def assert_border(
         Where light reaches the border from the middle, only energies and flat images are tested.
     limits : mapping of str to float, optional
         Limits by figure, in place of those of `BORDER_LIMITS`.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
     """
     __tracebackhide__ = True
     allowed = BORDER_LIMITS | dict(limits or {})
@@ -241,11 +231,6 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
     limit : float
         Allowed difference, as a share of the largest value of the bloom, beyond the errors of
         values.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     if not takes(bloom, "region"):

@@ -95,7 +95,7 @@ def as_values(found: Measured) -> dict[str, Any]:
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
             "veiling_glare_index": found.veiling_glare_index,
-            "first_infected": found.first_infected,
+            "first_infected": found.subject.first_infected,
             "reference": found.subject.reference or None,
             "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
             "required": found.report.required,
