@@ -139,7 +139,7 @@ void write_strip(ivec2 first, int end, vec2 ratio)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, WINDOW_ROWS));
     int end = min(first.y + WINDOW_ROWS, size.y);

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.cli import calls
 from tests.io.parts import written
 from vkbloom._cli import applied
-from vkbloom._cli.program import program
 
 oiio = pytest.importorskip("OpenImageIO")
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 
-def run(*words: object) -> Result:
-    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+run = functools.partial(calls.run, "apply", "--adapter", "software")
 
 
 def stored(path: Path, height: int, width: int) -> Path:

@@ -348,23 +348,6 @@ def test_a_program_of_8_bits_is_noted(copying: str) -> None:
     assert found["laws"]["gain"]["held"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ([], "give FILE, --preset NAME"),
-        (["missing.hook"], "there is no such file"),
-        (["--preset", "kino", "--require", "beauty"], "'beauty' is not one of superposition"),
-        (["--preset", "kino", "--command", "cp {input} {output}"], "cannot be combined"),
-        (["--command", "cp {input}"], "has no {output}"),
-        (["--preset", "kino", "--reference", "a.py:b"], "needs FILE"),
-    ],
-)
-def test_wrong_use(words: list[str], message: str) -> None:
-    done = CliRunner().invoke(program, ["check", *words])
-    assert done.exit_code == 2
-    assert message in done.output
-
-
 def test_a_program_that_fails_is_one_line() -> None:
     done = CliRunner().invoke(program, ["check", "--command", "false {input} {output}"])
     assert done.exit_code == 1

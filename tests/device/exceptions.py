@@ -24,7 +24,7 @@ EXCEPTIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
             f"test_huge_colours[{tonemap}-{encoding}]"
             for tonemap, encoding in product(("none", "exponential", "agx"), ("gamma22", "pq"))
         ),
-        "it lacks what images as words need (device.c: has_words)": (
+        "it lacks what images with linear texels need (device.c: has_linear_texels)": (
             "test_one_pass_stands_for_all_of_a_final[cpu]",
             "test_sequence_runs_shared_passes_once[cpu]",
             "test_sequence_runs_no_pass_of_other_settings[cpu]",

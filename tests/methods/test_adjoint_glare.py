@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.methods.reference_cases import random_image
+from tests.images import random_image
 from tests.methods.test_adjoint_passes import check
 from vkbloom import BlenderGlare, Ghosts, Halo, Pyramid, Renderer, reference
 from vkbloom._gradients.passes import DeviceGradients

@@ -227,14 +227,14 @@ def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once() -> None:
     with Renderer("software") as software:
         plan = software.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
     (first,) = (one for one in plan.passes if one.name == "down_0")
-    assert first.shader.startswith("shrink_words")
+    assert first.shader.startswith("shrink_linear")
 
 
 def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines() -> None:
     def stages(size: tuple[int, int]) -> int:
         image = np.zeros((size[1], size[0], 3), np.float32)
         plan = software.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))
-        return sum(one.shader.startswith("fft_words") for one in plan.passes)
+        return sum(one.shader.startswith("fft_linear") for one in plan.passes)
 
     with Renderer("software") as software:
         assert stages((500, 250)) > stages((500, 270))

@@ -14,7 +14,7 @@ INSTALL = (
     "install it: pip install 'vkbloom[cli]', or run it without: "
     "uvx 'vkbloom[all]' apply photo.jpg bloom.jpg"
 )
-NO_ADAPTER = "no Vulkan adapter was found; run vkbloom doctor for the reason"
+_NO_ADAPTER = "vkbloom: no Vulkan adapter was found; run vkbloom doctor for the reason"
 
 
 def run(words: Sequence[str], missing: Sequence[str]) -> int:
@@ -29,15 +29,22 @@ def run(words: Sequence[str], missing: Sequence[str]) -> int:
         print(json.dumps(found, indent=2) if as_json else "\n".join(lines_of(found)))
         return int(not found["can_render"])
     if first == "adapters" and (as_json or not options):
-        adapters = vkbloom.adapters()
-        rows = [dataclasses.asdict(adapter) for adapter in adapters]
-        listed = json.dumps(rows, indent=2) if as_json else "\n".join(a.summary for a in adapters)
-        print(listed, end="\n" if listed else "")
-        if not adapters:
-            print(f"vkbloom: {NO_ADAPTER}", file=sys.stderr)
-        return int(not adapters)
+        return list_adapters(as_json=as_json)
     print(f"vkbloom: the command line needs {' and '.join(missing)}; {INSTALL}", file=sys.stderr)
     return 1
+
+
+def list_adapters(*, as_json: bool) -> int:
+    """Print the adapters, one a line or as JSON, and return the status: 1 if there is none."""
+    adapters = vkbloom.adapters()
+    if as_json:
+        print(json.dumps([dataclasses.asdict(adapter) for adapter in adapters], indent=2))
+    else:
+        for adapter in adapters:
+            print(adapter.summary)
+    if not adapters:
+        print(_NO_ADAPTER, file=sys.stderr)
+    return int(not adapters)
 
 
 def examined() -> dict[str, Any]:

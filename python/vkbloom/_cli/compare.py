@@ -71,22 +71,9 @@ def tolerances_of(
     "that are NaN or infinite in only one image are magenta.",
 )
 @click.option(
-    "--diff-scale",
-    metavar="X",
-    type=click.FLOAT,
-    help="Factor of the differences in that picture [default: makes the largest 1]",
-)
-@click.option(
     "--allow-nan",
     is_flag=True,
     help="Accept NaN, and infinity of the same sign, at pixels where both images have it.",
-)
-@click.option(
-    "--data-range",
-    metavar="X",
-    type=click.FLOAT,
-    help="Data range for SSIM and PSNR [default 1 for integers; for floats the range of the "
-    "values, 0 and 1]",
 )
 @click.option(
     "--pixels-per-degree",
@@ -116,9 +103,7 @@ def command(
     first: str,
     second: str,
     diff: str | None,
-    diff_scale: float | None,
     allow_nan: bool,
-    data_range: float | None,
     pixels_per_degree: float | None,
     nits_per_unit: float | None,
     as_json: bool,
@@ -145,8 +130,6 @@ def command(
         tolerances = tolerances_of(**limits)
         if diff is not None:
             image_writing.check_writable(diff)
-    if diff is None and diff_scale is not None:
-        raise click.UsageError("--diff-scale needs --diff")
     a, b = read(first, subimage), read(second, subimage)
     check_part_is_given(first, a)
     check_part_is_given(second, b)
@@ -157,7 +140,6 @@ def command(
             b.pixels,
             threshold=tolerances.atol or 0.0,
             allow_nan=allow_nan,
-            data_range=data_range,
             metrics=USUAL_METRICS if nits_per_unit is None else ALL_METRICS,
             nits_per_unit=nits_per_unit,
             pixels_per_degree=pixels_per_degree,
@@ -169,7 +151,7 @@ def command(
     if diff is not None and found.max_error is None:
         note(f"{diff} is not written: the images have no values to compare")
     elif diff is not None:
-        scale = _write_difference(a, b, diff, diff_scale)
+        scale = _write_difference(a, b, diff)
     if as_json:
         shown = _object((first, second), found, failed, scale, cause)
         click.echo(json.dumps(shown, indent=2))
@@ -194,13 +176,12 @@ def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparis
     return dataclasses.replace(found, mismatches=(*found.mismatches, reason))
 
 
-def _write_difference(a: StoredImage, b: StoredImage, path: str, scale: float | None) -> float:
+def _write_difference(a: StoredImage, b: StoredImage, path: str) -> float:
     """Write the difference picture and return its scale."""
-    with as_wrong_use():
-        picture, used = difference(a.pixels, b.pixels, scale)
+    picture, scale = difference(a.pixels, b.pixels)
     for text in image_writing.save(Picture.of_values(picture), path):
         note(text)
-    return used
+    return scale
 
 
 def _object(

@@ -51,7 +51,6 @@ from vkbloom._settings.registry import METHODS
     "--framebuffer",
     metavar="NAME",
     default="final",
-    show_default=True,
     help="The framebuffer that TARGET shows: final is the picture with its bloom, bloom the bloom "
     "alone.",
 )

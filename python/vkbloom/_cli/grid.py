@@ -17,7 +17,7 @@ from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
-from vkbloom._grid import filling, identity, layout, order, parts, progress, sources
+from vkbloom._grid import filling, identity, layout, order, progress, sources
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
@@ -31,10 +31,10 @@ from vkbloom._settings.settings import SHADINGS
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
 @click.option("--time", default=0.0, help="Time of a scene's animation; its period is 1.")
-@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
-@click.option("--framebuffers", metavar="all|NAME,...", default="final", show_default=True)
-@click.option("--image-format", metavar="EXTENSION", default="png", show_default=True)
-@click.option("--resume/--no-resume", default=True, help="Continue a grid that is there [default]")
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
+@click.option("--framebuffers", metavar="all|NAME,...", default="final")
+@click.option("--image-format", metavar="EXTENSION", default="png")
+@click.option("--resume/--no-resume", default=True, help="Continue a grid that is there")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
 @click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
@@ -63,7 +63,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")
-        part = parts.read_part(given["part"])
+        part = order.read_part(given["part"])
     if not is_store and Path(out).suffix and not Path(out).is_dir():
         hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
         raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")

@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Final
 
 import click
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from vkbloom._cli.terminal import show
-
 __all__ = ["Entry", "listing_command"]
+
+# Console width for output to a file or another program, where lines must not be wrapped.
+_UNBROKEN: Final = 4096
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +53,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
             ]
             click.echo(json.dumps(objects, indent=2))
         else:
-            show(_table(listed))
+            _show(_table(listed))
 
     return command
 
@@ -76,3 +78,17 @@ def _table(entries: Iterable[Entry]) -> Table:
         hdr = "yes" if one.needs_hdr else "no"
         table.add_row(one.name, one.composite, hdr, *confirmed, *texts)
     return table
+
+
+def _show(table: Table) -> None:
+    """Print a table: wrapped to the terminal's width, or unwrapped without a terminal."""
+    console = Console(markup=False, highlight=False, emoji=False)
+    if console.is_terminal:
+        console.print(table)
+        return
+    console.width = _UNBROKEN
+    with console.capture() as captured:
+        console.print(table)
+    # rich pads every cell to the width of its column; strip the padding of the last column.
+    for line in captured.get().splitlines():
+        click.echo(line.rstrip())

@@ -229,7 +229,7 @@ def given(name: str, context: click.Context | None = None) -> bool:
     cls=Program,
     # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     params=[*terminal.PRINTING_OPTIONS],
 )
 @click.version_option(

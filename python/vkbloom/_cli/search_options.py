@@ -60,7 +60,6 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
             "--vary",
             metavar="NAME,...",
             default=vary,
-            show_default=True,
             help="The settings to find: numbers, switches and choices"
             + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
         ),
@@ -68,7 +67,6 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
             "--loss",
             type=click.Choice(get_args(LossName)),
             default=loss,
-            show_default=True,
             help="The figure to minimize. relative: norm of the difference divided by the norm of "
             "the target; l2: root mean square of the difference; log: the same for logarithms; "
             "flip: mean FLIP.",
@@ -78,7 +76,6 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
             metavar="N",
             type=click.IntRange(min=1),
             default=max_calls,
-            show_default=True,
             help="Limit of the renders of each search.",
         ),
         click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
@@ -93,20 +90,10 @@ def _show_results(found: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
         for one in found:
             click.echo(
                 f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
-                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s{_begun(one)}"
+                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s"
             )
             click.echo(f"  {as_code(one.settings)}")
             click.echo(f"  {one.words}")
-
-
-def _begun(found: vkbloom.FitResult) -> str:
-    """Return the preset that a search started from, as words; "" if none has the other fields."""
-    for name, preset in vkbloom.presets.items():
-        if preset.method == found.settings.method:
-            values = {field: getattr(preset, field) for field in found.vary}
-            if found.settings.replace(**values) == preset:
-                return f", from the preset {name}"
-    return ""
 
 
 def _object(found: vkbloom.FitResult) -> dict[str, Any]:

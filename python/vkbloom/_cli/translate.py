@@ -30,7 +30,6 @@ from vkbloom._settings.registry import METHODS
     "--size",
     type=SIZE,
     default="640x360",
-    show_default=True,
     help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
     "of the frame at every size but this.",
 )

@@ -46,17 +46,12 @@ _STEPS: Final = 200
 
 
 def controls() -> dict[str, Any]:
-    """Describe methods, point-spread functions, stages and presets.
+    """Describe methods, point-spread functions, stages of glare and presets.
 
-    Returns: "methods": for each method its "defaults", and for each field with a control its
-    "name", "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
-    "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
-    range from "low" to "high", and "integer"; choices have "choices", and may have a name for
-    "none" of them. "functions": the same for the point-spread functions of a convolution; the name
-    of a field of the mask begins with "mask.". "glare": "stages", the same for the stages of glare,
-    and "presets", for each name of `glares` its stages. "presets": settings by name, as from
-    `Settings.to_dict`. "look": the fields that keep their values when another preset or method is
-    selected.
+    Of each field with a control: its "name", "kind" ("bool", "number", "choice"), "help", whether
+    it comes "first" and may be None ("optional"). Numbers have "from", "to" and "step" of their
+    slider, and the accepted range "low" to "high". "look": the fields that keep their values when
+    another preset or method is selected.
     """
     return {
         "methods": {name: described(kind) for name, kind in METHODS.items()},

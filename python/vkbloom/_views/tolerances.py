@@ -45,8 +45,6 @@ class Tolerances:
         Percentage of pixels that may fail, 0 to 100: ``failpercent``.
     hard_fail : float or None
         Difference that no pixel may exceed, independent of `fail_percent`: ``hardfail``.
-    warn : float or None
-        Largest difference that passes without a warning: ``warn``.
     ssim : float or None
         Smallest structural similarity, -1 to 1.
     psnr : float or None
@@ -66,7 +64,6 @@ class Tolerances:
     rtol: float | None = None
     fail_percent: float = 0.0
     hard_fail: float | None = None
-    warn: float | None = None
     ssim: float | None = None
     psnr: float | None = None
     flip: float | None = None
@@ -78,7 +75,6 @@ class Tolerances:
             ("rtol", 0.0, float(np.finfo(np.float64).max)),
             ("fail_percent", 0.0, 100.0),
             ("hard_fail", 0.0, math.inf),
-            ("warn", 0.0, math.inf),
             ("ssim", -1.0, 1.0),
             ("psnr", -math.inf, math.inf),
             ("flip", 0.0, 1.0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -13,7 +13,17 @@ import numpy as np
 
 from vkbloom.testing._probe import Image
 
-__all__ = ["Deviation", "NotTaken", "compare_with_law", "fail", "figure", "is_within", "measuring"]
+__all__ = [
+    "Deviation",
+    "Measured",
+    "NotTaken",
+    "breaches",
+    "compare_with_law",
+    "fail",
+    "figure",
+    "is_within",
+    "measuring",
+]
 
 
 class NotTaken(ValueError):
@@ -29,6 +39,9 @@ class Deviation:
     allowed: float
     name: str
 
+
+#: The name of a figure, the deviation, the limit, and what is wrong where it is beyond the limit.
+Measured = tuple[str, float, float, str]
 
 _measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
 
@@ -50,6 +63,11 @@ def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     if found is not None:
         found.append(Deviation(law, off, allowed, name))
     return off <= allowed
+
+
+def breaches(law: str, measured: Iterable[Measured]) -> list[str]:
+    """Return what is wrong with each deviation that is beyond its limit."""
+    return [text for name, off, limit, text in measured if not is_within(law, off, limit, name)]
 
 
 def figure(name: str, value: float) -> None:

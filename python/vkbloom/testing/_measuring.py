@@ -1,11 +1,11 @@
-"""What `vkbloom check` measures: a bloom of settings or of a program, its times and its likes."""
+"""What `vkbloom check` measures of a bloom of settings or of a program."""
 
 from __future__ import annotations
 
 import functools
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,8 +19,7 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._sampled import samples
-from vkbloom.testing._law_report import LawReport, law_report
-from vkbloom.testing._law_table import LAWS
+from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._programs import COARSE_ERROR, Program
@@ -48,7 +47,10 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """All that was measured of a bloom. `passes`: seconds at `size`."""
+    """All that is measured of a bloom; figures are measured when they are read.
+
+    `passes`: seconds at `size`.
+    """
 
     name: str
     device: str
@@ -57,10 +59,24 @@ class Measured:
     passes: Mapping[str, float]
     subject: Subject
     report: LawReport
-    spread: Spread
-    veiling_glare_index: float
-    first_infected: str | None
-    nearest: tuple[str, float]
+    renderer: Renderer
+
+    @functools.cached_property
+    def spread(self) -> Spread:
+        """The point spread of the lamp."""
+        return spread_of(self.subject.spread, self.subject.lamp)
+
+    @functools.cached_property
+    def veiling_glare_index(self) -> float:
+        """The index of the picture, or of the bloom alone."""
+        probe, bloom = self.subject.probe, self.subject.picture or self.subject.bloom
+        patch = max(1, min(probe.size) // 8)
+        return veiling_glare_index(bloom, size=probe.size, patch=patch, value=probe.value)
+
+    @functools.cached_property
+    def nearest(self) -> tuple[str, float]:
+        """The preset whose bloom is nearest, and its difference."""
+        return nearest_preset(self.name, self.subject.bloom, self.renderer)
 
 
 def exact(settings: Settings) -> Settings:
@@ -84,8 +100,8 @@ def of_settings(
 ) -> Subject:
     """Return the bloom of settings.
 
-    An own bloom is expected to keep the light of flat images, others to have the gain that a flat
-    image gets in its middle.
+    A file that saves BLOOM is expected to keep the light of flat images, other methods to have the
+    gain that a flat image gets in its middle.
     """
     used = exact(settings)
     bloom = shown(renderer, used, "bloom")
@@ -99,8 +115,8 @@ def of_settings(
         frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
-        own = isinstance(used, CustomMethod) and used.file.saves_bloom
-        subject.gain = 1.0 if own else subject.measured_gain
+        keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
+        subject.gain = 1.0 if keeps_light else subject.measured_gain
     return subject
 
 
@@ -132,42 +148,6 @@ def of_program(
     if program.bits is not None:
         subject.highest = 1.0
     return subject
-
-
-def measured(
-    subject: Subject,
-    renderer: Renderer,
-    *,
-    name: str,
-    device: str,
-    settings: Settings | None,
-    passes: Mapping[str, float],
-    frame: tuple[int, int],
-    required: tuple[str, ...],
-    progress: Callable[[str], None],
-) -> Measured:
-    """Measure a bloom."""
-    report = law_report(subject, LAWS, required, progress)
-    probe = subject.probe
-    progress("presets")
-    return Measured(
-        name=name,
-        device=device,
-        settings=settings,
-        size=frame,
-        passes=passes,
-        subject=subject,
-        report=report,
-        spread=spread_of(subject.spread, subject.lamp),
-        veiling_glare_index=veiling_glare_index(
-            subject.picture or subject.bloom,
-            size=probe.size,
-            patch=max(1, min(probe.size) // 8),
-            value=probe.value,
-        ),
-        first_infected=subject.first_infected,
-        nearest=nearest_preset(name, subject.bloom, renderer),
-    )
 
 
 def pass_times(
@@ -239,7 +219,7 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     return found
 
 
-def nearest_preset(own: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
+def nearest_preset(excluded: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
     """Return the other preset whose bloom of four lights is nearest, at its best intensity."""
     image = lights(VIEW)
     target = np.asarray(bloom(image))[..., :3].astype(np.float64)
@@ -247,7 +227,7 @@ def nearest_preset(own: str, bloom: Bloom, renderer: Renderer) -> tuple[str, flo
         return "", math.nan
     found = {}
     for name in presets:
-        if own == name:
+        if excluded == name:
             continue
         light = preset_bloom(renderer, name).astype(np.float64)
         power = float((light * light).sum())

@@ -93,10 +93,6 @@ class ReferenceFolder:
         """Return the file that lists the references of a name."""
         return self.path / f"{name}.json"
 
-    def names(self) -> list[str]:
-        """List the names that have references."""
-        return sorted(file.name.removesuffix(".json") for file in self.path.glob("*.json"))
-
     def load(self, name: str) -> list[Reference]:
         """Read the references of a name."""
         return [

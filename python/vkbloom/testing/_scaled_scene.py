@@ -53,14 +53,6 @@ class ResolutionResponse:
     r90: NDArray[np.float64]
     peak: NDArray[np.float64]
 
-    def __str__(self) -> str:
-        """Return a table."""
-        rows: list[tuple[str, ...]] = [("size", "r50", "r90", "peak")]
-        for index, (width, height) in enumerate(self.sizes):
-            figures = (self.r50[index], self.r90[index], self.peak[index])
-            rows.append((f"{width} x {height}", *(f"{figure:.4g}" for figure in figures)))
-        return "\n".join("  ".join(cell.rjust(11) for cell in row) for row in rows)
-
 
 @checked
 def resolution_response(

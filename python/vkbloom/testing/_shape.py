@@ -52,11 +52,6 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     -------
     dict of float to float
         Greatest over smallest distance, by the share of the peak.
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
     """
     __tracebackhide__ = True
     plane = point_spread(bloom, probe).mean(axis=2)
@@ -100,11 +95,6 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
         Takes an image and returns one of the same height and width: the bloom alone.
     probe : Probe
     limit : float
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
@@ -141,11 +131,6 @@ def assert_sizes(
     limits : mapping of str to float, optional
         Largest difference from the size 16 n: "width", "energy" and "flat" as shares, "centroid" in
         pixels; by default 0.05, 0.05, 0.1, 0.3.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, a result is black or not finite.
     """
     __tracebackhide__ = True
     allowed = SIZE_LIMITS | dict(limits or {})

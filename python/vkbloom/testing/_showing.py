@@ -18,12 +18,6 @@ from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
 from vkbloom.testing._measuring import VIEW, Measured
 
-_STYLE: Final = (
-    "body{font:15px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;"
-    "color-scheme:light dark}td,th{padding:2px 12px 2px 0;vertical-align:top;text-align:left}"
-    "td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
-    "figure{display:inline-block;margin:0 12px 12px 0}img{image-rendering:pixelated}"
-)
 _OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
 #: Colours of rows in a terminal, as `law_report.COLOURS` in HTML.
 _COLOURS: Final = {"required": "red", "broken": "yellow", "untested": "bright_black"}
@@ -101,7 +95,7 @@ def as_values(found: Measured) -> dict[str, Any]:
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
             "veiling_glare_index": found.veiling_glare_index,
-            "first_infected": found.first_infected,
+            "first_infected": found.subject.first_infected,
             "reference": found.subject.reference or None,
             "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
             "required": found.report.required,
@@ -135,10 +129,7 @@ def as_page(found: Measured) -> str:
     spread, subject = found.spread, found.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
-    times = [
-        (name, element("span", f"{1000 * seconds:.3f} ms", class_="n"))
-        for name, seconds in found.passes.items()
-    ]
+    times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in found.passes.items()]
     lit = spread.radii > 0
     curve = diagram(
         "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
@@ -165,7 +156,6 @@ def as_page(found: Measured) -> str:
         markup.table(figures(found).items()),
         element("h2", f"Passes at {width} x {height}"),
         markup.table(times),
-        style=_STYLE,
     )
 
 

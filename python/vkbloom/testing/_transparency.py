@@ -37,11 +37,6 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
         Its `channels` do not count.
     limit : float
         Allowed difference, as a share of the brightest value of the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)
