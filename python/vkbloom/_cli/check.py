@@ -43,16 +43,16 @@ class CheckCommand(Command):
         """Load the file before the options are parsed, so that its parameters are options."""
         taking = {
             name
-            for one in self.get_params(ctx)
-            if isinstance(one, click.Option) and not one.is_flag
-            for name in one.opts
+            for param in self.get_params(ctx)
+            if isinstance(param, click.Option) and not param.is_flag
+            for name in param.opts
         }
         words = list(args)
-        for place, word in enumerate(words):
-            if word.startswith("-") or (place and words[place - 1] in taking):
+        for index, word in enumerate(words):
+            if word.startswith("-") or (index and words[index - 1] in taking):
                 continue
             if os.path.isfile(word):
-                words[place : place + 1] = ["--method", vkbloom.load_method(word).method]
+                words[index : index + 1] = ["--method", vkbloom.load_method(word).method]
                 break
         return super().parse_args(ctx, words)
 
@@ -187,28 +187,28 @@ def command(
                 against, settings
             )
         measured = [_measured(renderer, *source, how, bar) for source in sources.items()]
-        found, values = zip(*measured, strict=True)
+        blooms, values = zip(*measured, strict=True)
         if page is not None:
-            safe_writing.write_file(Path(page), showing.as_page(found[0]).encode())
+            safe_writing.write_file(Path(page), showing.as_page(blooms[0]).encode())
             say(f"wrote {page}", err=as_json)
     if against is None:
-        failed = [row.name for row in showing.broken(found[0].report)]
-        text, table, written = showing.as_text(found[0]), showing.as_markdown(found[0]), values[0]
+        failed = [row.name for row in showing.broken(blooms[0].report)]
+        text, table, written = showing.as_text(blooms[0]), showing.as_markdown(blooms[0]), values[0]
     else:
         changes = comparing.changes(values[1], values[0])
         failed = comparing.newly_broken(changes, how["require"])
-        names = (found[1].name, found[0].name)
+        names = (blooms[1].name, blooms[0].name)
         text = comparing.as_text(changes, names)
-        table = comparing.as_markdown(changes, names, found[0].device)
+        table = comparing.as_markdown(changes, names, blooms[0].device)
         written = comparing.as_values(changes, values[1], values[0], failed)
     click.echo(json.dumps(written, indent=2) if as_json else text)
     if markdown is not None:
         safe_writing.write_file(Path(markdown), table.encode())
         say(f"wrote {markdown}", err=as_json)
-    held = {row.name: row.words for row in found[0].report.rows}
+    held = {row.name: row.words for row in blooms[0].report.rows}
     for name in failed:
         note(
-            f"{found[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
+            f"{blooms[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
         )
     return int(bool(failed))
 
@@ -265,10 +265,10 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
         kind = vkbloom.load_method(against, name=f"{own_name(Path(against).stem)}_against")
         usual, other = type(settings)(), kind()
         changed = {
-            one.name: getattr(settings, one.name)
-            for one in dataclasses.fields(settings)
-            if hasattr(other, one.name)
-            and getattr(settings, one.name) != getattr(usual, one.name, None)
+            field.name: getattr(settings, field.name)
+            for field in dataclasses.fields(settings)
+            if hasattr(other, field.name)
+            and getattr(settings, field.name) != getattr(usual, field.name, None)
         }
         return other.replace(**changed) if isinstance(settings, CustomMethod) else other
     if against not in vkbloom.presets:
@@ -309,13 +309,13 @@ def _notes() -> Iterator[None]:
         note(str(warning.message).partition("; ")[0])
 
 
-def _add_reference(settings: vkbloom.Settings, place: str) -> None:
+def _add_reference(settings: vkbloom.Settings, where: str) -> None:
     """Give a custom method its reference, FILE.py:FUNCTION."""
-    path, _, function = place.rpartition(":")
+    path, _, function = where.rpartition(":")
     if not isinstance(settings, CustomMethod):
         raise click.UsageError("--reference needs FILE; presets have the package's own reference")
     if not path or not os.path.isfile(path):
-        raise click.UsageError(f"--reference: {place!r} is not FILE.py:FUNCTION of a file")
+        raise click.UsageError(f"--reference: {where!r} is not FILE.py:FUNCTION of a file")
     reference: Callable[..., Any] | None = runpy.run_path(path).get(function)
     if not callable(reference):
         raise click.UsageError(f"--reference: {path} has no function {function!r}")

@@ -61,7 +61,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
 def _table(entries: Iterable[Entry]) -> Table:
     """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
     listed = list(entries)
-    is_grouped = any("engine" in one.values for one in listed)
+    is_grouped = any("engine" in item.values for item in listed)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title in ("name", "composite", "needs HDR", *["confirmed by"] * is_grouped):
         table.add_column(title, no_wrap=True)
@@ -69,14 +69,14 @@ def _table(entries: Iterable[Entry]) -> Table:
     table.add_column("what")
     table.add_column("whose")
     engine = ""
-    for one in listed:
-        if one.values.get("engine", "") != engine:
-            engine = one.values["engine"]
+    for item in listed:
+        if item.values.get("engine", "") != engine:
+            engine = item.values["engine"]
             table.add_row(Text(f"{engine}:", style="bold"))
-        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (one.what, one.whose))
-        confirmed = [one.values["confirmed"]] if is_grouped else []
-        hdr = "yes" if one.needs_hdr else "no"
-        table.add_row(one.name, one.composite, hdr, *confirmed, *texts)
+        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (item.what, item.whose))
+        confirmed = [item.values["confirmed"]] if is_grouped else []
+        hdr = "yes" if item.needs_hdr else "no"
+        table.add_row(item.name, item.composite, hdr, *confirmed, *texts)
     return table
 
 

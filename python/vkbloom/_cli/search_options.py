@@ -82,31 +82,31 @@ def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, .
     )
 
 
-def _show_results(found: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
+def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
     """Print results, the best one first."""
     if as_json:
-        click.echo(json.dumps([_object(one) for one in found], indent=2))
+        click.echo(json.dumps([_object(item) for item in fits], indent=2))
     else:
-        for one in found:
+        for item in fits:
             click.echo(
-                f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
-                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s"
+                f"{item.settings.method}: {item.loss_name} loss {item.loss:.4g}, from "
+                f"{item.start_loss:.4g}; {item.calls} renders in {item.seconds:.1f} s"
             )
-            click.echo(f"  {as_code(one.settings)}")
-            click.echo(f"  {one.words}")
+            click.echo(f"  {as_code(item.settings)}")
+            click.echo(f"  {item.words}")
 
 
-def _object(found: vkbloom.FitResult) -> dict[str, Any]:
+def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
     """Return the object of one result that --json prints."""
     return {
-        "settings": found.settings.to_dict(),
-        "varied": {name: getattr(found.settings, name) for name in found.vary},
-        "loss": found.loss,
-        "start_loss": found.start_loss,
-        "loss_name": found.loss_name,
-        "explained": found.explained,
-        "verdict": found.verdict,
-        "cause": found.cause,
-        "calls": found.calls,
-        "seconds": found.seconds,
+        "settings": fit.settings.to_dict(),
+        "varied": {name: getattr(fit.settings, name) for name in fit.vary},
+        "loss": fit.loss,
+        "start_loss": fit.start_loss,
+        "loss_name": fit.loss_name,
+        "explained": fit.explained,
+        "verdict": fit.verdict,
+        "cause": fit.cause,
+        "calls": fit.calls,
+        "seconds": fit.seconds,
     }

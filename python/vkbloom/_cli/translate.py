@@ -59,5 +59,5 @@ def command(
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
-        found = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
-    show_results([found])
+        result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
+    show_results([result])

@@ -34,7 +34,7 @@ def examine() -> Report:
     loading = [_loader(listed), *drivers.examine(listed.messages)]
     if any(adapter["bundled"] for adapter in adapters):
         # The bundled driver needs neither loader nor manifest.
-        loading = [one._replace(status=one.status.replace("problem", "note")) for one in loading]
+        loading = [item._replace(status=item.status.replace("problem", "note")) for item in loading]
     findings = [
         installation.package(),
         *installation.memory(),
@@ -97,8 +97,8 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
         advice = installation.memory_advice() or advice
         return Finding(topic, "problem", f"{name} fails: {answer.failure}", advice)
     if answer.value["differences"]:
-        found = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
-        return Finding(topic, "problem", found, f"{advice} Do not trust its framebuffers.")
+        text = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
+        return Finding(topic, "problem", text, f"{advice} Do not trust its framebuffers.")
     return Finding(topic, "ok", f"{name} renders the expected values in all framebuffers")
 
 
@@ -112,9 +112,9 @@ def _validation(adapter: str) -> Finding:
         "is not installed": "it is not installed",
         "needs the system's": "there is no loader",
     }
-    for said, found in missing.items():
+    for said, text in missing.items():
         if said in answer.failure:
             advice = "To use validation=True: apt install libvulkan1 vulkan-validationlayers."
-            return Finding(topic, "note", found, advice)
+            return Finding(topic, "note", text, advice)
     advice = "Install the layer again, in the loader's version, or do not use validation=True."
     return Finding(topic, "problem", f"the test render fails with it: {answer.failure}", advice)

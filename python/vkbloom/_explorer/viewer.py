@@ -213,7 +213,7 @@ class Viewer:
         """Return a description of the source, and the initial settings."""
         scene = self._scene
         return {
-            "sides": {side: as_fields(current(one)) for side, one in self.settings.items()},
+            "sides": {side: as_fields(current(item)) for side, item in self.settings.items()},
             "name": self._name,
             "note": self._note,
             "animated": scene is not None,
@@ -284,7 +284,7 @@ class Viewer:
                 "dtype": str(frames[shown].dtype),
                 "note": _note_of(settings, shown),
                 "code": code_with_image(settings, self._file, self._expand),
-                "plan": [one._asdict() for one in plan],
+                "plan": [item._asdict() for item in plan],
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
             }

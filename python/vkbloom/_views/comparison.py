@@ -136,14 +136,14 @@ def compare(
         pair, metrics, data_range=data_range, nits=nits_per_unit, degree=pixels_per_degree
     )
     over = _over(pair, threshold, relative)
-    place, values = _largest(pair)
+    position, values = _largest(pair)
     is_any = bool(pair.valid.any())
     return Comparison(
         mismatches=mismatches,
         threshold=threshold,
         relative=relative,
         max_error=float(pair.error.max()) if is_any else None,
-        max_error_at=place,
+        max_error_at=position,
         max_error_values=values,
         mean_error=float(pair.error.mean(where=pair.valid)) if is_any else None,
         percent_over=100.0 * float(over.any(axis=2).mean()),
@@ -199,15 +199,15 @@ def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
     """Return the reasons why two images cannot be compared value by value."""
-    found: list[str] = []
+    results: list[str] = []
     if a.shape[:2] != b.shape[:2]:
         sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
-        found.append(f"the sizes differ, {' against '.join(sizes)}")
+        results.append(f"the sizes differ, {' against '.join(sizes)}")
     if a.shape[2] != b.shape[2]:
-        found.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
+        results.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
     if a.dtype.kind != b.dtype.kind:
-        found.append(f"integers against floats, {a.dtype} against {b.dtype}")
-    return tuple(found)
+        results.append(f"integers against floats, {a.dtype} against {b.dtype}")
+    return tuple(results)
 
 
 def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
@@ -363,14 +363,14 @@ def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
     """Return both images as linear (H, W, 3) of float32."""
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
-    found = []
+    results = []
     for image in (pair.a, pair.b):
         linear = image[:, :, :colours]
         if pair.is_integer:
             linear = decode_srgb(linear)
         limited = np.clip(linear, -largest, largest).astype(np.float32)
-        found.append(np.repeat(limited, 3 // colours, axis=2))
-    return found
+        results.append(np.repeat(limited, 3 // colours, axis=2))
+    return results
 
 
 def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:

@@ -244,10 +244,10 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
         for other in (probe.flat(0.0), noise[1 - second]):
             views = [other, noise[second]] if second else [noise[second], other]
             given = probe.given(np.concatenate(views, axis=axis))
-            found = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
-            if found.shape[:2] == given.shape[:2]:
-                found = np.split(found, 2, axis=axis)[second]
-            results.append(probe.values(found, probe.given(noise[second])))
+            result = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
+            if result.shape[:2] == given.shape[:2]:
+                result = np.split(result, 2, axis=axis)[second]
+            results.append(probe.values(result, probe.given(noise[second])))
         (alone, error), (beside, _) = results
         off = np.abs(beside - alone)
         largest = float(np.abs(alone).max()) or 1.0
@@ -268,7 +268,10 @@ def takes(bloom: object, name: str) -> bool:
         parameters = inspect.signature(bloom).parameters.values()  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return False
-    return any(one.name == name or one.kind is one.VAR_KEYWORD for one in parameters)
+    return any(
+        parameter.name == name or parameter.kind is parameter.VAR_KEYWORD
+        for parameter in parameters
+    )
 
 
 def _places(probe: Probe) -> dict[str, tuple[int, int]]:
@@ -298,8 +301,8 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     """
     __tracebackhide__ = True
     x, y = (
-        place + _PERIOD * round((middle - place) / _PERIOD)
-        for place, middle in zip(at, lights.probe.centre, strict=True)
+        position + _PERIOD * round((middle - position) / _PERIOD)
+        for position, middle in zip(at, lights.probe.centre, strict=True)
     )
     spread = lights.spread((x, y))[0]
     energy = float(spread.sum())
@@ -307,10 +310,10 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     return _moved(spread, (x, y), at), energy
 
 
-def _moved(spread: Image, place: tuple[int, int], to: tuple[int, int]) -> Image:
+def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
     moved = np.zeros_like(spread)
-    (x, y), (height, width) = np.subtract(to, place), spread.shape[:2]
+    (x, y), (height, width) = np.subtract(to, start), spread.shape[:2]
     rows, columns = (
         (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
         for by, size in ((y, height), (x, width))

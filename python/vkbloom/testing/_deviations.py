@@ -49,19 +49,19 @@ _measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=N
 @contextmanager
 def measuring() -> Iterator[list[Deviation]]:
     """Collect the deviations of all assertions inside, up to the first one that fails."""
-    found: list[Deviation] = []
-    token = _measured.set(found)
+    results: list[Deviation] = []
+    token = _measured.set(results)
     try:
-        yield found
+        yield results
     finally:
         _measured.reset(token)
 
 
 def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     """Return whether a deviation is within its limit; NaN is not."""
-    found = _measured.get()
-    if found is not None:
-        found.append(Deviation(law, off, allowed, name))
+    result = _measured.get()
+    if result is not None:
+        result.append(Deviation(law, off, allowed, name))
     return off <= allowed
 
 
@@ -78,7 +78,7 @@ def figure(name: str, value: float) -> None:
 def compare_with_law(
     assertion: str,
     law: str,
-    found: Image,
+    actual: Image,
     expected: Image,
     allowed: float,
     *,
@@ -87,15 +87,15 @@ def compare_with_law(
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
     __tracebackhide__ = True
-    difference = np.abs(found - expected)
-    place = np.unravel_index(int(difference.argmax()), difference.shape)
-    if not is_within(law, float(difference[place]), allowed):
-        y, x, channel = (int(index) for index in place)
+    difference = np.abs(actual - expected)
+    position = np.unravel_index(int(difference.argmax()), difference.shape)
+    if not is_within(law, float(difference[position]), allowed):
+        y, x, channel = (int(index) for index in position)
         fail(
             assertion,
             law,
-            f"{found[place]:.6g} instead of {expected[place]:.6g} at x {x + border}, "
-            f"y {y + border}, channel {channel}: off by {difference[place]:.3g}, {allowed:.3g} "
+            f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x + border}, "
+            f"y {y + border}, channel {channel}: off by {difference[position]:.3g}, {allowed:.3g} "
             f"allowed{note}",
         )
 

@@ -93,7 +93,7 @@ def judge_image(
     atol, rtol = tolerances.of(expected.dtype)
     # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
-    found = compare(
+    comparison = compare(
         expected,
         actual,
         threshold=atol,
@@ -101,12 +101,12 @@ def judge_image(
         allow_nan=tolerances.allow_nan,
         metrics=metrics,
     )
-    failed = failures(found, tolerances, metrics)
+    failed = failures(comparison, tolerances, metrics)
     return Verdict(
         name=name,
         failed_at=failed[0][0] if failed else None,
         reasons=tuple(reason for _, reason in failed),
-        comparison=found,
+        comparison=comparison,
         diagnosis=diagnose(expected, actual) if failed else None,
         atol=atol,
         rtol=rtol,

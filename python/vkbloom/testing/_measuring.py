@@ -89,8 +89,8 @@ def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
     """Return the colours of a framebuffer as a function of the image."""
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        found = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
-        return found[..., : image.shape[2]]
+        result = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
+        return result[..., : image.shape[2]]
 
     return bloom
 
@@ -131,12 +131,12 @@ def of_program(
 
     @functools.wraps(program)
     def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
-        found = program(image, **options)[..., :3]
+        result = program(image, **options)[..., :3]
         x, y, *_ = options.get("region") or (0, 0)
-        if found.shape[:2] == image.shape[:2]:
+        if result.shape[:2] == image.shape[:2]:
             x, y = 0, 0
-        height, width = found.shape[:2]
-        return np.asarray(found - image[y : y + height, x : x + width, :3])
+        height, width = result.shape[:2]
+        return np.asarray(result - image[y : y + height, x : x + width, :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(
@@ -155,12 +155,12 @@ def pass_times(
 ) -> dict[str, float]:
     """Return the shortest time of each pass in seconds, for an image of 16-bit floats."""
     images = [noise(size, seed).astype(np.float16) for seed in (0, 1)]
-    found: dict[str, float] = {}
+    results: dict[str, float] = {}
     for turn in range(repeats + 1):
         timings = renderer.apply(images[turn % 2], settings, framebuffers=("final",)).timings
         if turn:
-            found = {name: min(time, found.get(name, time)) for name, time in timings.items()}
-    return found
+            results = {name: min(time, results.get(name, time)) for name, time in timings.items()}
+    return results
 
 
 def run_time(program: Bloom, size: tuple[int, int]) -> dict[str, float]:
@@ -209,14 +209,14 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     image = noise((96, 64), 2).astype(np.float32)
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
-    found = {}
+    results = {}
     for name, array in expected.items():
         wanted, got = np.atleast_3d(array)[..., :3], np.atleast_3d(frames[name])[..., :3]
         if wanted.shape != got.shape:
             raise ValueError(f"reference: the shape of {name}, {wanted.shape}, is not {got.shape}")
         largest = float(np.abs(wanted).max()) or 1.0
-        found[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
-    return found
+        results[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
+    return results
 
 
 def nearest_preset(excluded: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
@@ -225,16 +225,16 @@ def nearest_preset(excluded: str, bloom: Bloom, renderer: Renderer) -> tuple[str
     target = np.asarray(bloom(image))[..., :3].astype(np.float64)
     if not np.linalg.norm(target) > 0:
         return "", math.nan
-    found = {}
+    results = {}
     for name in presets:
         if excluded == name:
             continue
         light = preset_bloom(renderer, name).astype(np.float64)
         power = float((light * light).sum())
         factor = max(0.0, float((light * target).sum()) / power) if power > 0 else 0.0
-        found[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
-    best = min(found, key=lambda name: found[name])
-    return best, found[best]
+        results[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
+    best = min(results, key=lambda name: results[name])
+    return best, results[best]
 
 
 #: Blooms of presets by the adapter and their name: most of the time goes into their pipelines.

@@ -98,10 +98,10 @@ class Probe:
         """Return an image of one value."""
         return np.full((self.size[1], self.size[0], self.colours), value)
 
-    def point(self, place: tuple[int, int], value: float) -> Image:
+    def point(self, position: tuple[int, int], value: float) -> Image:
         """Return a black image with one lit pixel at (x, y)."""
         image = self.flat(0.0)
-        image[place[1], place[0]] = value
+        image[position[1], position[0]] = value
         return image
 
     def noise(self, index: int, highest: float) -> Image:

@@ -240,9 +240,13 @@ class FrameRegression:
                 "results may differ between machines; use the driver of vkbloom-lavapipe, or "
                 "tolerances"
             )
-        same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
+        same = [
+            reference
+            for reference in references
+            if reference.origin.driver_sha256 == origin.driver_sha256
+        ]
         if references and not same and not (self._mode.update or self._mode.add):
-            made_by = "; ".join(one.origin.summary for one in references)
+            made_by = "; ".join(reference.origin.summary for reference in references)
             raise ValueError(
                 f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
                 f"({origin.summary}), only of {made_by}; install that version of "
@@ -260,13 +264,13 @@ class FrameRegression:
                 "use the driver of vkbloom-lavapipe"
             )
         file = self._folder.file(given.name).with_suffix(".hashes")
-        listed, found = hashes.load(file), hashes.hashes_of(given.images)
+        listed, results = hashes.load(file), hashes.hashes_of(given.images)
         expected = listed.get(driver)
         message = (
-            "there is no reference" if expected is None else hashes.difference(expected, found)
+            "there is no reference" if expected is None else hashes.difference(expected, results)
         )
         if message and (self._mode.update or self._mode.add):
-            hashes.save(file, {**(listed if self._mode.add else {}), driver: found})
+            hashes.save(file, {**(listed if self._mode.add else {}), driver: results})
             self._record(given, "written", None)
             return
         missing = expected is None
