@@ -5,7 +5,13 @@
 // and defines seen(), by which texels are changed.
 #include "lib/filter.glsl"
 
-const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES);
+#ifdef LINEAR_TEXELS
+const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES), ROWS = WINDOW_ROWS;
+#define PIXEL_AT(x, y) raw_pixel(source, read_shapes[0], x, y)
+#else
+const int COLUMNS = HALVE_COLUMNS, ROWS = HALVE_ROWS;
+#define PIXEL_AT(x, y) floatBitsToUint(imageLoad(source, ivec2(x, y)))
+#endif
 // The rows and columns that a pixel needs. At HDRP's border their place differs from the position's.
 const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
@@ -42,7 +48,8 @@ int texel_in_run(int column)
 
 void add_row(int row, int first)
 {
-    int line = clamp(row, 0, read_shapes[0].y - 1), last = read_shapes[0].x - 1;
+    ivec2 last = READ_SIZE(source, 1) - 1;
+    int line = clamp(row, 0, last.y);
     uvec4 raw[LOADED];
 
     if (EXACT != 0)
@@ -54,8 +61,7 @@ void add_row(int row, int first)
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
             uvec4 texel = EXACT != 0 ? raw[texel_in_run(i) + 1 - KEPT / 2 + at]
-                                      : raw_pixel(source, read_shapes[0],
-                                                  clamp(windows[i % PHASES].first + at, 0, last), line);
+                                      : PIXEL_AT(clamp(windows[i % PHASES].first + at, 0, last.x), line);
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 if (has_weight(TAKEN_X, at, kernel))
                     sums[kernel] += windows[i % PHASES].weights[at][kernel] * seen(texel);
@@ -141,8 +147,8 @@ void main()
 {
     copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, WINDOW_ROWS));
-    int end = min(first.y + WINDOW_ROWS, size.y);
+    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
+    int end = min(first.y + ROWS, size.y);
     vec2 ratio = vec2(source_size) / vec2(params.target_width, params.target_height);
 
     if (any(greaterThanEqual(first, size)))
