@@ -52,6 +52,15 @@ def test_derivatives_are_those_of_the_reference(renderer: Renderer, name: str) -
     check_against_reference(renderer, settings, image)
 
 
+@pytest.mark.parametrize("name", ["darktable", "blender 5.2"])
+def test_methods_without_adjoint_passes_have_derivatives(renderer: Renderer, name: str) -> None:
+    """The reference derives them: darktable's boxes, and what Blender 5.2 reads by rounding."""
+    settings: vkbloom.Settings = vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0)
+    if name == "blender 5.2":
+        settings = vkbloom.BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2)
+    check_against_reference(renderer, settings, random_image(9, 41, channels=3, seed=1))
+
+
 def test_mask_and_emission_have_derivatives(renderer: Renderer) -> None:
     image, emission = (random_image(7, 9, seed=seed).astype(np.float32) for seed in (1, 2))
     mask = np.random.default_rng(3).random((7, 9), np.float32)
