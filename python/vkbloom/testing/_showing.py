@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import click
-import numpy as np
 
 from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
+from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
 from vkbloom.testing._measuring import VIEW, Measured
@@ -82,7 +81,7 @@ def as_values(measured: Measured) -> dict[str, Any]:
         measured.subject.stability,
         measured.subject.resolution,
     )
-    value: dict[str, Any] = _plain(
+    value: dict[str, Any] = plain(
         {
             "name": measured.name,
             "adapter": measured.device,
@@ -181,16 +180,3 @@ def _width(name: str) -> int:
 
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
-
-
-def _plain(value: Any) -> Any:
-    """Return a value for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
