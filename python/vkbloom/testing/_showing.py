@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
-from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
@@ -131,9 +131,7 @@ def as_page(found: Measured) -> str:
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in found.passes.items()]
     lit = spread.radii > 0
-    curve = diagram(
-        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
-    )
+    curve = _curve(spread.radii[lit], spread.encircled[lit])
     shown = (
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
@@ -178,3 +176,16 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
+
+
+def _curve(radii: NDArray[np.float64], energies: NDArray[np.float64]) -> Markup:
+    """Return the encircled energy over the logarithm of the radius, as SVG."""
+    if not energies.any():
+        return Markup()
+    x = np.log(radii / radii[0]) / (np.log(radii[-1] / radii[0]) or 1.0)
+    ends = zip(300 * x, 180 * (1 - energies / energies.max()), strict=True)
+    points = " ".join(f"{across:.1f},{down:.1f}" for across, down in ends)
+    line = element("polyline", points=points, fill="none", stroke="currentColor")
+    drawn = element("svg", line, width=300, height=180, viewBox="-2 -2 304 184", role="img")
+    note = f" {radii[0]:.3g} to {radii[-1]:.3g} pixels, up to {energies.max():.2g}"
+    return markup.figure(drawn, element("b", "encircled energy"), note, style="margin:0")
