@@ -2,20 +2,15 @@
 // taken, separated by commas. test_lesser_devices.py builds and uses it.
 #define _GNU_SOURCE
 #define VK_ENABLE_BETA_EXTENSIONS  // the portability subset
+#include "layer.h"
+
 #include <signal.h>
-#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
-// clang-format off: the second one leaves out what the first one has
-#include <vulkan/vulkan.h>
-#include <vulkan/vk_layer.h>
-// clang-format on
 
 #define INSTANCE_FUNCTIONS(FUNCTION) \
-    FUNCTION(vkCreateDevice) \
     FUNCTION(vkGetPhysicalDeviceProperties) \
     FUNCTION(vkGetPhysicalDeviceProperties2) \
     FUNCTION(vkGetPhysicalDeviceFeatures) \
@@ -48,12 +43,8 @@
     FUNCTION(vkWaitSemaphoresKHR)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
-// by their handles. Messages go to the instance that was created last.
+// by their handles.
 static struct {
-    VkInstance instance;
-    PFN_vkSubmitDebugUtilsMessageEXT message;
-    PFN_vkGetInstanceProcAddr instance_proc;
-    PFN_vkGetDeviceProcAddr device_proc;
 #define MEMBER(name) PFN_##name name;
     INSTANCE_FUNCTIONS(MEMBER)
     DEVICE_FUNCTIONS(MEMBER)
@@ -423,16 +414,6 @@ static VKAPI_ATTR void VKAPI_CALL copy_to_image(VkCommandBuffer commands, VkBuff
             &(VkImageSubresourceRange){VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1});
 }
 
-static void object(const char *text)
-{
-    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
-                  &(VkDebugUtilsMessengerCallbackDataEXT){
-                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
-                      .pMessage = text,
-                  });
-}
-
 // Semaphores that presentations wait for. Only a wait for the queue tells that they have waited: a
 // semaphore must not be destroyed before, which the validation layer does not see.
 static struct {
@@ -596,26 +577,12 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo
                                                       const VkAllocationCallbacks *callbacks,
                                                       VkInstance *created)
 {
-    VkLayerInstanceCreateInfo *link = (VkLayerInstanceCreateInfo *)info->pNext;
-
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerInstanceCreateInfo *)link->pNext;
-    below.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    PFN_vkCreateInstance create =
-        (PFN_vkCreateInstance)below.instance_proc(VK_NULL_HANDLE, "vkCreateInstance");
-    VkResult result = create(info, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)below.instance_proc(*created, #name);
-    if (result == VK_SUCCESS && !below.vkCreateDevice) {
+    const VkResult result = begin_instance(info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)chain.instance_proc(*created, #name);
+    if (result == VK_SUCCESS && !below.vkGetPhysicalDeviceProperties) {
         INSTANCE_FUNCTIONS(FETCH)
     }
 #undef FETCH
-    if (result == VK_SUCCESS) {
-        below.instance = *created;
-        below.message = (PFN_vkSubmitDebugUtilsMessageEXT)below.instance_proc(
-            *created, "vkSubmitDebugUtilsMessageEXT");
-    }
     return result;
 }
 
@@ -624,13 +591,6 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
                                                     const VkAllocationCallbacks *callbacks,
                                                     VkDevice *created)
 {
-    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)info->pNext;
-
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerDeviceCreateInfo *)link->pNext;
-    below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
     const char *kept[64];
     VkDeviceCreateInfo changed = *info;
     changed.ppEnabledExtensionNames = kept;
@@ -646,8 +606,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     // A device that has the extension must be created with it.
     if (lacks("portability") && changed.enabledExtensionCount == info->enabledExtensionCount)
         return VK_ERROR_INITIALIZATION_FAILED;
-    VkResult result = below.vkCreateDevice(physical, &changed, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
+    const VkResult result = begin_device(physical, &changed, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)chain.device_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkAllocateMemory) {
         DEVICE_FUNCTIONS(FETCH)
     }
@@ -655,15 +615,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
-
-static const struct entry {
-    const char *name;
-    PFN_vkVoidFunction function;
-    bool of_device;
-} entries[] = {
-#define ENTRY(name, function, of_device) {#name, (PFN_vkVoidFunction)function, of_device}
+static const struct entry entries[] = {
     ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
     ENTRY(vkCreateInstance, create_instance, false),
     ENTRY(vkCreateDevice, create_device, false),
@@ -702,34 +654,7 @@ static const struct entry {
     ENTRY(vkDestroySemaphore, destroy_semaphore, true),
 };
 
-static PFN_vkVoidFunction find(const char *name, bool of_device)
+static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {
-    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
-        if (strcmp(entries[i].name, name) == 0 && (entries[i].of_device || !of_device))
-            return entries[i].function;
-    return NULL;
-}
-
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, false);
-
-    return found || !handle ? found : below.instance_proc(handle, name);
-}
-
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, true);
-
-    return found ? found : below.device_proc(handle, name);
-}
-
-VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
-vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
-{
-    layer->loaderLayerInterfaceVersion = 2;
-    layer->pfnGetInstanceProcAddr = get_instance_proc;
-    layer->pfnGetDeviceProcAddr = get_device_proc;
-    layer->pfnGetPhysicalDeviceProcAddr = NULL;
-    return VK_SUCCESS;
+    return find_entry(entries, sizeof entries / sizeof entries[0], name, of_device);
 }
