@@ -30,6 +30,8 @@
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
+    FUNCTION(vkMapMemory) \
+    FUNCTION(vkFreeMemory) \
     FUNCTION(vkCmdClearColorImage) \
     FUNCTION(vkCmdCopyBufferToImage) \
     FUNCTION(vkQueueSubmit) \
@@ -391,6 +393,21 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_host_pointer(VkDevice handle,
     return result;
 }
 
+// Memory that is not coherent: the host sees a copy, which only a flush or an invalidation renews.
+static struct copied_memory {
+    VkDeviceMemory memory;
+    VkDeviceSize size;
+    char *real, *copy;
+} copied[1 << 10];
+
+static struct copied_memory *find_copied(VkDeviceMemory memory)
+{
+    for (int i = 0; i < 1 << 10; ++i)
+        if (copied[i].memory == memory)
+            return &copied[i];
+    return NULL;
+}
+
 static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAllocateInfo *info,
                                                const VkAllocationCallbacks *callbacks,
                                                VkDeviceMemory *memory)
@@ -399,7 +416,66 @@ static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAl
 
     if (lacks("memory"))
         changed.memoryTypeIndex = 0;
-    return below.vkAllocateMemory(handle, &changed, callbacks, memory);
+    const VkResult result = below.vkAllocateMemory(handle, &changed, callbacks, memory);
+    struct copied_memory *unused = find_copied(VK_NULL_HANDLE);
+    if (result == VK_SUCCESS && lacks("memory") && info->memoryTypeIndex == CACHED_TYPE && unused)
+        *unused = (struct copied_memory){.memory = *memory, .size = info->allocationSize};
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL map_memory(VkDevice handle, VkDeviceMemory memory,
+                                                 VkDeviceSize offset, VkDeviceSize size,
+                                                 VkMemoryMapFlags flags, void **data)
+{
+    const VkResult result = below.vkMapMemory(handle, memory, offset, size, flags, data);
+    struct copied_memory *found = find_copied(memory);
+
+    // (The core maps all of it.)
+    if (result != VK_SUCCESS || !found || offset > 0 || !(found->copy = malloc(found->size)))
+        return result;
+    found->real = *data;
+    *data = memcpy(found->copy, found->real, found->size);
+    return result;
+}
+
+static VkResult copy_ranges(uint32_t count, const VkMappedMemoryRange *ranges, bool to_host)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        const struct copied_memory *found = find_copied(ranges[i].memory);
+        if (!found || !found->copy)
+            continue;
+        const VkDeviceSize start = ranges[i].offset, rest = found->size - start;
+        const VkDeviceSize size = ranges[i].size < rest ? ranges[i].size : rest;
+        memcpy((to_host ? found->copy : found->real) + start,
+               (to_host ? found->real : found->copy) + start, size);
+    }
+    return VK_SUCCESS;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL flush(VkDevice handle, uint32_t count,
+                                            const VkMappedMemoryRange *ranges)
+{
+    (void)handle;
+    return copy_ranges(count, ranges, false);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL invalidate(VkDevice handle, uint32_t count,
+                                                 const VkMappedMemoryRange *ranges)
+{
+    (void)handle;
+    return copy_ranges(count, ranges, true);
+}
+
+static VKAPI_ATTR void VKAPI_CALL free_memory(VkDevice handle, VkDeviceMemory memory,
+                                              const VkAllocationCallbacks *callbacks)
+{
+    struct copied_memory *found = memory ? find_copied(memory) : NULL;
+
+    if (found) {
+        free(found->copy);
+        *found = (struct copied_memory){0};
+    }
+    below.vkFreeMemory(handle, memory, callbacks);
 }
 
 // Without "texels", the 64 texels with which the core finds out how they are read are others.
@@ -643,6 +719,10 @@ static const struct entry entries[] = {
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
+    ENTRY(vkMapMemory, map_memory, true),
+    ENTRY(vkFlushMappedMemoryRanges, flush, true),
+    ENTRY(vkInvalidateMappedMemoryRanges, invalidate, true),
+    ENTRY(vkFreeMemory, free_memory, true),
     ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
     ENTRY(vkQueueSubmit, submit, true),
     ENTRY(vkWaitForFences, wait, true),
