@@ -444,26 +444,26 @@
 #define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
-#define HALVE_WORDS_COLUMNS           8
-#define HALVE_WORDS_ROWS              32
-#define PREFILTER_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
-#define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define DOUBLE_FINAL_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
-#define DOUBLE_WORDS_ROWS             64
-#define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
-#define TEXEL_ROWS                    16
-#define WINDOW_COLUMNS(CHANNEL)       (8 / (CHANNEL))
-#define WINDOW_ROWS                   64
-#define SHRINK_ROWS                   32
-#define GATHER_COLUMNS                4
-#define GATHER_ROWS                   16
-#define NINE_OUTPUTS                  8
-#define STREAK_COLUMNS                8
-#define STREAK_ROWS                   32
-#define TILE_LOADED                   64
-#define TILE_ROWS                     32
-#define TILE_RUNS                     4
-#define TILE_RADIUS                   16
+#define HALVE_LINEAR_COLUMNS           8
+#define HALVE_LINEAR_ROWS              32
+#define PREFILTER_COLUMNS(CHANNEL)     ((CHANNEL) == 2 ? 8 : 4)
+#define DOUBLE_LINEAR_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
+#define DOUBLE_FINAL_COLUMNS(CHANNEL)  ((CHANNEL) == 4 ? 8 : 16)
+#define DOUBLE_LINEAR_ROWS             64
+#define TEXEL_COLUMNS(CHANNEL)         (16 / (CHANNEL))
+#define TEXEL_ROWS                     16
+#define WINDOW_COLUMNS(CHANNEL)        (8 / (CHANNEL))
+#define WINDOW_ROWS                    64
+#define SHRINK_ROWS                    32
+#define GATHER_COLUMNS                 4
+#define GATHER_ROWS                    16
+#define NINE_OUTPUTS                   8
+#define STREAK_COLUMNS                 8
+#define STREAK_ROWS                    32
+#define TILE_LOADED                    64
+#define TILE_ROWS                      32
+#define TILE_RUNS                      4
+#define TILE_RADIUS                    16
 // Tiles of levels of exactly twice the size, and of the transposes of both: their pixels, and the
 // invocations along a column. On an H100 with float32, the tile of four rows of the second
 // transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
@@ -483,18 +483,18 @@
 #define FUSED_VEC4S             5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
-// FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
+// FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
 // butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
 // clamped, since their sums would overflow.
 #define FFT_INVOCATIONS  64
 #define FFT_ROW_COLUMNS  8
-#define FFT_MOST_RADIX   64
+#define FFT_MAX_RADIX    64
 #define FFT_SMALL_RADIX  16
 #define FFT_SMALL_PIXELS 131072
 // With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups
 // run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
-// FFT_MOST_GROUP_RADIX.
-#define FFT_MOST_GROUP_RADIX  16
+// FFT_MAX_GROUP_RADIX.
+#define FFT_MAX_GROUP_RADIX   16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 

@@ -6,15 +6,16 @@
 #include <stdio.h>
 #include <string.h>
 
-static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(filter);
+static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(filter);
 static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(filter_final);
+    VKB_LINEAR_BY_FORMAT(filter_final);
 static const struct vkb_shader *const mixed_shaders[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_filter_final_mixed_words_rgba32float};
+    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_filter_final_mixed_linear_rgba32float};
 static const struct vkb_shader *const rows_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(gather_rows);
+    VKB_LINEAR_BY_FORMAT(gather_rows);
 static const struct vkb_shader *const gather_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(gather_columns);
+    VKB_LINEAR_BY_FORMAT(gather_columns);
 
 // The size of an image that is filtered along rows.
 static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
@@ -24,17 +25,18 @@ static struct vkb_size rows_size(const struct vkb_variant_choice *choice,
                              choice->graph->images[from].height};
 }
 
-// Whether words reach all pixels of the first `count` images that the pass reads, also filtered.
+// Whether linear texels reach all pixels of the first `count` images that the pass reads, also
+// filtered.
 static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                       uint32_t count)
 {
-    bool fits = vkb_fits_words(choice, pass);
+    bool fits = vkb_fits_linear(choice, pass);
 
     for (uint32_t i = 0; i < count; ++i) {
         const struct vkb_size size = rows_size(choice, pass, pass->reads[i]);
         fits = fits
-            && vkb_image_fits_words(choice->device, VKB_FORMAT_RGBA32_FLOAT, size.width,
-                                    size.height);
+            && vkb_image_fits_linear_texels(choice->device, VKB_FORMAT_RGBA32_FLOAT, size.width,
+                                            size.height);
     }
     return fits;
 }
@@ -59,7 +61,7 @@ static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_p
     row.reads[0] = from;
     vkb_drop_reads(&row, 1);
     row.targets[0] = *rows;
-    vkb_make_words(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
+    vkb_make_linear(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -84,8 +86,8 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
             return false;
     for (uint32_t level = levels; level < row.read_count; ++level)
         row.reads[level] = row.reads[0];
-    vkb_make_words(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
-                   GATHER_ROWS);
+    vkb_make_linear(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
+                    GATHER_ROWS);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -114,8 +116,8 @@ static void make_strips(const struct vkb_variant_choice *choice, const struct vk
                          : source->width == target->width     ? EXACT_SAME
                          : 2 * source->width == target->width ? EXACT_DOUBLE
                                                               : 0;
-    vkb_make_words(row, shaders[target->format],
-                   WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
+    vkb_make_linear(row, shaders[target->format],
+                    WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
 }
 
 bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -123,7 +125,7 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
 {
     struct vkb_pass_row row;
 
-    *fits = fits_strips(&choice->plain, pass) && vkb_fits_words(choice, pass);
+    *fits = fits_strips(&choice->plain, pass) && vkb_fits_linear(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -229,7 +231,7 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
 {
     const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
 
-    *fits = up && fits_strips(&choice->plain, up) && vkb_fits_words(choice, pass)
+    *fits = up && fits_strips(&choice->plain, up) && vkb_fits_linear(choice, pass)
          && (!pass->transposed || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;

@@ -333,7 +333,7 @@ static bool has_whole_words(const struct vkb_device *device)
     return layout.offset == 0 && layout.rowPitch % VKB_STORE_SIZE == 0;
 }
 
-static bool has_words(const struct vkb_device *device)
+static bool has_linear_texels(const struct vkb_device *device)
 {
     VkFormatProperties properties;
 
@@ -394,7 +394,7 @@ static bool create_handle(struct vkb_device *device, uint32_t adapter, const cha
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
     device->dispatch = device->dispatch && stores_all(device);
-    device->words = has_words(device);
+    device->linear_texels = has_linear_texels(device);
     return true;
 }
 

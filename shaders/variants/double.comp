@@ -9,5 +9,5 @@ UNIFORM_BLOCK(FILTER_BLOCK);
 #include "variants/pixels.glsl"
 #include "variants/nested.glsl"
 
-#define WORDS_COLUMNS DOUBLE_WORDS_COLUMNS
+#define LINEAR_COLUMNS DOUBLE_LINEAR_COLUMNS
 #include "variants/double.glsl"

@@ -2,10 +2,10 @@
 // each texel once. `Pyramid(levels=5)` takes 47 ms, and 61 with
 // the general strips (filter.glsl) (processor time of 1920 x
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26). The including shader includes
-// nested.glsl and defines WORDS_COLUMNS.
+// nested.glsl and defines LINEAR_COLUMNS.
 #include "lib/doubling.glsl"
 
-const int COLUMNS = WORDS_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_WORDS_ROWS;
+const int COLUMNS = LINEAR_COLUMNS(CHANNEL_BYTES), ROWS = DOUBLE_LINEAR_ROWS;
 // Columns of the smaller level that are loaded for a row. A pixel at an odd position starts one
 // texel later.
 const int LOADED = COLUMNS / 2 + 4;
@@ -22,7 +22,7 @@ const int KEPT = 5;
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 last = READ_SIZE(source, 1) - 1, size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y) / 2;

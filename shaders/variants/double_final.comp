@@ -15,5 +15,5 @@ UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
 #define FINAL
 #include "variants/nested.glsl"
 
-#define WORDS_COLUMNS DOUBLE_FINAL_COLUMNS
+#define LINEAR_COLUMNS DOUBLE_FINAL_COLUMNS
 #include "variants/double.glsl"

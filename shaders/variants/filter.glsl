@@ -71,7 +71,7 @@ vec4 column_of(Window window, int i)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, WINDOW_ROWS));
     int end = min(first.y + WINDOW_ROWS, size.y);

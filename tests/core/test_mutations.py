@@ -192,7 +192,7 @@ def test_is_found_and_named(
     assert outcomes == dict.fromkeys(mutation.equal, "equal") | dict.fromkeys(
         mutation.different, "failed"
     )
-    assert f"</a>: <strong>{first}</strong>" in (report / "index.html").read_text()
+    assert f"the first framebuffer that differs is {first} (" in (report / "index.html").read_text()
 
     # On this device, whose other variants are right.
     monkeypatch.delenv("VKBLOOM_VARIANT")

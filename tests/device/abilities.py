@@ -11,12 +11,12 @@ from vkbloom import Renderer, Separable
 
 
 def has_linear_texels(renderer: Renderer) -> bool:
-    """Whether passes access images as buffers. llvmpipe has what that needs (device.c: has_words).
+    """Whether passes access images as buffers. llvmpipe has what that needs (device.c: has_linear_texels).
 
     SwiftShader has neither linear storage images nor 64-bit integers.
     """
     plan = renderer.plan(np.zeros((8, 8, 3), np.float32), Separable())
-    found = any("words" in one.shader for one in plan.passes)
+    found = any("linear" in one.shader for one in plan.passes)
     assert found or "llvmpipe" not in renderer.info.name
     return found
 

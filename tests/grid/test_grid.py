@@ -26,7 +26,7 @@ from vkbloom import (
 )
 from vkbloom._grid.filling import Tally
 from vkbloom._grid.layout import Grid, ask, lay_out
-from vkbloom._grid.parts import read_part
+from vkbloom._grid.order import read_part
 from vkbloom._grid.progress import Progress
 
 AXES: dict[str, list[Any]] = {

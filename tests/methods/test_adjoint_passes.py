@@ -288,12 +288,12 @@ def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatc
         linear = has_linear_texels(renderer)
         for settings, size, passes in STRIPS:
             shaders = shaders_of_transpose(renderer, settings, size, random)
-            strips = ["strip_mixed_words_rgba32float", "adjoint_strip_words_rgba32float"]
+            strips = ["strip_mixed_linear_rgba32float", "adjoint_strip_linear_rgba32float"]
             assert (shaders == strips[2 - passes :]) == linear
         for levels, ends in ((Pyramid, "double_final"), (DualKawase, "filter_final")):
             curved = levels(levels=1, threshold=0.5, tonemap="aces")
             shaders = shaders_of_transpose(renderer, curved, (8, 32, 3), random)
-            assert (f"{ends}_mixed_words_rgba32float" in shaders) == linear
+            assert (f"{ends}_mixed_linear_rgba32float" in shaders) == linear
 
 
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
@@ -342,10 +342,10 @@ def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) ->
         plan = renderer._core.adjoint(source, settings, ("final",), False)
         drawn = variant == "cpu" and not has_linear_texels(renderer)
     assert plan
-    words = {"adjoint_taps_words_rgba32float"}
+    linear = {"adjoint_taps_linear_rgba32float"}
     blocks = {"adjoint_filter_dispatch", "adjoint_taps_comp_rgba32float"}
     shaders = {shader for _, shader, *_ in plan.passes}
-    assert shaders == (words if variant == "cpu" else blocks) or drawn
+    assert shaders == (linear if variant == "cpu" else blocks) or drawn
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])

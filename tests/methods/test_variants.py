@@ -228,14 +228,14 @@ def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once() -> None:
         plan = software.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
         linear = has_linear_texels(software)
     (first,) = (one for one in plan.passes if one.name == "down_0")
-    assert first.shader.startswith("shrink_words") == linear
+    assert first.shader.startswith("shrink_linear") == linear
 
 
 def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines() -> None:
     def stages(size: tuple[int, int]) -> int:
         image = np.zeros((size[1], size[0], 3), np.float32)
         plan = software.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))
-        return sum(one.shader.startswith("fft_words") for one in plan.passes)
+        return sum(one.shader.startswith("fft_linear") for one in plan.passes)
 
     with Renderer("software") as software:
         linear = has_linear_texels(software)

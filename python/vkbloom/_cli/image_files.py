@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, suppress
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 import click
@@ -60,7 +59,6 @@ subimage_option: Final = click.option(
     metavar="N",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Index of the part to read from a file with several parts.",
 )
 layer_option: Final = click.option(
@@ -126,7 +124,7 @@ def read_picture(
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
-    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]
@@ -173,60 +171,22 @@ def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Pictu
     return dataclasses.replace(picture, pixels=final, encoding=encoding)
 
 
-_quiet = threading.Lock()
-
-
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress what C libraries print on standard error.
+    """Suppress what C libraries print on standard error, and this process meanwhile.
 
-    libpng prints messages about damaged files, instead of passing them to OpenImageIO. The output
-    of this program still goes to standard error. A nested call does nothing.
+    libpng prints messages about damaged files, instead of passing them to OpenImageIO.
     """
     # Standard error was closed when this process began, so descriptor 2 may be another file.
-    if sys.stderr is None or not _quiet.acquire(blocking=False):
+    if sys.stderr is None:
         yield
         return
-    try:
-        with _redirected():
-            yield
-    finally:
-        _quiet.release()
-
-
-@contextmanager
-def _redirected() -> Iterator[None]:
     sys.stderr.flush()
-    try:
-        kept = os.dup(_STANDARD_ERROR)
-    except OSError:
-        # Descriptor 2 is closed, so nothing can be printed.
-        yield
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    kept, nowhere = os.dup(_STANDARD_ERROR), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, _STANDARD_ERROR)
-        with _elsewhere(kept):
-            yield
+        yield
     finally:
         os.dup2(kept, _STANDARD_ERROR)
         os.close(nowhere)
         os.close(kept)
-
-
-@contextmanager
-def _elsewhere(descriptor: int) -> Iterator[None]:
-    """Redirect Python's standard error to a descriptor, if it is that of the process."""
-    stream = sys.stderr
-    try:
-        is_own = stream.fileno() == _STANDARD_ERROR
-    except (OSError, ValueError, AttributeError):
-        is_own = False
-    if not is_own:
-        yield
-        return
-    own = os.fdopen(
-        descriptor, "w", 1, encoding=stream.encoding, errors=stream.errors, closefd=False
-    )
-    with own, redirect_stderr(own):
-        yield

@@ -61,11 +61,11 @@ def _copy_of(name: str) -> str:
     if _FOLDER not in context.meta:
         context.meta[_FOLDER] = context.with_resource(tempfile.TemporaryDirectory())
     # The name is kept, because some formats are known by it.
-    place = os.path.join(context.meta[_FOLDER], name.replace("%", "%25").replace(os.sep, "%2F"))
-    if not os.path.exists(place):
-        with _opened(name) as stream, open(place, "wb") as copy:
+    file = os.path.join(context.meta[_FOLDER], name.replace("%", "%25").replace(os.sep, "%2F"))
+    if not os.path.exists(file):
+        with _opened(name) as stream, open(file, "wb") as copy:
             shutil.copyfileobj(stream, copy)
-    return place
+    return file
 
 
 @contextmanager

@@ -18,8 +18,6 @@ from vkbloom._settings.settings import Settings
 from vkbloom._views import markup, pictures
 from vkbloom._views.markup import Markup, element
 
-__all__ = ["FitResult"]
-
 # The smallest shares of the loss without bloom that a good and a fair fit explain.
 _GOOD, _FAIR = 0.95, 0.8
 

@@ -8,8 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MAX_SIDE", "checked_levels", "read_only"]
-
 #: The longest side, far above the 4096 that every Vulkan device supports. It rejects the sizes of
 #: damaged images. The device's own limit is checked at upload.
 MAX_SIDE: Final = 16384

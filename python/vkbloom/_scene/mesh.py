@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from vkbloom._scene.arrays import read_only
 from vkbloom._scene.textures import WHITE, Surface
 
-__all__ = ["Mesh"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:

@@ -19,8 +19,6 @@ from ._sampling import Array
 if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
 
-__all__ = ["FACTORS", "GAINS", "LIGHTS"]
-
 #: What the sides of the highlights are divided by, for each quality.
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
 

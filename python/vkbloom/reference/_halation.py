@@ -7,10 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ._unreal import passes
-
-__all__ = ["gain", "passes"]
-
 
 def gain(settings: Any, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: 1, since light is only moved."""

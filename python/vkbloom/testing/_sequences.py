@@ -141,7 +141,7 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
         red_flashes=red[0],
         area=general[1],
         red_area=red[1],
-        second=max(general, red, key=lambda found: found[1])[2],
+        second=max(general, red, key=lambda match: match[1])[2],
     )
 
 
