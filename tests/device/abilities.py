@@ -11,7 +11,7 @@ from vkbloom import Renderer, Separable
 
 
 def has_linear_texels(renderer: Renderer) -> bool:
-    """Whether passes access images as buffers. llvmpipe has what that needs (device.c: has_linear_texels).
+    """Whether passes access images as buffers, for which llvmpipe has all (csrc/vulkan/device.c).
 
     SwiftShader has neither linear storage images nor 64-bit integers.
     """
