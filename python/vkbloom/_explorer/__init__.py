@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
 
-__all__ = ["explore"]
-
 
 def explore(
     source: Scene | NDArray[Any] | None = None,

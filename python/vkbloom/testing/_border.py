@@ -15,8 +15,6 @@ from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figu
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
-__all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
-
 _DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
 #: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.

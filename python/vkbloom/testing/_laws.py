@@ -19,16 +19,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "assert_additive",
-    "assert_bounded_fireflies",
-    "assert_gain",
-    "assert_no_ringing",
-    "assert_superposition",
-    "assert_symmetric",
-    "first_infected",
-]
-
 _DEFAULT = Probe()
 
 

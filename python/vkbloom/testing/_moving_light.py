@@ -16,16 +16,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "LIMITS",
-    "Stability",
-    "area_sampled",
-    "assert_stable",
-    "check_stable",
-    "moments",
-    "stability",
-]
-
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.

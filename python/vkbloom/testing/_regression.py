@@ -22,8 +22,6 @@ from vkbloom.testing._judging import Verdict, first_failure, judge
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
 from vkbloom.testing._test_report import Record
 
-__all__ = ["FrameRegression", "Mode", "name_of_test"]
-
 
 class Limits(TypedDict, total=False):
     """The fields of `Tolerances`."""

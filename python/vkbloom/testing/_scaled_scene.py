@@ -17,13 +17,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "ResolutionResponse",
-    "assert_resolution_independent",
-    "check_independent",
-    "resolution_response",
-]
-
 _DEFAULT = Probe(size=(128, 128))
 _SCALES: Final = (0.5, 1.0, 2.0, 4.0)
 # Rings that the light is sorted into, for each pixel of distance, and pixels of the shorter side.

@@ -16,8 +16,6 @@ from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
-__all__ = ["SIZE_LIMITS", "assert_round", "assert_sizes", "roundness"]
-
 _DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
