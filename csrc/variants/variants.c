@@ -53,8 +53,6 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "runs", vkb_add_prefiltered, 0},
     {VKB_VARIANTS_CPU, "shrunk", vkb_add_shrunk, 0},
     {VKB_VARIANTS_CPU, "line", vkb_add_nine, 0},
-    {VKB_VARIANTS_CPU, "doubled", vkb_add_doubled, 0},
-    {VKB_VARIANTS_CPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_CPU, "filtered", vkb_add_filtered, 0},
     {VKB_VARIANTS_CPU, "filtered_final", vkb_add_filtered_final, 0},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
@@ -73,9 +71,8 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_groups, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},
     {VKB_VARIANTS_GPU, "halved", vkb_add_halved, 0},
-    {VKB_VARIANTS_GPU, "doubled", vkb_add_doubled, 0},
-    {VKB_VARIANTS_GPU, "doubled_final", vkb_add_doubled_final, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_filter_tiles, 0},
+    {VKB_VARIANTS_GPU, "tiles_final", vkb_add_filter_tiles_final, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels, 0},
 };
 

@@ -28,8 +28,6 @@ from vkbloom._io.array_files import premultiplied
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
 
-__all__ = ["Begun", "Options", "Pair", "Run", "of_format"]
-
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
 #: The settings of a file, and what its highlights are expanded up to.

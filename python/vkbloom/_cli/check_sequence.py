@@ -15,8 +15,6 @@ import vkbloom
 from vkbloom import testing
 from vkbloom._cli.sequences import expanded
 
-__all__ = ["judge"]
-
 
 def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
     """Print flashes and flicker of a sequence of files; return 1 if it fails WCAG 2.2, else 0."""

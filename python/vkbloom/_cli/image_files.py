@@ -59,7 +59,6 @@ subimage_option: Final = click.option(
     metavar="N",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Index of the part to read from a file with several parts.",
 )
 layer_option: Final = click.option(
@@ -125,7 +124,7 @@ def read_picture(
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
-    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]

@@ -88,13 +88,13 @@ class Program(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the commands that begin with some letters, without an import of them."""
-        found = [
+        results = [
             CompletionItem(name, help=_summary(name))
             for name in COMMANDS
             if name.startswith(incomplete)
         ]
         # Not the group's own: it would list the commands again.
-        return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
+        return [*results, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
@@ -140,7 +140,7 @@ class Program(click.Group):
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
             no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
-            if any(one in str(error) for one in no_memory):
+            if any(item in str(error) for item in no_memory):
                 _exit(1, described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, described(error))
@@ -162,20 +162,20 @@ def _summary(name: str) -> str:
 def with_methods(words: Sequence[str]) -> list[str]:
     """Load the files of custom methods after --method or --to; put the names there."""
     changed = list(words)
-    for place, word in enumerate(changed):
+    for index, word in enumerate(changed):
         option, _, value = word.partition("=")
         if option not in ("--method", "--to"):
             continue
         joined = bool(value)
-        if not joined and place + 1 < len(changed):
-            value = changed[place + 1]
+        if not joined and index + 1 < len(changed):
+            value = changed[index + 1]
         if value in METHODS or not os.path.isfile(value):
             continue
         name = vkbloom.load_method(value).method
         if joined:
-            changed[place] = f"{option}={name}"
+            changed[index] = f"{option}={name}"
         else:
-            changed[place + 1] = name
+            changed[index + 1] = name
     return changed
 
 
@@ -229,7 +229,7 @@ def given(name: str, context: click.Context | None = None) -> bool:
     cls=Program,
     # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     params=[*terminal.PRINTING_OPTIONS],
 )
 @click.version_option(

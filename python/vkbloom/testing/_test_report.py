@@ -19,8 +19,6 @@ from vkbloom._views.comparison import difference
 from vkbloom._views.markup import Markup, element
 from vkbloom.testing._judging import Verdict
 
-__all__ = ["Record", "figures", "write_part", "write_report"]
-
 _FORMAT: Final = 1
 _LARGEST_SIDE: Final = 640  # pixels of a picture in the page
 
@@ -31,7 +29,6 @@ class Record(TypedDict):
     test: str
     name: str
     folder: str  # of the references
-    has_files: bool  # not where a test gave what it expects
     outcome: str  # "passed", "failed", "missing" or "written"
     origin: str
     reference_origin: str | None
