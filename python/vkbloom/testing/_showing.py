@@ -7,7 +7,6 @@ from typing import Any, Final
 
 import click
 
-from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
@@ -140,15 +139,11 @@ def broken(report: LawReport) -> list[LawRow]:
 
 
 def as_page(measured: Measured) -> str:
-    """Return a page with tables, the point spread with its curve, and pictures."""
+    """Return a page with tables, the point spread, and pictures."""
     spread, subject = measured.spread, measured.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in measured.passes.items()]
-    lit = spread.radii > 0
-    curve = diagram(
-        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
-    )
     shown = (
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
@@ -164,7 +159,6 @@ def as_page(measured: Measured) -> str:
         element("p", f"On {measured.device}."),
         element("h2", "Pictures"),
         *images,
-        curve,
         element("h2", "Laws"),
         Markup(measured.report._repr_html_()),
         element("h2", "Figures"),
