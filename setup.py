@@ -91,7 +91,7 @@ def modules(shader: Path) -> list[Module]:
         Module(name.replace(shader.stem, f"{shader.stem}_mixed"), shader, (*options, "-DMIXED"))
         for name, _, options in plain
         if '"lib/ended.glsl"' in shader.read_text()
-        and name.endswith(("_comp", "_words_rgba32float"))
+        and name.endswith(("_comp", "_linear_rgba32float"))
     ]
     if shader.stem.startswith(("adjoint", "fft")):
         return plain
@@ -99,7 +99,7 @@ def modules(shader: Path) -> list[Module]:
         Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))
         for module in plain
         if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
-        and "-DWORDS" not in module.options
+        and "-DLINEAR_TEXELS" not in module.options
     ]
     return plain + layered + adjoints
 
@@ -108,7 +108,7 @@ def plain_modules(shader: Path) -> list[Module]:
     """Return the modules of a shader for one image.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for images as words, of each format. Lines of it say more: with `#pragma compile
+    is compiled for linear texels of each format. Lines of it say more: with `#pragma compile
     floats` it is for single floats alone, with `#pragma compile images` also for storage images.
     If it calls finished() or ended(), or has `#pragma compile packed`, it can make the caller's
     array, and is also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can
@@ -126,17 +126,21 @@ def plain_modules(shader: Path) -> list[Module]:
             if "images" in marks:
                 options = (f"-DSOURCE_FORMAT={glsl}",)
                 found.append(Module(f"{name}_{ours}", shader, options))
-            words = ("-DWORDS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
+            linear = ("-DLINEAR_TEXELS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
             if "TARGET_BYTES" in text:
-                stored = ("-DWORDS", "-DCHANNEL_BYTES=4", f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}")
-                found.append(Module(f"{shader.stem}_stored_words_{ours}", shader, stored))
+                stored = (
+                    "-DLINEAR_TEXELS",
+                    "-DCHANNEL_BYTES=4",
+                    f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}",
+                )
+                found.append(Module(f"{shader.stem}_stored_linear_{ours}", shader, stored))
             kinds = [("", ())]
             if "SOURCE_CHANNELS" in text and ours == "rgba32float":
                 kinds.append(("rgb_", ("-DRGB",)))
             for kind, options in kinds:
-                found.append(Module(f"{shader.stem}_words_{kind}{ours}", shader, words + options))
+                found.append(Module(f"{shader.stem}_linear_{kind}{ours}", shader, linear + options))
                 if re.search(r"\b(finished|ended)\(", text) or "packed" in marks:
-                    packed = (*words, *options, "-DTARGET_CHANNELS=3")
+                    packed = (*linear, *options, "-DTARGET_CHANNELS=3")
                     found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
         return found
     if "SOURCE_FORMAT" in text:
@@ -289,8 +293,8 @@ def write_spirv(jobs: int) -> None:
         hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
         twins = (
             f"{module.shader.stem}_dispatch",
-            module.name.replace("_words_", "_packed_"),
-            module.name.replace("_words_", "_words_rgb_"),
+            module.name.replace("_linear_", "_packed_"),
+            module.name.replace("_linear_", "_linear_rgb_"),
             f"{module.name}_layers",
         )
         pointers = ", ".join(

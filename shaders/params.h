@@ -170,7 +170,7 @@
     VEC4S(B, next, MAX_TAPS)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
-// ghosts. SUMMED_ROWS are of adjoints.
+// ghosts.
 #define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
     INPUT(B, float, limit) \
@@ -181,20 +181,7 @@
     INPUT(B, float, vignette) \
     INPUT(B, float, width) \
     INPUT(B, int, count) \
-    SUMMED_ROWS(B, INPUT) \
     VEC4S(B, ghosts, MAX_GHOSTS)
-
-// Of an adjoint pass that reads many pixels for the texels of a block, which is `summed_width` x
-// `summed_height` at (summed_x, summed_y): a pass before it adds up `summed_rows` rows for each
-// texel and each group of rows, in blocks of which `summed_columns` are beside each other
-// (summed.glsl).
-#define SUMMED_ROWS(B, INPUT) \
-    INPUT(B, int, summed_x) \
-    INPUT(B, int, summed_y) \
-    INPUT(B, int, summed_width) \
-    INPUT(B, int, summed_height) \
-    INPUT(B, int, summed_rows) \
-    INPUT(B, int, summed_columns)
 
 // What a picture of dirt leaves of the light: base + share * dirt (dirt.frag).
 #define DIRT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -230,13 +217,12 @@
     INPUT(B, float, limit)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
-// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
+// the sides; the share of the samples that jitter leaves.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
     INPUT(B, float, left) \
-    SUMMED_ROWS(B, INPUT) \
     INPUT(B, float, limit)
 
 // The light of the deferred system.
@@ -464,57 +450,49 @@
 #define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
-#define HALVE_WORDS_COLUMNS           8
-#define HALVE_WORDS_ROWS              32
-#define PREFILTER_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
-#define DOUBLE_WORDS_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define DOUBLE_FINAL_COLUMNS(CHANNEL) ((CHANNEL) == 4 ? 8 : 16)
-#define DOUBLE_WORDS_ROWS             64
-#define TEXEL_COLUMNS(CHANNEL)        (16 / (CHANNEL))
-#define TEXEL_ROWS                    16
-#define WINDOW_COLUMNS(CHANNEL)       (8 / (CHANNEL))
-#define WINDOW_ROWS                   64
-#define SHRINK_ROWS                   32
-#define GATHER_COLUMNS                4
-#define GATHER_ROWS                   16
-#define NINE_OUTPUTS                  8
-#define STREAK_COLUMNS                8
-#define STREAK_ROWS                   32
-#define TILE_LOADED                   64
-#define TILE_ROWS                     32
-#define TILE_RUNS                     4
-#define TILE_RADIUS                   16
-// Tiles of levels of exactly twice the size, and of the transposes of both: their pixels, and the
-// invocations along a column. On an H100 with float32, the tile of four rows of the second
-// transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
-// 256 invocations composite 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one
-// of 32 x 16, 151 in one of 64 x 16.
-#define DOUBLE_TILE_COLUMNS 64
-#define DOUBLE_TILE_ROWS    16
-#define DOUBLE_TILE_RUNS    4
-// Tiles of filters: their rows, and the invocations of a workgroup.
-#define FILTER_TILE_ROWS        16
-#define FILTER_TILE_INVOCATIONS 256
-#define ADJOINT_HALVE_COLUMNS   32
-#define ADJOINT_HALVE_ROWS      16
-#define ADJOINT_HALVE_RUNS      4
-#define ADJOINT_DOUBLE_COLUMNS  61
-#define ADJOINT_DOUBLE_ROWS     4
-#define FUSED_VEC4S             5
+#define HALVE_LINEAR_COLUMNS       8
+#define HALVE_LINEAR_ROWS          32
+#define PREFILTER_COLUMNS(CHANNEL) ((CHANNEL) == 2 ? 8 : 4)
+#define TEXEL_COLUMNS(CHANNEL)     (16 / (CHANNEL))
+#define TEXEL_ROWS                 16
+#define WINDOW_COLUMNS(CHANNEL)    (8 / (CHANNEL))
+#define WINDOW_ROWS                64
+#define SHRINK_ROWS                32
+#define GATHER_COLUMNS             4
+#define GATHER_ROWS                16
+#define NINE_OUTPUTS               8
+#define STREAK_COLUMNS             8
+#define STREAK_ROWS                32
+#define TILE_LOADED                64
+#define TILE_ROWS                  32
+#define TILE_RUNS                  4
+#define TILE_RADIUS                16
+// Tiles of filters: their rows, and those that an invocation adds up. Then those of the transposes
+// of levels of exactly half and twice the size. On an H100 with float32, the tile of four rows of
+// the second transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137; the first
+// transpose takes 139 in one of 32 x 16, 151 in one of 64 x 16.
+#define FILTER_TILE_ROWS       16
+#define FILTER_TILE_RUN        4
+#define ADJOINT_HALVE_COLUMNS  32
+#define ADJOINT_HALVE_ROWS     16
+#define ADJOINT_HALVE_RUNS     4
+#define ADJOINT_DOUBLE_COLUMNS 61
+#define ADJOINT_DOUBLE_ROWS    4
+#define FUSED_VEC4S            5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
-// FFT_ROW_COLUMNS of them are in one row. FFT_MOST_RADIX is the largest number of elements of a
+// FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
 // butterfly, FFT_SMALL_RADIX that of images of up to FFT_SMALL_PIXELS. Values above FFT_LIMIT are
 // clamped, since their sums would overflow.
 #define FFT_INVOCATIONS  64
 #define FFT_ROW_COLUMNS  8
-#define FFT_MOST_RADIX   64
+#define FFT_MAX_RADIX    64
 #define FFT_SMALL_RADIX  16
 #define FFT_SMALL_PIXELS 131072
 // With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups
 // run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors, else up to
-// FFT_MOST_GROUP_RADIX.
-#define FFT_MOST_GROUP_RADIX  16
+// FFT_MAX_GROUP_RADIX.
+#define FFT_MAX_GROUP_RADIX   16
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
@@ -552,17 +530,18 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
 // long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
 // source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl), and SOURCE_ROWS of their tiles. EXACT says that their images are in this
-// ratio, or for strips the widths of these. With FROM_IMAGE, a downsampling to half the size
-// reads the image itself and applies the threshold, and an adjoint pass writes the cotangents of
-// a source's image. BY is what these are of. With ENLARGED the target has more rows than the
-// source. STORED is the format of the target (STORED_*). FIRST marks an engine's first level.
-// LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling makes of its
-// taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH
-// x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage that is
-// PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1 to
-// RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
-// GROUP_WIDTH lines.
+// (lib/filter.glsl), and SOURCE_ROWS of their tiles. TAKEN_X and TAKEN_Y have a bit for each texel
+// of a window and each kernel that may have a weight; 0: all may. EXACT says that their images are
+// in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
+// With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
+// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
+// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
+// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
+// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
+// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
+// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
+// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
+// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -609,7 +588,10 @@
     CONSTANT(44, TAP_COUNT, taps) \
     CONSTANT(45, KERNELS, kernels) \
     CONSTANT(46, WINDOW, window) \
-    CONSTANT(47, SOURCE_ROWS, source_rows)
+    CONSTANT(47, SOURCE_ROWS, source_rows) \
+    CONSTANT(48, EXACT_ROWS, exact_rows) \
+    CONSTANT(49, TAKEN_X, taken_x) \
+    CONSTANT(50, TAKEN_Y, taken_y)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

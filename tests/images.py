@@ -77,6 +77,11 @@ def noise_image(*shape: int, dtype: str = "float32", seed: int = 5) -> NDArray[A
     return values.astype(dtype)
 
 
+def random_image(height: int, width: int, channels: int = 3, seed: int = 1) -> NDArray[np.float64]:
+    """Return doubles of 0 to 1."""
+    return np.random.default_rng(seed).random((height, width, channels))
+
+
 def changed(a: NDArray[Any], place: tuple[int, int, int], value: float) -> NDArray[Any]:
     """Return a copy with one value changed."""
     b = a.copy()

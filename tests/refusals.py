@@ -30,7 +30,11 @@ def assert_refused(call: str, error: str, names: Mapping[str, Any]) -> str:
     raised = caught.value
     # The text of a KeyError is its message as a literal.
     text = raised.args[0] if isinstance(raised, KeyError) else raised
-    found = f"{type(raised).__name__}: {text}"
-    pattern = ".*".join(map(re.escape, error.split("...")))
-    assert re.fullmatch(pattern, found, re.DOTALL), f"{call} -> {found}"
+    assert_matches(f"{type(raised).__name__}: {text}", error)
     return str(text)
+
+
+def assert_matches(found: str, error: str) -> None:
+    """Check that a text is the one of a table."""
+    pattern = ".*".join(map(re.escape, error.split("...")))
+    assert re.fullmatch(pattern, found, re.DOTALL), found

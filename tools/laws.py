@@ -199,10 +199,16 @@ def fireflies(bloom: Bloom, probe: Probe) -> None:
 
 def measured(subject: Subject) -> str:
     """Return gain and standard deviation of the point spread as a short text."""
-    found = testing.response(lambda image, _: subject.bloom(image), "_", [None], subject.probe)
-    sigma_x, sigma_y = found.sigma[0]
-    border = f", {100 * found.at_border[0]:.1g} % at the border" * bool(found.at_border[0] > 1e-3)
-    return f"gain {found.gain[0]:.4g}, sigma {sigma_x:.3g} and {sigma_y:.3g} pixels{border}"
+    spread = testing.point_spread(subject.bloom, subject.probe)[:, :, 0]
+    gain, outside = spread.sum(), np.abs(spread).sum() - np.abs(spread[1:-1, 1:-1]).sum()
+    sigmas = []
+    for axis in (0, 1):
+        shares = spread.sum(axis=axis) / gain
+        places = np.arange(len(shares))
+        sigmas.append(np.sqrt(shares @ (places - shares @ places) ** 2))
+    share = outside / np.abs(spread).sum()
+    border = f", {100 * share:.1g} % at the border" * bool(share > 1e-3)
+    return f"gain {gain:.4g}, sigma {sigmas[0]:.3g} and {sigmas[1]:.3g} pixels{border}"
 
 
 def table(subjects: list[Subject], device: str) -> str:

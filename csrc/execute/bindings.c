@@ -35,8 +35,8 @@ static const struct vkb_binding_types binding_types[VKB_BINDING_KINDS] = {
     [VKB_BINDINGS_DISPATCH] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
                                VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
     [VKB_BINDINGS_LOAD] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-    [VKB_BINDINGS_WORDS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
-                            VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
+    [VKB_BINDINGS_LINEAR_TEXELS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                                    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
 };
 
 bool vkb_layouts_create(const struct vkb_device *device,
@@ -98,7 +98,8 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layo
             .descriptorCount = 1,
             .stageFlags = stages,
         };
-    const uint32_t constants = layouts->kind == VKB_BINDINGS_WORDS ? sizeof(struct vkb_words) : 0;
+    const uint32_t constants =
+        layouts->kind == VKB_BINDINGS_LINEAR_TEXELS ? sizeof(struct vkb_linear_texels) : 0;
     return vkb_layouts_create(device, rows, layouts->count + 1, constants, &layouts->made, error);
 }
 
@@ -137,7 +138,7 @@ static enum vkb_binding_kind kind_of(const struct vkb_pass_row *pass)
         return VKB_BINDINGS_DRAW;
     return pass->reading == VKB_READING_SAMPLED ? VKB_BINDINGS_DISPATCH
          : pass->reading == VKB_READING_LOADED  ? VKB_BINDINGS_LOAD
-                                                : VKB_BINDINGS_WORDS;
+                                                : VKB_BINDINGS_LINEAR_TEXELS;
 }
 
 struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)

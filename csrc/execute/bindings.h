@@ -7,17 +7,17 @@
 
 // The descriptors after the parameter block.
 enum vkb_binding_kind {
-    VKB_BINDINGS_DRAW,      // images, each with a sampler
-    VKB_BINDINGS_DISPATCH,  // the same, and a storage image as the target
-    VKB_BINDINGS_LOAD,      // storage images, the target is one too
-    VKB_BINDINGS_WORDS,     // images as words, and the sizes of all images as push constants
+    VKB_BINDINGS_DRAW,           // images, each with a sampler
+    VKB_BINDINGS_DISPATCH,       // the same, and a storage image as the target
+    VKB_BINDINGS_LOAD,           // storage images, the target is one too
+    VKB_BINDINGS_LINEAR_TEXELS,  // linear texels, and the sizes of all images as push constants
     VKB_BINDING_KINDS
 };
 
-// Push constants: the sizes of images that are accessed as words (variants/pixels.glsl).
-struct vkb_words {
+// Push constants: the sizes of images that are accessed as linear texels (variants/pixels.glsl).
+struct vkb_linear_texels {
     int32_t target[4];  // width, height, words in a row, first row of the bound buffer
-    int32_t reads[VKB_MAX_WORDS][4];  // width, height, words in a row, 0
+    int32_t reads[VKB_MAX_LINEAR_TEXELS][4];  // width, height, words in a row, 0
 };
 
 // A descriptor set layout, and the pipeline layout with only this set.

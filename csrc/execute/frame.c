@@ -45,24 +45,25 @@ static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_e
     vk->vkDestroyDescriptorPool(run->device->handle, submission->descriptors, NULL);
     submission->descriptors = VK_NULL_HANDLE;
     submission->descriptor_capacity = 0;
-    if (!VK(error, vk->vkCreateDescriptorPool(
-                       run->device->handle,
-                       &(VkDescriptorPoolCreateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                           .maxSets = sets,
-                           .poolSizeCount = 5,
-                           .pPoolSizes =
-                               (VkDescriptorPoolSize[]){
-                                   {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets + resources},
-                                   {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                    sets * VKB_MAX_READS + resources},
-                                   {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-                                    sets * (VKB_MAX_LOADS + 1) + resources},
-                                   {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_WORDS},
-                                   {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets + resources},
-                               },
-                       },
-                       NULL, &submission->descriptors)))
+    if (!VK(error,
+            vk->vkCreateDescriptorPool(
+                run->device->handle,
+                &(VkDescriptorPoolCreateInfo){
+                    .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
+                    .maxSets = sets,
+                    .poolSizeCount = 5,
+                    .pPoolSizes =
+                        (VkDescriptorPoolSize[]){
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets + resources},
+                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                             sets * VKB_MAX_READS + resources},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+                             sets * (VKB_MAX_LOADS + 1) + resources},
+                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_LINEAR_TEXELS},
+                            {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets + resources},
+                        },
+                },
+                NULL, &submission->descriptors)))
         return false;
     submission->descriptor_capacity = sets;
     return true;
@@ -266,7 +267,7 @@ static void find_usages(struct vkb_run *run, const struct vkb_frame_source *sour
             const struct vkb_image_row *row = &plan->graph.images[image];
             const struct vkb_input *input = source->inputs[row->input];
             run->usages[image] |= row->usage;
-            if (row->input && ((input && input->exported) || !run->device->words))
+            if (row->input && ((input && input->exported) || !run->device->linear_texels))
                 run->usages[image] |= vkb_access_usage(VKB_ACCESS_COPY_TARGET);
             if (input && input->exported)
                 run->usages[image] |=

@@ -96,18 +96,19 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
                           struct vkb_image *image, struct vkb_error *error)
 {
-    return vkb_image_create(device,
-                            &(struct vkb_image_spec){
-                                .format = row->format,
-                                .width = row->width,
-                                .height = row->height,
-                                .layers = row->layers ? row->layers : 1,
-                                .levels = 1,
-                                .array = row->layers > 0,
-                                .usage = row->usage,
-                                .mapped = device->words && row->format != VKB_FORMAT_DEPTH32_FLOAT,
-                            },
-                            image, error);
+    return vkb_image_create(
+        device,
+        &(struct vkb_image_spec){
+            .format = row->format,
+            .width = row->width,
+            .height = row->height,
+            .layers = row->layers ? row->layers : 1,
+            .levels = 1,
+            .array = row->layers > 0,
+            .usage = row->usage,
+            .mapped = device->linear_texels && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+        },
+        image, error);
 }
 
 static struct vkb_cached_image *find_cached(const struct vkb_image_cache *cache,

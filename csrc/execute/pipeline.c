@@ -117,8 +117,8 @@ bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipeli
 static VkImageLayout attachment_layout(const struct vkb_device *device, enum vkb_format format,
                                        enum vkb_access access)
 {
-    return device->words && format != VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_LAYOUT_GENERAL
-                                                               : vkb_access_layout(access);
+    return device->linear_texels && format != VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_LAYOUT_GENERAL
+                                                                       : vkb_access_layout(access);
 }
 
 static VkAttachmentDescription describe_attachment(const struct vkb_device *device,
@@ -209,7 +209,7 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
         key.depth_format = graph->images[pass->depth].format;
     key.load = pass->load;
     key.use_count = vkb_graph_target_uses(graph, first, end, key.uses);
-    if (device->words)
+    if (device->linear_texels)
         generalize(key.uses, key.use_count);
 
     for (size_t i = 0; i < pipelines->render_pass_count; ++i)

@@ -92,11 +92,11 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
         .descriptorType = vkb_pass_binding_types(pass).read,
         .pImageInfo = info,
     };
-    if (pass->reading != VKB_READING_WORDS)
+    if (pass->reading != VKB_READING_LINEAR_TEXELS)
         return read_image(run, pass, binding->surface, i, info, error);
     struct vkb_image *image = &run->images[pass->reads[i]]->image;
-    write->pTexelBufferView = &image->words;
-    return vkb_image_words(run->device, image, error);
+    write->pTexelBufferView = &image->linear_texels;
+    return vkb_image_linear_texels(run->device, image, error);
 }
 
 // Fills the set with the parameters, the images read, the resources and the target of a dispatch.
@@ -241,7 +241,7 @@ uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
         ++sets;
-        if (pass->reading == VKB_READING_WORDS) {
+        if (pass->reading == VKB_READING_LINEAR_TEXELS) {
             const struct vkb_image_row *row = &graph->images[pass->targets[0]];
             const size_t pitch = vkb_image_row_pitch(row->format, row->width);
             sets += row->height / band_rows(device, pass, pitch);
@@ -266,40 +266,42 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
     for (uint32_t i = 0; i < plan->output_count; ++i) {
         struct vkb_output *output = &run->request->outputs[i];
         if (plan->outputs[i] == image && (vkb_readback_is_complete(output) || pass->shader->packed)
-            && vkb_readback_takes_words(run->device, output))
+            && vkb_readback_takes_linear_texels(run->device, output))
             return output;
     }
     return NULL;
 }
 
-static void describe_words(const struct vkb_image *image, size_t row_pitch, int32_t words[4])
+static void describe_linear_texels(const struct vkb_image *image, size_t row_pitch,
+                                   int32_t shape[4])
 {
-    words[0] = (int32_t)image->width;
-    words[1] = (int32_t)image->height;
-    words[2] = (int32_t)(row_pitch / VKB_WORD_SIZE);
-    words[3] = 0;
+    shape[0] = (int32_t)image->width;
+    shape[1] = (int32_t)image->height;
+    shape[2] = (int32_t)(row_pitch / VKB_WORD_SIZE);
+    shape[3] = 0;
 }
 
-static void push_words(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                       const struct band *band)
+static void push_linear_texels(const struct vkb_run *run, const struct vkb_pass_row *pass,
+                               const struct band *band)
 {
-    struct vkb_words words = {0};
+    struct vkb_linear_texels shapes = {0};
 
-    describe_words(&run->images[pass->targets[0]]->image, band->row_pitch, words.target);
-    words.target[3] = (int32_t)band->first;
+    describe_linear_texels(&run->images[pass->targets[0]]->image, band->row_pitch, shapes.target);
+    shapes.target[3] = (int32_t)band->first;
     for (uint32_t i = 0; i < pass->read_count; ++i) {
         const struct vkb_image *image = &run->images[pass->reads[i]]->image;
-        describe_words(image, image->row_pitch, words.reads[i]);
+        describe_linear_texels(image, image->row_pitch, shapes.reads[i]);
     }
     run->device->vk.vkCmdPushConstants(
         run->submission->commands.buffer,
         vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->pipeline,
-        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof words, &words);
+        VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof shapes, &shapes);
 }
 
 // `output`: what the pass stores to; NULL: its image.
-static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
-                           VkDeviceSize params, struct vkb_output *output, struct vkb_error *error)
+static bool dispatch_linear_texels(struct vkb_run *run, const struct vkb_pass_row *pass,
+                                   VkDeviceSize params, struct vkb_output *output,
+                                   struct vkb_error *error)
 {
     const struct vkb_image *image = &run->images[pass->targets[0]]->image;
     const size_t channel_size = vkb_formats[image->format].channel_size;
@@ -320,7 +322,7 @@ static bool dispatch_words(struct vkb_run *run, const struct vkb_pass_row *pass,
         band.buffer.range = band.rows * band.row_pitch;
         if (!bind_descriptors(run, &binding, error))
             return false;
-        push_words(run, pass, &band);
+        push_linear_texels(run, pass, &band);
         dispatch(run, pass, band.rows);
     }
     return true;
@@ -370,12 +372,12 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
 {
     const struct vkb_pass_row *pass = &run->graph->passes[index];
     VkCommandBuffer commands = run->submission->commands.buffer;
-    const bool words = pass->reading == VKB_READING_WORDS;
-    struct vkb_output *output = words ? find_stored(run, pass) : NULL;
+    const bool linear = pass->reading == VKB_READING_LINEAR_TEXELS;
+    struct vkb_output *output = linear ? find_stored(run, pass) : NULL;
     struct vkb_pass_row known;
     VkPipeline pipeline;
 
-    if (words) {
+    if (linear) {
         memcpy(&known, pass, sizeof known);
         if (run->images[pass->reads[0]]->image.channels == 3)
             known.shader = known.shader->rgb;
@@ -395,8 +397,9 @@ static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render
         return false;
     vkb_label_begin(run->device, commands, pass->name);
     run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
-    const bool done = words ? dispatch_words(run, pass, write_params(run, pass), output, error)
-                            : draw(run, pass, write_params(run, pass), error);
+    const bool done = linear
+                        ? dispatch_linear_texels(run, pass, write_params(run, pass), output, error)
+                        : draw(run, pass, write_params(run, pass), error);
     vkb_label_end(run->device, commands);
     return done;
 }

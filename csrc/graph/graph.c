@@ -276,8 +276,8 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
         const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
-        // Words are a buffer.
-        if (pass->reading == VKB_READING_WORDS)
+        // Linear texels are a buffer.
+        if (pass->reading == VKB_READING_LINEAR_TEXELS)
             continue;
         for (uint32_t read = 0; read < pass->read_count; ++read)
             graph->images[pass->reads[read]].usage |= vkb_access_usage(vkb_pass_reads_as(pass));
@@ -287,7 +287,7 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
         if (pass->depth != VKB_NO_IMAGE)
             graph->images[pass->depth].usage |= vkb_access_usage(VKB_ACCESS_DEPTH_TARGET);
     }
-    // No image is without a usage, also if all passes access it as words.
+    // No image is without a usage, also if all passes access its linear texels.
     for (uint32_t i = 0; i < graph->image_count; ++i)
         if (graph->images[i].usage == 0)
             graph->images[i].usage = vkb_access_usage(VKB_ACCESS_COPY_SOURCE);
@@ -413,8 +413,9 @@ static bool can_layer(const struct vkb_graph *graph)
         can = can && !graph->images[i].serial && graph->images[i].input <= VKB_INPUT_IMAGE;
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
-        can = can && pass->geometry == VKB_GEOMETRY_DISPATCH && pass->reading != VKB_READING_WORDS
-           && pass->resource_count == 0 && pass->shader->layers;
+        can = can && pass->geometry == VKB_GEOMETRY_DISPATCH
+           && pass->reading != VKB_READING_LINEAR_TEXELS && pass->resource_count == 0
+           && pass->shader->layers;
     }
     return can;
 }

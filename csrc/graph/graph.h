@@ -11,8 +11,8 @@
 
 enum {
     VKB_NAME_SIZE = 32,
-    VKB_MAX_READS = 16,               // as many as every device can sample
-    VKB_MAX_WORDS = GATHERED_LEVELS,  // images that are read as words
+    VKB_MAX_READS = 16,                       // as many as every device can sample
+    VKB_MAX_LINEAR_TEXELS = GATHERED_LEVELS,  // images that are read as linear texels
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
@@ -85,8 +85,9 @@ static inline bool vkb_is_mesh(enum vkb_geometry geometry)
 // that reads sampled images writes a storage image.
 enum vkb_reading {
     VKB_READING_SAMPLED,
-    VKB_READING_LOADED,  // as storage images
-    VKB_READING_WORDS,   // as buffers of 16-byte words, on devices that share images with the host
+    VKB_READING_LOADED,         // as storage images
+    VKB_READING_LINEAR_TEXELS,  // as buffers of 16-byte words, on devices that share images with
+                                // the host
 };
 
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
@@ -173,8 +174,8 @@ bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t 
                     struct vkb_error *error);
 
 // Makes the graph that of a batch: all images get as many layers as it has, and one dispatch writes
-// all layers of its target. A VALUE error where this cannot be done: of draws, of words, of shaders
-// without layers, and of images that the host fills for all frames.
+// all layers of its target. A VALUE error where this cannot be done: of draws, of linear texels, of
+// shaders without layers, and of images that the host fills for all frames.
 bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error);
 
 // Derives how each image is used from the passes that read and write it, and from whether the host

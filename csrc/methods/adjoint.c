@@ -20,7 +20,6 @@ static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_flare] = vkb_transpose_flare,
     [VKB_BLOCK_dirt] = vkb_transpose_dirt,
     [VKB_BLOCK_star] = vkb_transpose_star,
-    [VKB_BLOCK_sun_beams] = vkb_transpose_sun_beams,
 };
 
 // The image of a framebuffer's cotangents, a level of the source.
@@ -87,7 +86,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))
             return false;
-        *possible = *possible && !adjoint->too_large;
+        *possible = *possible && !adjoint->scattered;
     }
     return !*possible || vkb_end_scene(adjoint, error);
 }

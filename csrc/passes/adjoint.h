@@ -15,7 +15,7 @@ struct vkb_adjoint {
     uint32_t added;        // images so far
     uint32_t max_side;
     bool sums;       // the derivatives by fields are wanted, not those by images
-    bool too_large;  // a pass would need an image beyond max_side
+    bool scattered;  // a pass has samples that are not on a grid, whose transpose the core lacks
     // The cotangents of the scene of a composite without a curve are `share` times those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -70,11 +70,6 @@ bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_r
                             const struct vkb_filter *filter, uint32_t image, uint32_t target,
                             struct vkb_error *error);
 
-// Accumulates, where samples are not on a grid, the row's result at the samples of its pixels:
-// those of a halo, or of ghost number `levels`.
-bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                          uint32_t source, struct vkb_error *error);
-
 // If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
 // pixels.
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -100,8 +95,7 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather,
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
 // Glare.
-vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star,
-    vkb_transpose_sun_beams;
+vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star;
 
 // Accumulates the cotangents of what a convolution's prefilter of bright colours makes of the glow.
 bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,

@@ -1,4 +1,4 @@
-// The adjoints of glare: rays of streaks, ghosts and halo, stars, dirt, and the prefilter of a
+// The adjoints of glare: rays of streaks, ghosts, stars, dirt, and the prefilter of a
 // convolution.
 #include "passes/adjoint.h"
 
@@ -79,7 +79,7 @@ static void scale_axis(double scale, struct vkb_axis *axis)
     axis->border = VKB_BORDER_ZERO;
 }
 
-// Ghosts, or a halo, which has none.
+// Ghosts. A halo, and colours that are moved along the radius, are left to the reference.
 bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_error *error)
 {
@@ -88,21 +88,19 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag, 1);
     struct vkb_filter filter;
 
+    adjoint->scattered = params->count == 0 || params->aberration > 0.0f;
+    if (adjoint->scattered)
+        return true;
     if (pass->constants.add_own && !accumulate_all(adjoint, row.reads[1], pass->reads[1], error))
         return false;
     row.constants.add_own = 0;
-    if (params->count == 0)
-        return vkb_accumulate_moved(adjoint, &row, source, error);
     for (int ghost = 0; ghost < params->count; ++ghost) {
         const float scale = params->ghosts[ghost][3];
         row.constants.levels = ghost;
         vkb_filter_begin(adjoint->graph, source, target, &filter);
         scale_axis(scale, &filter.x);
         scale_axis(scale, &filter.y);
-        // What is sampled in the centre alone is not moved.
-        if (params->aberration > 0.0f && scale != 0.0f
-                ? !vkb_accumulate_moved(adjoint, &row, source, error)
-                : !vkb_accumulate_through(adjoint, &row, &filter, source, target, error))
+        if (!vkb_accumulate_through(adjoint, &row, &filter, source, target, error))
             return false;
     }
     return true;

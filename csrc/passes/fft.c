@@ -30,7 +30,7 @@ static bool is_smooth(uint32_t length)
 // pipelines of a few small radices.
 static uint32_t most_radix(uint32_t length)
 {
-    return length <= 64 ? 8 : length <= 1024 || length > 4096 ? 32 : FFT_MOST_RADIX;
+    return length <= 64 ? 8 : length <= 1024 || length > 4096 ? 32 : FFT_MAX_RADIX;
 }
 
 // Splits the length into so many stages, the longest first, whose radices have the least sum:
@@ -99,7 +99,7 @@ bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
 {
     return is_smooth(length)
         && (split_group(length, FFT_USUAL_GROUP_RADIX, found)
-            || split_group(length, FFT_MOST_GROUP_RADIX, found));
+            || split_group(length, FFT_MAX_GROUP_RADIX, found));
 }
 
 static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);

@@ -17,7 +17,7 @@ struct vkb_fft_line {
 // to `most`.
 struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most);
 
-// The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MOST_GROUP_RADIX
+// The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MAX_GROUP_RADIX
 // each, the longest first. False: there are none.
 bool vkb_fft_group_radices(uint32_t length, uint32_t *found);
 

@@ -31,7 +31,7 @@ static const struct vkb_device any_device = {
             [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
         },
     .dispatch = true,
-    .words = true,
+    .linear_texels = true,
 };
 
 // Whether the image is wanted: all are where `names` is None. -1 with an exception set.
@@ -169,7 +169,7 @@ static PyObject *describe_outputs(const struct vkb_plan *plan)
 static bool layer_graph(const struct vkb_device *device, struct vkb_graph *graph,
                         struct vkb_error *error)
 {
-    if (graph->layers > device->limits.maxImageArrayLayers || device->words)
+    if (graph->layers > device->limits.maxImageArrayLayers || device->linear_texels)
         return vkb_fail(error, VKB_ERROR_VALUE, "batch: the device has no images of %u layers",
                         graph->layers);
     return vkb_graph_layer(graph, error);

@@ -16,7 +16,7 @@ static bool is_float(enum vkb_format format)
 // Whether dispatches access images. On a CPU, copies are faster.
 static bool dispatches(const struct vkb_device *device)
 {
-    return device->dispatch && !device->words;
+    return device->dispatch && !device->linear_texels;
 }
 
 // Whether the rows can be copied to an image as they are.

@@ -48,7 +48,7 @@ bool vkb_in_place_stage(const struct vkb_device *device, struct vkb_in_place *pl
         .row_pitch = (size_t)input->row_stride,
     };
 
-    if (!device->words || size < VKB_IMPORTED_BYTES || input->memory == place->memory
+    if (!device->linear_texels || size < VKB_IMPORTED_BYTES || input->memory == place->memory
         || !has_words(device, input) || !vkb_image_borrow(device, &borrowed, &place->cached.image))
         return false;
     vkb_in_parts(device->workers, count_part, NULL, &counting, 0, input->height, size);

@@ -54,7 +54,7 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     // A copy writes complete pixels, to addresses that are multiples of their size.
     if (vkb_readback_is_complete(output)
             ? (uintptr_t)output->memory % vkb_pixel_size(output->format) != 0
-            : !device->words || output_row_size(output) % VKB_WORD_SIZE != 0)
+            : !device->linear_texels || output_row_size(output) % VKB_WORD_SIZE != 0)
         return false;
     if (output->pages)
         return import_pages(device, output);
@@ -98,7 +98,8 @@ static bool plan_output(const struct vkb_device *device, struct vkb_readback *re
     return true;
 }
 
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output)
+bool vkb_readback_takes_linear_texels(const struct vkb_device *device,
+                                      const struct vkb_output *output)
 {
     const VkDeviceSize align = device->limits.minStorageBufferOffsetAlignment;
 

@@ -55,7 +55,8 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 // Whether the output has all channels of its image.
 bool vkb_readback_is_complete(const struct vkb_output *output);
 // Whether a pass can store words to the output's memory.
-bool vkb_readback_takes_words(const struct vkb_device *device, const struct vkb_output *output);
+bool vkb_readback_takes_linear_texels(const struct vkb_device *device,
+                                      const struct vkb_output *output);
 // Records the copy of the output's rows of an image to a buffer.
 void vkb_readback_copy(const struct vkb_device *device, VkCommandBuffer commands,
                        struct vkb_image *image, const struct vkb_output *output, VkBuffer to,

@@ -92,7 +92,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
         .input = kind,
         // Whatever plan it will be for.
         .usage = vkb_access_usage(VKB_ACCESS_COPY_SOURCE) | vkb_access_usage(VKB_ACCESS_SAMPLED)
-               | (device->words ? 0 : vkb_access_usage(VKB_ACCESS_COPY_TARGET))
+               | (device->linear_texels ? 0 : vkb_access_usage(VKB_ACCESS_COPY_TARGET))
                | (device->dispatch ? vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED) : 0),
     };
     struct vkb_cached_image *cached = &resident->inputs[kind].cached;

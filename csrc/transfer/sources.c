@@ -55,8 +55,8 @@ static bool overlaps(const struct vkb_output *output, const struct vkb_image_row
         && other < start + size;
 }
 
-// Whether all passes of the request that may read the image read words, and nothing copies it to an
-// output or writes to the memory of its pixels.
+// Whether all passes of the request that may read the image read linear texels, and nothing copies
+// it to an output or writes to the memory of its pixels.
 static bool allows_in_place(const struct vkb_request *request, uint32_t image,
                             const struct vkb_input *input)
 {
@@ -65,7 +65,7 @@ static bool allows_in_place(const struct vkb_request *request, uint32_t image,
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
         if (vkb_pass_reads(pass, image)
-            && (pass->reading != VKB_READING_WORDS
+            && (pass->reading != VKB_READING_LINEAR_TEXELS
                 || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
             return false;
     }

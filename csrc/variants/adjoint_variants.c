@@ -143,7 +143,7 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
 
 // The most weights that an invocation keeps along an axis, in vec4s. More than GPUs have registers
 // for, or LLVM, would be slower than the plain pass.
-enum { MAX_WORDS = 24, MAX_REGISTERS = 16 };
+enum { MAX_LINEAR = 24, MAX_REGISTERS = 16 };
 
 static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        uint32_t most)
@@ -158,7 +158,7 @@ static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row 
 
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    bool fits = vkb_fits_words(choice, pass);
+    bool fits = vkb_fits_linear(choice, pass);
 
     for (uint32_t i = 0; i < pass->read_count; ++i)
         fits = fits && choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT;
@@ -197,9 +197,9 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     row->reads[2] = pass->reads[0];
 }
 
-// The same, if its images are words, too.
-static void read_words_of_composite(const struct vkb_variant_choice *choice,
-                                    struct vkb_pass_row *row)
+// The same, if its images have linear texels, too.
+static void read_linear_of_composite(const struct vkb_variant_choice *choice,
+                                     struct vkb_pass_row *row)
 {
     struct vkb_pass_row fused;
 
@@ -209,19 +209,19 @@ static void read_words_of_composite(const struct vkb_variant_choice *choice,
         memcpy(row, &fused, sizeof fused);
 }
 
-bool vkb_add_adjoint_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           bool *fits, struct vkb_error *error)
+bool vkb_add_adjoint_linear(const struct vkb_variant_choice *choice,
+                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
     struct vkb_pass_row row;
 
-    *fits = pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass, MAX_WORDS)
+    *fits = pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass, MAX_LINEAR)
          && vkb_are_floats(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    read_words_of_composite(choice, &row);
-    vkb_make_words(&row, &vkb_shader_adjoint_taps_words_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
+    read_linear_of_composite(choice, &row);
+    vkb_make_linear(&row, &vkb_shader_adjoint_taps_linear_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
     return add_tables(choice, pass, &row, error) && vkb_graph_add_pass(choice->graph, &row, error);
 }
 

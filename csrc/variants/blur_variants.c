@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const struct vkb_shader *const line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
-static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(strip);
+static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(strip);
 
 // The row of a line blur. `origin` is the position of the target's first pixel in the source.
 static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
@@ -199,7 +199,7 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
     row->params.fused_bloom.columns = (int32_t)columns;
     row->constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
     row->gains_if_finite = true;
-    vkb_make_words(row, shader, columns, rows);
+    vkb_make_linear(row, shader, columns, rows);
     if (vertical) {
         row->block_width = columns;
         row->block_height = ROW_INVOCATIONS * rows;
@@ -218,12 +218,12 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
     struct nest nest;
 
     *fits = find_nest(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &nest)
-         && vkb_fits_words(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
+         && vkb_fits_linear(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &nest);
     make_strips(choice, &row,
-                pass->transposed ? &vkb_shader_strip_mixed_words_rgba32float
+                pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
                                  : strip_shaders[format],
                 vertical);
     return vkb_add_fullscreen(choice, pass, error)
@@ -376,6 +376,6 @@ bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
     if (!*fits)
         return true;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
-    make_strips(choice, &row, &vkb_shader_adjoint_strip_words_rgba32float, false);
+    make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

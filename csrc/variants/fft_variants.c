@@ -203,9 +203,9 @@ bool vkb_add_lines(const struct vkb_variant_choice *choice, const struct vkb_pas
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(fft);
+static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(fft);
 static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(fft_stored);
+    VKB_LINEAR_BY_FORMAT(fft_stored);
 
 // A storage buffer must reach the complete target: an invocation stores to places far apart.
 static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)
@@ -221,12 +221,12 @@ bool vkb_add_transform(const struct vkb_variant_choice *choice, const struct vkb
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
 
-    *fits = pass->block == VKB_BLOCK_fft && vkb_fits_words(choice, pass)
+    *fits = pass->block == VKB_BLOCK_fft && vkb_fits_linear(choice, pass)
          && reaches(choice->device, target);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
-    row.reading = VKB_READING_WORDS;
+    row.reading = VKB_READING_LINEAR_TEXELS;
     row.shader = pass->constants.stage == STAGE_LAST ? stored_shaders[target->format]
                                                      : stage_shaders[from->format];
     return vkb_graph_add_pass(choice->graph, &row, error);

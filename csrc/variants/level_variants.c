@@ -1,4 +1,4 @@
-// Variants of downsampling to exactly half the size and of upsampling to exactly twice the size.
+// Variants of downsampling, and of the first passes of published methods.
 #include "variants/variant.h"
 
 #include "passes/filter.h"
@@ -6,28 +6,24 @@
 #include <string.h>
 
 static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
-static const struct vkb_shader *const halve_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(halve);
-static const struct vkb_shader *const halve_taps_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(halve_taps);
-static const struct vkb_shader *const prefilter_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(prefilter);
-static const struct vkb_shader *const shrink_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(shrink);
-static const struct vkb_shader *const rows_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(nine_rows);
-static const struct vkb_shader *const columns_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(nine_columns);
-static const struct vkb_shader *const double_words[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(double);
-static const struct vkb_shader *const double_final_words[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(double_final);
-static const struct vkb_shader *const double_mixed_words[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_double_final_mixed_words_rgba32float};
-
+static const struct vkb_shader *const halve_linear[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(halve);
+static const struct vkb_shader *const halve_taps_linear[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(halve_taps);
+static const struct vkb_shader *const prefilter_linear[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(prefilter);
+static const struct vkb_shader *const shrink_linear[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(shrink);
+static const struct vkb_shader *const rows_linear[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(nine_rows);
+static const struct vkb_shader *const columns_linear[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(nine_columns);
 // Sets the shader, and the block of pixels that each invocation writes, for storage images or
-// words.
+// linear texels.
 static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                          enum vkb_format format)
 {
     if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_words(row, halve_words[format], HALVE_WORDS_COLUMNS, HALVE_WORDS_ROWS);
+        vkb_make_linear(row, halve_linear[format], HALVE_LINEAR_COLUMNS, HALVE_LINEAR_ROWS);
     } else {
         vkb_make_dispatch(row, halve_shaders[format], HALVE_INVOCATIONS * HALVE_COLUMNS,
                           HALVE_ROWS);
@@ -35,35 +31,13 @@ static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pas
     }
 }
 
-// The same; a GPU does it in tiles.
-static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                          const struct vkb_shader *tiles, const struct vkb_shader *const *words,
-                          uint32_t columns, enum vkb_format format)
-{
-    if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_words(row, words[format], columns, DOUBLE_WORDS_ROWS);
-    } else {
-        vkb_make_dispatch(row, tiles, DOUBLE_TILE_COLUMNS, DOUBLE_TILE_ROWS);
-    }
-}
-
-// Whether the device can run the pass as make_halving and make_doubling set it. Shaders for words
+// Whether the device can run the pass as make_halving sets it. Shaders for linear texels
 // are compiled for one format of all images.
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     return choice->variants != VKB_VARIANTS_CPU
-        || (vkb_fits_words(choice, pass)
+        || (vkb_fits_linear(choice, pass)
             && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]));
-}
-
-static bool loads_to_double(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass)
-{
-    const uint32_t invocations = DOUBLE_TILE_COLUMNS * DOUBLE_TILE_RUNS;
-
-    return choice->variants == VKB_VARIANTS_CPU
-             ? loads(choice, pass)
-             : choice->device->limits.maxComputeWorkGroupInvocations >= invocations;
 }
 
 bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -72,7 +46,7 @@ bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pa
     const struct vkb_graph *plain = &choice->plain;
     struct vkb_pass_row row;
 
-    *fits = vkb_filter_exact(pass) == EXACT_HALF && loads(choice, pass);
+    *fits = vkb_filter_exact(pass) && loads(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
@@ -113,17 +87,17 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return source->width == 2 * target->width && source->height == 2 * target->height;
 }
 
-// Adds the pass as one of words, which loads the texels of its first image.
-static bool add_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
-                      struct vkb_error *error)
+// Adds the pass as one of linear texels, which loads the texels of its first image.
+static bool add_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
+                       struct vkb_error *error)
 {
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
     row.constants.sampling = 0;
     vkb_drop_reads(&row, 1);
-    vkb_make_words(&row, shader, columns, rows);
+    vkb_make_linear(&row, shader, columns, rows);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
@@ -134,11 +108,11 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
 
     *fits = weights_taps(pass) && is_half(&choice->plain, pass) && loads(choice, pass);
     return !*fits
-        || add_words(choice, pass, halve_taps_words[source->format], HALVE_WORDS_COLUMNS,
-                     HALVE_WORDS_ROWS, error);
+        || add_linear(choice, pass, halve_taps_linear[source->format], HALVE_LINEAR_COLUMNS,
+                      HALVE_LINEAR_ROWS, error);
 }
 
-// Adds the pass as one of words, and a fused pass that reads the image itself.
+// Adds the pass as one of linear texels, and a fused pass that reads the image itself.
 static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                           const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
                           struct vkb_error *error)
@@ -148,7 +122,7 @@ static bool add_prefilter(const struct vkb_variant_choice *choice, const struct 
     memcpy(&row, pass, sizeof row);
     row.constants.sampling = 0;
     vkb_drop_reads(&row, 1);
-    vkb_make_words(&row, shader, columns, rows);
+    vkb_make_linear(&row, shader, columns, rows);
     return vkb_graph_add_pass(choice->graph, &row, error)
         && vkb_add_from_image(choice, pass, &row, error);
 }
@@ -171,7 +145,7 @@ bool vkb_add_prefiltered(const struct vkb_variant_choice *choice, const struct v
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants.exact = same ? EXACT_SAME : EXACT_HALF;
-    return add_prefilter(choice, &row, prefilter_words[format],
+    return add_prefilter(choice, &row, prefilter_linear[format],
                          PREFILTER_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS, error);
 }
 
@@ -189,7 +163,7 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
     struct vkb_pass_row row;
     memcpy(&row, pass, sizeof row);
     row.constants.enlarged = source->height < target->height;
-    return add_prefilter(choice, &row, shrink_words[source->format],
+    return add_prefilter(choice, &row, shrink_linear[source->format],
                          4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
 }
 
@@ -208,55 +182,13 @@ bool vkb_add_nine(const struct vkb_variant_choice *choice, const struct vkb_pass
                     && loads(choice, pass)
               : groups_of(pass) == GROUPS_GODOT_BLUR && rows && is_half(&choice->plain, pass)
                     && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
-                    && vkb_fits_words(choice, pass);
+                    && vkb_fits_linear(choice, pass);
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
         pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
-    return rows ? add_words(choice, &row, rows_words[format], NINE_OUTPUTS, GATHER_ROWS, error)
-                : add_words(choice, &row, columns_words[format],
-                            4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
-}
-
-bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                     bool *fits, struct vkb_error *error)
-{
-    const struct vkb_graph *plain = &choice->plain;
-    const enum vkb_format format = plain->images[pass->reads[0]].format;
-    struct vkb_pass_row row;
-
-    *fits = vkb_filter_exact(pass) == EXACT_DOUBLE && loads_to_double(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){
-        .add_own = pass->constants.add_own,
-        .alpha = pass->constants.alpha,
-    };
-    make_doubling(choice, &row, &vkb_shader_double_tile_comp, double_words,
-                  DOUBLE_WORDS_COLUMNS(vkb_formats[format].channel_size), format);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-// Adds the composite, and after it a fused pass that also upsamples the last level.
-bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           bool *fits, struct vkb_error *error)
-{
-    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
-    const bool mixed = pass->transposed;
-
-    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && loads_to_double(choice, pass)
-         && (!mixed || choice->variants != VKB_VARIANTS_CPU || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
-    make_doubling(choice, &row,
-                  mixed ? &vkb_shader_double_tile_final_mixed_comp
-                        : &vkb_shader_double_tile_final_comp,
-                  mixed ? double_mixed_words : double_final_words,
-                  DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
+    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS, error)
+                : add_linear(choice, &row, columns_linear[format],
+                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
 }

@@ -4,9 +4,9 @@
 
 #include <string.h>
 
-static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_WORDS_BY_FORMAT(blend);
+static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(blend);
 static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
-    VKB_WORDS_BY_FORMAT(threshold);
+    VKB_LINEAR_BY_FORMAT(threshold);
 
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
@@ -29,7 +29,7 @@ static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass
 static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
                         enum vkb_format format, uint32_t read_count)
 {
-    vkb_make_words(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
+    vkb_make_linear(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
     vkb_drop_reads(row, read_count);
 }
 
@@ -43,9 +43,9 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
     memcpy(&row, pass, sizeof row);
     if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
-    else if (vkb_fits_words(choice, pass) && blends(graph, pass))
+    else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(&row, blend_shaders[format], format, 2);
-    else if (vkb_fits_words(choice, pass) && loads_threshold(graph, pass))
+    else if (vkb_fits_linear(choice, pass) && loads_threshold(graph, pass))
         load_pixels(&row, threshold_shaders[format], format, 1);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -27,20 +27,21 @@ void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader
     row->block_height = block_height;
 }
 
-void vkb_make_words(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
-                    uint32_t rows)
+void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
+                     uint32_t rows)
 {
     vkb_make_dispatch(row, shader, ROW_INVOCATIONS * columns, rows);
-    row->reading = VKB_READING_WORDS;
+    row->reading = VKB_READING_LINEAR_TEXELS;
 }
 
-bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    bool fits = choice->device->words;
+    bool fits = choice->device->linear_texels;
 
     for (uint32_t i = 0; i < pass->read_count; ++i) {
         const struct vkb_image_row *row = &choice->graph->images[pass->reads[i]];
-        fits = fits && vkb_image_fits_words(choice->device, row->format, row->width, row->height);
+        fits = fits
+            && vkb_image_fits_linear_texels(choice->device, row->format, row->width, row->height);
     }
     return fits;
 }

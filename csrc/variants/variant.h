@@ -26,8 +26,8 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
 // For derivatives of these by the image.
 vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
-// Levels of exactly half and exactly twice the size.
-vkb_variant_add vkb_add_halved, vkb_add_doubled, vkb_add_doubled_final;
+// Levels of exactly half the size.
+vkb_variant_add vkb_add_halved;
 // The first of these with taps that are weighted by brightness.
 vkb_variant_add vkb_add_halved_taps;
 // First passes of published methods, with taps among 4 x 4 texels of an image of twice the size, or
@@ -37,22 +37,24 @@ vkb_variant_add vkb_add_prefiltered;
 vkb_variant_add vkb_add_shrunk;
 // Blurs of nine taps, of images of the same size and of twice the size.
 vkb_variant_add vkb_add_nine;
-// Filters in strips, also fused with the composite; the sum of several levels that are filtered.
-vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_filter_tiles, vkb_add_gathered;
+// Filters in strips and in tiles, also fused with the composite; the sum of several levels that are
+// filtered.
+vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_filter_tiles,
+    vkb_add_filter_tiles_final, vkb_add_gathered;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
-// Transforms: of complete lines in shared memory; stages of images as words.
+// Transforms: of complete lines in shared memory; stages of images with linear texels.
 vkb_variant_add vkb_add_lines, vkb_add_transform;
-// Adjoint passes: of images as words; transposed filters, in blocks of texels or fused with the
-// composite's.
-vkb_variant_add vkb_add_adjoint_words, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
+// Adjoint passes: of images with linear texels; transposed filters, in blocks of texels or fused
+// with the composite's.
+vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
 // Transposed filters between levels of exactly half and twice the size, in tiles.
 vkb_variant_add vkb_add_adjoint_levels;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;
 
-// The same for images as words.
-#define VKB_WORDS_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_words)
+// The same for images with linear texels.
+#define VKB_LINEAR_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_linear)
 
 // Whether both images store pixels as the same bytes. (R11G11B10 is stored as single floats.)
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
@@ -80,18 +82,18 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
 // Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
 
-// Whether the images that a pass reads are words of single floats.
+// Whether the images that a pass reads have linear texels of single floats.
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height);
-// Turns a pass into a dispatch that accesses its images as words. Each of the ROW_INVOCATIONS
-// invocations of a workgroup writes a block of `columns` x `rows` pixels.
-void vkb_make_words(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
-                    uint32_t rows);
-// Whether all images that the pass accesses are small enough for a view of their words.
-bool vkb_fits_words(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
+// Turns a pass into a dispatch that accesses its images with linear texels. Each of the
+// ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.
+void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
+                     uint32_t rows);
+// Whether all images that the pass accesses are small enough for a view of their linear texels.
+bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 // A pass over all pixels of one target. On CPUs it is drawn if its texels cannot be loaded. On GPUs
 // it is a compute shader, since GPUs that are made for computing draw slowly.
 bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,

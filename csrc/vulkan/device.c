@@ -333,7 +333,7 @@ static bool has_whole_words(const struct vkb_device *device)
     return layout.offset == 0 && layout.rowPitch % VKB_STORE_SIZE == 0;
 }
 
-static bool has_words(const struct vkb_device *device)
+static bool has_linear_texels(const struct vkb_device *device)
 {
     VkFormatProperties properties;
 
@@ -385,15 +385,16 @@ static bool create_handle(struct vkb_device *device, uint32_t adapter, const cha
     if (!(device->workers = vkb_workers_create(error))
         || !(device->allocations = vkb_alloc(error, 1, sizeof *device->allocations))
         || !open_adapter(device, adapter, driver, validation, error)
-        || (device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
-            && !vkb_instance_require_room(device->instance, error))
+        || (device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
+            && !vkb_instance_require_room(
+                device->instance, device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE, error))
         || !vkb_require_room("a device", DEVICE_MIB, error) || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
     device->dispatch = device->dispatch && stores_all(device);
-    device->words = has_words(device);
+    device->linear_texels = has_linear_texels(device);
     return true;
 }
 

@@ -33,7 +33,7 @@ struct vkb_device {
     bool scalar_layout;  // VK_EXT_scalar_block_layout is enabled
     // Colour images have linear tiling and lie in host-visible memory, which shaders also access as
     // buffers of 16-byte words. This is the case on a CPU: its memory is host memory.
-    bool words;
+    bool linear_texels;
     uint64_t timestamp_mask;  // 0: the queue has no timestamps
     bool presents;            // VK_KHR_swapchain is there
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.

@@ -139,7 +139,7 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_buffer_destroy(device, buffer);
         return false;
     }
-    if (device->words && buffer->mapped)
+    if (device->linear_texels && buffer->mapped)
         vkb_advise_large(buffer->mapped, (size_t)size);
     vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
@@ -338,8 +338,8 @@ bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bo
     return true;
 }
 
-static bool create_words(const struct vkb_device *device, struct vkb_image *image,
-                         VkDeviceSize offset, VkDeviceSize size, struct vkb_error *error)
+static bool create_linear_texels(const struct vkb_device *device, struct vkb_image *image,
+                                 VkDeviceSize offset, VkDeviceSize size, struct vkb_error *error)
 {
     return VK(error,
               device->vk.vkCreateBufferView(device->handle,
@@ -350,13 +350,14 @@ static bool create_words(const struct vkb_device *device, struct vkb_image *imag
                                                 .offset = offset,
                                                 .range = size,
                                             },
-                                            NULL, &image->words));
+                                            NULL, &image->linear_texels));
 }
 
-bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
-                     struct vkb_error *error)
+bool vkb_image_linear_texels(const struct vkb_device *device, struct vkb_image *image,
+                             struct vkb_error *error)
 {
-    return image->words || create_words(device, image, 0, image->row_pitch * image->height, error);
+    return image->linear_texels
+        || create_linear_texels(device, image, 0, image->row_pitch * image->height, error);
 }
 
 bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
@@ -384,7 +385,7 @@ bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed
         .buffer = buffer.handle,
     };
     if (offset % device->limits.minTexelBufferOffsetAlignment == 0
-        && create_words(device, image, offset, size, &ignored))
+        && create_linear_texels(device, image, offset, size, &ignored))
         return true;
     vkb_image_destroy(device, image);
     return false;
@@ -401,8 +402,8 @@ size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width)
     return round_up((size_t)width * vkb_pixel_size(format), 256);
 }
 
-bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format format, uint32_t width,
-                          uint32_t height)
+bool vkb_image_fits_linear_texels(const struct vkb_device *device, enum vkb_format format,
+                                  uint32_t width, uint32_t height)
 {
     const uint64_t words = vkb_image_row_pitch(format, width) / VKB_WORD_SIZE;
 
@@ -496,7 +497,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
 
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
 {
-    device->vk.vkDestroyBufferView(device->handle, image->words, NULL);
+    device->vk.vkDestroyBufferView(device->handle, image->linear_texels, NULL);
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
     device->vk.vkDestroyImageView(device->handle, image->base_view, NULL);

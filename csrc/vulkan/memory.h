@@ -36,13 +36,13 @@ struct vkb_image {
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
     uint32_t channels;       // of the mapped pixels; those of the caller may lack the fourth
-    // The mapped pixels as a buffer, and as words.
+    // The mapped pixels as a buffer, and as linear texels.
     VkBuffer buffer;
-    VkBufferView words;  // created at its first use
+    VkBufferView linear_texels;  // created at its first use
 };
 
 // Six layers make a cubemap, unless it is an array. A mapped image has one layer and one level, and
-// its memory is also a buffer; this requires device->words.
+// its memory is also a buffer; this requires device->linear_texels.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;
@@ -107,17 +107,17 @@ bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed
 bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
                     VkImageView *view, struct vkb_error *error);
 
-// Creates the view of a mapped image's words if there is none. The image must be small enough (see
-// vkb_image_fits_words).
-bool vkb_image_words(const struct vkb_device *device, struct vkb_image *image,
-                     struct vkb_error *error);
+// Creates the view of a mapped image's linear texels if there is none. The image must be small
+// enough (see vkb_image_fits_linear_texels).
+bool vkb_image_linear_texels(const struct vkb_device *device, struct vkb_image *image,
+                             struct vkb_error *error);
 
 // An upper bound of the bytes from a row of a mapped image to the next.
 size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width);
 
-// Whether an image of that size is small enough for a view of its words.
-bool vkb_image_fits_words(const struct vkb_device *device, enum vkb_format format, uint32_t width,
-                          uint32_t height);
+// Whether an image of that size is small enough for a view of its linear texels.
+bool vkb_image_fits_linear_texels(const struct vkb_device *device, enum vkb_format format,
+                                  uint32_t width, uint32_t height);
 
 // The layout of the image for that access. A mapped image is always in the general layout.
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,31 +14,27 @@ from vkbloom import testing
 
 WEIGHTS = vkbloom.gaussian_weights(1.5)
 BLUR = vkbloom.Separable(weights=WEIGHTS, blur_strength=1.0)
+Image = NDArray[np.float32]
 
 
-def respond(renderer: vkbloom.Renderer, parameter: str, values: list[float]) -> testing.Response:
-    """Measure the bloom of one lit pixel for each value of a parameter."""
-
-    def bloom(image: NDArray[np.float32], **changes: Any) -> NDArray[np.float32]:
-        return renderer.apply(image, BLUR.replace(**changes))["bloom"]
-
-    return testing.response(bloom, parameter, values)
+def of_settings(renderer: vkbloom.Renderer, settings: vkbloom.Settings) -> Callable[[Image], Image]:
+    """Return the bloom of settings as a function of the image."""
+    return lambda image: renderer.apply(image, settings)["bloom"]
 
 
 def test_the_width_is_proportional_to_blur_scale(bloom_renderer: vkbloom.Renderer) -> None:
     """The variance of the kernel is 2 sum i^2 w_i; a step of s pixels multiplies sigma by s."""
     sigma = math.sqrt(2 * sum(i * i * weight for i, weight in enumerate(WEIGHTS)))
-    found = respond(bloom_renderer, "blur_scale", [1.0, 2.0, 3.0])
-    expected = sigma * np.array(found.values)
-    np.testing.assert_allclose(found.sigma, np.column_stack([expected, expected]), rtol=1e-4)
-    np.testing.assert_allclose(found.gain, 1, rtol=1e-4)
+    for scale in (1.0, 2.0, 3.0):
+        bloom = of_settings(bloom_renderer, BLUR.replace(blur_scale=scale))
+        testing.assert_spread(bloom, scale * sigma, rtol=1e-4)
 
 
 def test_the_gain_follows_from_blur_strength(bloom_renderer: vkbloom.Renderer) -> None:
     """One direction multiplies light by w0 + strength * 2 sum w_i, and there are two."""
-    found = respond(bloom_renderer, "blur_strength", [0.0, 0.5, 1.0, 2.0])
-    expected = (WEIGHTS[0] + np.array(found.values) * 2 * sum(WEIGHTS[1:])) ** 2
-    np.testing.assert_allclose(found.gain, expected, rtol=1e-4)
+    for strength in (0.0, 0.5, 1.0, 2.0):
+        bloom = of_settings(bloom_renderer, BLUR.replace(blur_strength=strength))
+        testing.assert_gain(bloom, (WEIGHTS[0] + strength * 2 * sum(WEIGHTS[1:])) ** 2)
 
 
 def test_intensity_is_linear(

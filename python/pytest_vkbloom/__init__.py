@@ -7,7 +7,6 @@ imported only when a test requests a fixture.
 from __future__ import annotations
 
 import shutil
-from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,17 +15,15 @@ import pytest
 
 if TYPE_CHECKING:
     from vkbloom import Renderer
-    from vkbloom.testing._records import Record
     from vkbloom.testing._regression import FrameRegression
+    from vkbloom.testing._test_report import Record
 
 __all__ = ["bloom_renderer", "frame_regression"]
 
 _RECORDS = pytest.StashKey[list["Record"]]()
 _RUN = pytest.StashKey["_Run"]()
-# Attributes of a test's report, which carry its checks and its module's data from an xdist worker
-# to the controller.
+# Attribute of a test's report, which carries its checks from an xdist worker to the controller.
 _CHECKS = "vkbloom_checks"
-_MODULE = "vkbloom_module"
 _FOLDER = "bloom_references"
 
 
@@ -114,7 +111,6 @@ def pytest_runtest_makereport(
             page = parts.parent / "index.html"
             item.user_properties.append(("bloom_report", str(page)))
             item.add_report_section("call", "stdout", f"[[ATTACHMENT|{page}]]\n")
-    setattr(report, _MODULE, item.config.stash[_RUN].describe(item))
     return report
 
 
@@ -185,10 +181,6 @@ class _Run:
         self._config = config
         self._worker_input: dict[str, Any] | None = getattr(config, "workerinput", None)
         self._records: list[Record] = []
-        # By folder of references: the number of tests of its module, and the tests that passed.
-        self._totals: Counter[str] = Counter()
-        self._passed: dict[str, set[str]] = {}
-        self._partly: set[Path] = set()
         self._page: Path | None = None
         # Why the page could not be written.
         self._reason = ""
@@ -206,39 +198,15 @@ class _Run:
             except OSError as error:
                 raise pytest.UsageError(f"--bloom-report={wanted}: {error.strerror}") from error
 
-    def pytest_deselected(self, items: list[pytest.Item]) -> None:
-        """Note modules with deselected tests, whose references are not reported as unused."""
-        self._partly.update(item.path for item in items)
-
-    def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Count the tests by module."""
-        for argument in session.config.args:
-            path, _, test = argument.partition("::")
-            if test:
-                self._partly.add((session.config.invocation_params.dir / path).resolve())
-        self._totals.update(str(folder_of(item.path)) for item in session.items)
-
-    def describe(self, item: pytest.Item) -> tuple[str, int] | None:
-        """Return a test's folder of references and its number of tests; None if unknown."""
-        if item.path in self._partly:
-            return None
-        folder = str(folder_of(item.path))
-        return folder, self._totals[folder]
-
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Collect the records of a report from this process or a worker."""
         self._records += getattr(report, _CHECKS, [])
-        module = getattr(report, _MODULE, None)
-        if module is not None and report.when == "call" and report.passed:
-            folder, total = module
-            self._totals[folder] = total
-            self._passed.setdefault(folder, set()).add(report.nodeid)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Write the report; if that fails, the summary says so and the run goes on."""
         if self._report is None or self.parts is None or self._worker_input is not None:
             return
-        from vkbloom.testing._report_page import write_report  # noqa: PLC0415  costs start-up time
+        from vkbloom.testing._test_report import write_report  # noqa: PLC0415  costs start-up time
 
         try:
             self._page = write_report(self._report, self.parts, self._records)
@@ -247,7 +215,7 @@ class _Run:
             session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List written, missing and unused references, and the report's path."""
+        """List written and missing references, and the report's path."""
         suffix = ".hashes" if self._config.getoption("bloom_hash") else ".json"
         lines = [
             f"{record['outcome']}: "
@@ -255,7 +223,6 @@ class _Run:
             for record in self._records
             if record["outcome"] in ("written", "missing")
         ]
-        lines += [f"unused: {self._relative(file)}" for file in self._unused()]
         if self._page is not None:
             lines.append(f"report: {self._relative(self._page)}")
         if self._reason:
@@ -264,29 +231,6 @@ class _Run:
             terminalreporter.section("vkbloom")
             for line in lines:
                 terminalreporter.write_line(line)
-
-    def _unused(self) -> list[Path]:
-        """Find references that no test used, in modules whose tests all ran and passed."""
-        used = {
-            (record["folder"], record["name"]) for record in self._records if record["has_files"]
-        }
-        unused: list[Path] = []
-        for folder, tests in self._passed.items():
-            if len(tests) != self._totals[folder]:
-                continue
-            unused += (
-                file
-                for file in Path(folder).glob("*.json")
-                if (folder, file.name.removesuffix(".json")) not in used
-            )
-        for parent in {Path(folder).parent for folder in self._passed}:
-            if parent.is_dir():
-                unused += (
-                    folder
-                    for folder in parent.iterdir()
-                    if folder.is_dir() and not (parent.parent / f"{folder.name}.py").exists()
-                )
-        return sorted(unused)
 
     def _relative(self, path: Path) -> str:
         """Shorten a path for the terminal."""

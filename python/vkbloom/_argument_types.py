@@ -14,21 +14,6 @@ import numpy as np
 
 from vkbloom._checks import as_float
 
-__all__ = [
-    "ANY",
-    "FLAG",
-    "FUNCTION",
-    "INTEGER",
-    "MANY_SETTINGS",
-    "MAPPING",
-    "NAMES",
-    "NUMBER",
-    "PATH",
-    "SETTINGS",
-    "checked",
-    "checked_as",
-]
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Test = Callable[[Any], bool]
 

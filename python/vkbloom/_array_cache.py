@@ -9,8 +9,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, Final, Protocol, TypeVar, cast
 
-__all__ = ["ArrayCache", "kept", "shared"]
-
 #: The bound while a renderer is open, as that of the core's images. The last array that was made
 #: stays whatever its size, since a plan holds it anyway.
 OPEN_BYTES: Final = 256 << 20

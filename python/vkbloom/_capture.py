@@ -14,8 +14,6 @@ from vkbloom._argument_types import checked
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 
-__all__ = ["capture"]
-
 _VERSION: Final = 10102  # 1.1.2 of the API: RenderDoc 1.0
 # Of the pointers in RENDERDOC_API_1_1_2 (renderdoc_app.h).
 _SET_TEMPLATE, _COUNT, _GET, _START, _END = 11, 13, 14, 19, 21

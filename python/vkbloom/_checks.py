@@ -19,25 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "FLT_MAX",
-    "as_float",
-    "check_above",
-    "check_emission",
-    "check_floats",
-    "check_framebuffers",
-    "check_image",
-    "check_index",
-    "check_integer",
-    "check_mask",
-    "check_number",
-    "check_size",
-    "check_time",
-    "import_extra",
-    "native_order",
-    "on_another_device",
-]
-
 #: The largest 32-bit float; the device computes in 32-bit floats.
 FLT_MAX = (2 - 2**-23) * 2.0**127
 

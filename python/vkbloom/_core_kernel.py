@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CoreKernel", "core_kernel"]
-
 
 class CoreKernel(NamedTuple):
     """A kernel as the core reads it.

@@ -7,8 +7,6 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-__all__ = ["Framebuffers", "MadeWith", "dimensions", "leading"]
-
 
 class MadeWith(Protocol):
     """The part of `Settings` that viewers and writers of framebuffers use."""

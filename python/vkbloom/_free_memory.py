@@ -11,8 +11,6 @@ from typing import Final
 if sys.platform != "win32":
     import resource
 
-__all__ = ["ADVICE", "address_space_left", "memory_left"]
-
 #: What helps where memory is short.
 ADVICE: Final = (
     "raise the limit (ulimit -v), close other programs, or use less memory: half floats (--half), "

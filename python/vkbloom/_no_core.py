@@ -12,8 +12,6 @@ from importlib.resources import files
 from types import ModuleType
 from typing import Any
 
-__all__ = ["stand_in"]
-
 
 def stand_in(reason: ImportError) -> ModuleType:
     """Return a module with the names of the core, which is also `vkbloom._core` from now on."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
-__all__ = ["Named", "did_you_mean", "lacking", "nearest", "unknown"]
-
 T = TypeVar("T")
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 
-__all__ = ["installed_version"]
-
 
 @functools.cache
 def installed_version() -> str:

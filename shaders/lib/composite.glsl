@@ -52,14 +52,14 @@ float blend_alpha(float alpha, vec4 bloom)
 }
 
 // NaN and infinity of the scene stay in their own pixels and channels: some curves would change
-// them, and curves that mix channels would spread them. (In words finished() keeps them.)
+// them, and curves that mix channels would spread them. (With linear texels finished() keeps them.)
 vec4 encoded(vec4 scene, vec4 bloom, vec3 toned, ivec2 pixel)
 {
     vec3 result = apply_encoding(toned, ENCODING, params.reference_white);
     if (DITHER != 0)
         result = dithered(result, pixel, params.noise_seed);
     result = storable(result);
-#ifndef WORDS
+#ifndef LINEAR_TEXELS
     result = mix(scene.rgb, result, is_finite(scene.rgb));
 #endif
     return vec4(result, blend_alpha(scene.a, bloom));

@@ -1,11 +1,11 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture
 // before exposure and curves, from those of the finished one, the image at ENDED_BINDING. ENDED_TARGET is the
-// binding of the target. The including shader has composite.glsl and, for words, pixels.glsl.
+// binding of the target. The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifdef MIXED
 #include "lib/where_finite.glsl"
 #include "lib/adjoint_composite.glsl"
 #define ENDED_TARGET (ENDED_BINDING + 1)
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 READ_IMAGE(ENDED_BINDING, cotangents);
 vec4 cotangent_at(ivec2 pixel)
 {
@@ -32,7 +32,7 @@ vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 #endif
 }
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 uvec4 ended(uvec4 own, vec4 bloom, ivec2 pixel)
 {
     vec4 value = ended(value_of(own), bloom, pixel);

@@ -2,7 +2,7 @@
 
 bvec3 is_finite(vec3 value)
 {
-#if defined(WORDS) && CHANNEL_BYTES == 1
+#if defined(LINEAR_TEXELS) && CHANNEL_BYTES == 1
     return bvec3(true);
 #endif
     uvec3 bits = FINITE != 0 ? uvec3(0) : floatBitsToUint(value);

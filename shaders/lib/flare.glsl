@@ -2,46 +2,24 @@
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-// The texel at an offset from the centre, in texels, and how far the offset is beyond its centre, in
-// `part`. The offset is not added to the size of the image first, which would round it.
-ivec2 texel_from_centre(vec2 offset, out vec2 part)
+// The source at an offset from the centre, in texels. The offset is not added to the size of the image first,
+// which would round it.
+vec4 sample_from_centre(vec2 offset)
 {
     vec2 centre = 0.5 * vec2(textureSize(source, 0)) - 0.5, start = floor(centre);
     vec2 moved = centre - start + offset, integer = floor(moved);
-    part = moved - integer;
-    return ivec2(start + integer);
-}
-
-// The source there.
-vec4 sample_from_centre(vec2 offset)
-{
-    vec2 part;
-    ivec2 texel = texel_from_centre(offset, part);
-    vec4 four[4] = vec4[4](
-        fetch_inside(source, texel), fetch_inside(source, texel + ivec2(1, 0)),
-        fetch_inside(source, texel + ivec2(0, 1)), fetch_inside(source, texel + ivec2(1, 1)));
-    return bilinear(four, part);
-}
-
-// Whether red (-1) and blue (1) are sampled at other places than green, and the place of each.
-bool is_aberrated(vec2 offset)
-{
-    return params.aberration > 0.0 && length(offset / vec2(textureSize(source, 0))) > 0.0;
-}
-
-vec2 aberrated(vec2 offset, float side)
-{
-    float distance = length(offset / vec2(textureSize(source, 0)));
-    return offset + side * (params.aberration / distance * offset);
+    return bilinear(fetch_four_inside(source, ivec2(start + integer)), moved - integer);
 }
 
 // The same with red and blue moved along the radius.
 vec4 colours_from_centre(vec2 offset)
 {
     vec4 value = sample_from_centre(offset);
-    if (is_aberrated(offset)) {
-        value.r = sample_from_centre(aberrated(offset, -1.0)).r;
-        value.b = sample_from_centre(aberrated(offset, 1.0)).b;
+    float distance = length(offset / vec2(textureSize(source, 0)));
+    if (params.aberration > 0.0 && distance > 0.0) {
+        vec2 moved = params.aberration / distance * offset;
+        value.r = sample_from_centre(offset - moved).r;
+        value.b = sample_from_centre(offset + moved).b;
     }
     return value;
 }
@@ -85,16 +63,4 @@ float vignette(vec2 place)
     vec2 corner = 2.0 * place / vec2(textureSize(source, 0));
     float squared = dot(corner, corner);
     return mix(1.0, min(squared * squared, 1.0), params.vignette);
-}
-
-// A halo has no ghosts.
-bool is_halo()
-{
-    return params.count == 0;
-}
-
-// What a halo or a ghost samples for a place.
-vec2 flare_offset(int ghost, vec2 place)
-{
-    return is_halo() ? halo_offset(place) : params.ghosts[ghost].w * place;
 }

@@ -1,8 +1,8 @@
-// Discrete Fourier transforms of up to FFT_MOST_RADIX elements in named registers: of `held`, whose
+// Discrete Fourier transforms of up to FFT_MAX_RADIX elements in named registers: of `held`, whose
 // elements are two complex numbers each. All loops are unrolled, so that no index is known only at run
 // time.
 #ifndef FFT_HELD
-#define FFT_HELD FFT_MOST_RADIX
+#define FFT_HELD FFT_MAX_RADIX
 #endif
 
 vec2 conjugate(vec2 value)

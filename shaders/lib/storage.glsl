@@ -27,7 +27,7 @@ vec3 from_level(vec3 level, int format)
 
 vec3 storable(vec3 value)
 {
-#if defined(WORDS) && CHANNEL_BYTES < 4
+#if defined(LINEAR_TEXELS) && CHANNEL_BYTES < 4
     // pixels.glsl rounds where it packs.
     return value;
 #else

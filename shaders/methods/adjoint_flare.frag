@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The cotangents of what a halo, or a ghost of number LEVELS, samples.
+// The cotangents of what a ghost of number LEVELS samples.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 #include "lib/sampling.glsl"
@@ -20,9 +20,9 @@ layout(set = 0, binding = 2) uniform sampler2D cotangents;
 vec4 shade()
 {
     vec2 place = FROM_CENTRE;
-    vec4 value = colours_from_centre(flare_offset(LEVELS, place));
+    vec4 value = sample_from_centre(params.ghosts[LEVELS].w * place);
     vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
-    cotangent *= is_halo() ? vec4(halo_factor(place)) : ghost_factor(LEVELS, place) * vignette(place);
+    cotangent *= ghost_factor(LEVELS, place) * vignette(place);
     cotangent.rgb *= larger(vec4(params.maximum), above_threshold(value)).rgb;
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;

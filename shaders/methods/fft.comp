@@ -24,7 +24,7 @@ UNIFORM_BLOCK(FFT_BLOCK);
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, factor);
-#ifndef WORDS
+#ifndef LINEAR_TEXELS
 layout(set = 0, binding = 3) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4
 layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec4 texels[]; } target;
@@ -43,8 +43,8 @@ ivec2 texel_at(int along, int across)
 
 vec4 load_source(ivec2 at)
 {
-#ifdef WORDS
-    return load_pixel(source, words.reads[0], at.x, at.y);
+#ifdef LINEAR_TEXELS
+    return load_pixel(source, shapes.reads[0], at.x, at.y);
 #else
     return imageLoad(source, at);
 #endif
@@ -52,8 +52,8 @@ vec4 load_source(ivec2 at)
 
 vec4 load_factor(ivec2 at)
 {
-#ifdef WORDS
-    return uintBitsToFloat(texelFetch(factor, at.y * words.reads[1].z + at.x));
+#ifdef LINEAR_TEXELS
+    return uintBitsToFloat(texelFetch(factor, at.y * shapes.reads[1].z + at.x));
 #else
     return imageLoad(factor, at);
 #endif
@@ -61,18 +61,18 @@ vec4 load_factor(ivec2 at)
 
 void store(ivec2 at, vec4 value)
 {
-#ifndef WORDS
+#ifndef LINEAR_TEXELS
     imageStore(target, at, value);
 #elif TARGET_BYTES == 4
     // (Without the maximum LLVM packs lane by lane.)
-    target.texels[at.y * words.target.z + at.x] = max(floatBitsToUint(value), uvec4(words.reads[0].w));
+    target.texels[at.y * shapes.target.z + at.x] = max(floatBitsToUint(value), uvec4(shapes.reads[0].w));
 #elif TARGET_BYTES == 2
     uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * words.target.z + at.x] = max(bits, uvec2(words.reads[0].w));
+    target.texels[2 * at.y * shapes.target.z + at.x] = max(bits, uvec2(shapes.reads[0].w));
 #else
     // A sum with 2^23 is rounded to an integer, which its last bits are.
     uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;
-    target.texels[4 * at.y * words.target.z + at.x] =
+    target.texels[4 * at.y * shapes.target.z + at.x] =
         level.r | level.g << 8 | level.b << 16 | level.a << 24;
 #endif
 }
@@ -90,7 +90,7 @@ void transform_held(bool inverse)
 }
 
 // exp(-2 pi i k q / n), or its inverse, for q of 0 to RADIX - 1.
-vec2 turns[FFT_MOST_RADIX];
+vec2 turns[FFT_MAX_RADIX];
 
 void compute_turns(int k, int n, bool inverse)
 {
@@ -119,7 +119,7 @@ void store_line(int first, int across)
 
 void multiply_grey(int first, int across)
 {
-    vec4 values[FFT_MOST_RADIX];
+    vec4 values[FFT_MAX_RADIX];
     [[unroll]] for (int i = 0; i < RADIX; ++i)
         values[i] = rotated(held[place_of(i)], load_factor(texel_at(first + i, across)).xy);
     [[unroll]] for (int i = 0; i < RADIX; ++i)
@@ -181,7 +181,7 @@ void multiply_colours(int number, int index)
     int other_number = mirrored(number, blocks, params.count);
     int frequency = frequency_at(across, rows), other = (params.row_length - frequency) % params.row_length;
     bool own = number == 0;
-    vec4 values[FFT_MOST_RADIX], others[FFT_MOST_RADIX];
+    vec4 values[FFT_MAX_RADIX], others[FFT_MAX_RADIX];
 
     if (frequency > other || (frequency == other && number > other_number))
         return;

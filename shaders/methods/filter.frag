@@ -7,7 +7,6 @@
 
 UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
-#include "lib/doubling.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D own;
@@ -35,26 +34,11 @@ vec4 halved()
     return sum;
 }
 
-// The tent, or one bilinear tap, for a level of exactly twice the size of the smaller one.
-vec4 doubled()
-{
-    ivec2 first = (PIXEL + 1) / 2 - 2;
-    vec4 rows[4];
-    for (int y = 0; y < 4; ++y) {
-        vec4 texels[4];
-        for (int x = 0; x < 4; ++x)
-            texels[x] = fetch_clamped(source, first + ivec2(x, y));
-        rows[y] = four(texels[0], texels[1], texels[2], texels[3], (PIXEL.x & 1) == 1);
-    }
-    return four(rows[0], rows[1], rows[2], rows[3], (PIXEL.y & 1) == 1);
-}
-
 vec4 shade()
 {
     if (EXACT == EXACT_HALF)
         return stored(halved());
-    vec4 sum =
-        params.coarse * (EXACT == EXACT_DOUBLE ? doubled() : filtered(source) / params.divisor);
+    vec4 sum = params.coarse * (filtered(source) / params.divisor);
     if (ADD_OWN != 0)
         sum += params.own * texelFetch(own, PIXEL, 0);
     return stored(sum);

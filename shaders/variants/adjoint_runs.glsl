@@ -1,9 +1,9 @@
-// The images of an adjoint pass that writes runs of COLUMNS pixels, as words or, on GPUs, as samplers,
+// The images of an adjoint pass that writes runs of COLUMNS pixels, as linear texels or, on GPUs, as samplers,
 // and how it ends (see lib/adjoint.glsl). ADDED and DIFFERENTIATED are the bindings of its last two
 // images. FETCH loads a pixel of the image at a binding.
 #include "lib/where_finite.glsl"
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 #define READ_FLOATS(number, name) READ_IMAGE(number, name)
 #define FETCH(name, number, x, y) load_floats(name, read_shapes[number - 1], x, y)
 #else
@@ -13,7 +13,7 @@
 
 READ_FLOATS(ADDED, added);
 READ_FLOATS(DIFFERENTIATED, differentiated);
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 WRITE_IMAGE(DIFFERENTIATED + 1);
 #define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
@@ -32,7 +32,7 @@ vec4 gathered(int x, int y, float share, vec4 found)
 // Stores the cotangents of a run of pixels.
 void store_gathered(int first, int row, float share, vec4 found[COLUMNS])
 {
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
     uvec4 raw[COLUMNS];
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = floatBitsToUint(

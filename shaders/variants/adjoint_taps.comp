@@ -17,7 +17,7 @@ UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
 const int COLUMNS = ADJOINT_SIDE, SPAN_X = RADIX_1 + 1, SPAN_Y = RADIX_2 + 1;
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 const int ROWS = ADJOINT_ROWS;
 layout(local_size_x = ROW_INVOCATIONS) in;
 #else
@@ -39,7 +39,7 @@ vec4 entry(int place)
 
 vec4 cotangent_at(int x, int y)
 {
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
     int column = min(x, read_shapes[0].x - 1), row = min(y, read_shapes[0].y - 1);
 #else
     ivec2 last = textureSize(cotangents, 0) - 1;
@@ -129,7 +129,7 @@ void across(ivec2 first, int end, ivec2 start, float gain, float share)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 size = TARGET_SIZE(), first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);
     ivec2 start = ivec2(params.start_x, params.start_y);

@@ -17,7 +17,7 @@
 
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/storage.glsl"
-#define FFT_HELD FFT_MOST_GROUP_RADIX
+#define FFT_HELD FFT_MAX_GROUP_RADIX
 #include "lib/fourier.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
@@ -220,7 +220,7 @@ vec4 separated(vec2 value, vec2 mirror)
 
 void store_separated(int radix)
 {
-    vec2 mirrors[FFT_MOST_GROUP_RADIX];
+    vec2 mirrors[FFT_MAX_GROUP_RADIX];
     [[unroll]] for (int pair = 0; pair < 2; ++pair) {
         [[unroll]] for (int part = 0; part < 2; ++part) {
             leave(2 * pair + part, radix, LENGTH / radix);
@@ -245,7 +245,7 @@ void multiply(int radix)
     int columns = half_columns(params.row_length);
     int line = min(across, params.across - 1);
     int column = STAGE == STAGE_GREY && line >= columns ? line - columns : line;
-    vec4 values[FFT_MOST_GROUP_RADIX];
+    vec4 values[FFT_MAX_GROUP_RADIX];
     [[unroll]] for (int i = 0; i < radix; ++i) {
         vec4 value = held[place_of(i, radix)];
         vec4 by = imageLoad(factor, ivec2(column, place_at(i, radix)));

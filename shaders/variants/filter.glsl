@@ -1,7 +1,8 @@
 // A filter of an image of any size in strips. An invocation writes a strip from top to bottom. It filters
 // each row of the source along the row once, for each kernel, and keeps the filtered rows that a pixel
-// needs. The including shader includes sampling.glsl and nested.glsl, and defines seen(), by which texels
-// are changed.
+// needs. Where the sizes of the images along an axis are in a simple ratio (EXACT, EXACT_ROWS), positions have one
+// or two PHASES, whose weights are computed once. The including shader includes sampling.glsl and nested.glsl,
+// and defines seen(), by which texels are changed.
 #include "lib/filter.glsl"
 
 const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES);
@@ -10,8 +11,7 @@ const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
 #include "variants/own.glsl"
 
-// The texels of a row are a run where the width of the source is in a simple ratio (EXACT) to the target's.
-// The compiler removes loads that no window needs.
+// The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
 const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 #define LOAD load_run
 #define LOAD_IMAGE source
@@ -20,10 +20,16 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"
 
-Window windows[COLUMNS];
+// Windows whose weights depend on the place, too, are computed for each column.
+const bool HAS_BORDER = IS_INSET || UPSAMPLE == UPSAMPLE_INSIDE;
+const int PHASES = EXACT == 0 ? COLUMNS : HAS_BORDER ? COLUMNS : EXACT == EXACT_DOUBLE ? 2 : 1;
+// The rows of the source and of the target that are next to each other in the same way again.
+const int ROWS_IN = EXACT_ROWS == EXACT_HALF ? 2 : 1, ROWS_OUT = EXACT_ROWS == EXACT_DOUBLE ? 2 : 1;
+const int KEPT_ROWS = KEPT + ROWS_OUT - 1;
+
+Window windows[PHASES];
 // (A constant that is given at random may be 0, an array's length not.)
-const int KEPT_ROWS = KEPT * KERNELS > 0 ? KEPT * KERNELS : 1;
-vec4 rows[KEPT_ROWS][COLUMNS];
+vec4 rows[KEPT_ROWS * KERNELS > 0 ? KEPT_ROWS * KERNELS : 1][COLUMNS];
 
 // The texel at or before the position of a column, in texels of the run.
 int texel_in_run(int column)
@@ -49,51 +55,68 @@ void add_row(int row, int first)
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
             uvec4 texel = EXACT != 0 ? raw[texel_in_run(i) + 1 - KEPT / 2 + at]
                                       : raw_pixel(source, read_shapes[0],
-                                                  clamp(windows[i].first + at, 0, last), line);
+                                                  clamp(windows[i % PHASES].first + at, 0, last), line);
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-                sums[kernel] += windows[i].weights[at][kernel] * seen(texel);
+                if (has_weight(TAKEN_X, at, kernel))
+                    sums[kernel] += windows[i % PHASES].weights[at][kernel] * seen(texel);
         }
-        [[unroll]] for (int kept = KERNELS; kept < KEPT * KERNELS; ++kept)
+        [[unroll]] for (int kept = KERNELS; kept < KEPT_ROWS * KERNELS; ++kept)
             rows[kept - KERNELS][i] = rows[kept][i];
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            rows[(KEPT - 1) * KERNELS + kernel][i] = sums[kernel];
+            rows[(KEPT_ROWS - 1) * KERNELS + kernel][i] = sums[kernel];
     }
 }
 
-vec4 column_of(Window window, int i)
+// Writes a row of the target from the rows that are kept, from `start` on.
+void write_row(int first, int y, Window window, int start, float coarse, float shares)
 {
-    vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
-    [[unroll]] for (int row = 0; row < KEPT; ++row)
-        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            sums[kernel] += window.weights[row][kernel] * rows[row * KERNELS + kernel][i];
-    return sum_of(sums);
+    uvec4 raw[COLUMNS];
+
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        raw[i] = uvec4(0);
+    if (HAS_OWN)
+        load_own(first, y, raw);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
+        [[unroll]] for (int row = 0; row < KEPT; ++row)
+            [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+                if (has_weight(TAKEN_Y, row, kernel))
+                    sums[kernel] += window.weights[row][kernel] * rows[(start + row) * KERNELS + kernel][i];
+        raw[i] = shade(raw[i], coarse * (sum_of(sums) / shares), ivec2(first + i, y));
+    }
+    store(first, y, raw);
 }
 
-void main()
+void write_in_phases(ivec2 first, int end, vec2 ratio)
 {
-    read_words();
-    ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, WINDOW_ROWS));
-    int end = min(first.y + WINDOW_ROWS, size.y);
+    ivec2 source_size = READ_SIZE(source, 1);
+    float coarse = params.coarse, shares = params.divisor;
+    Window phases[ROWS_OUT];
+
+    [[unroll]] for (int i = 0; i < ROWS_OUT; ++i)
+        phases[i] = window_of(axis_y(place_in_size(source_size, ivec2(0, i), TARGET_SIZE()), source_size, ratio),
+                              KEPT, false);
+    int start = first.y / ROWS_OUT;
+    for (int y = start - (KEPT_ROWS - 1) / ROWS_IN; y < end / ROWS_OUT; ++y) {
+        [[unroll]] for (int i = 1; i <= ROWS_IN; ++i)
+            add_row(ROWS_IN * (y - 1) + KEPT / 2 + i, first.x);
+        if (y < start)
+            continue;
+        [[unroll]] for (int i = 0; i < ROWS_OUT; ++i)
+            write_row(first.x, ROWS_OUT * y + i, phases[i], i, coarse, shares);
+    }
+}
+
+void write_strip(ivec2 first, int end, vec2 ratio)
+{
     // The position as in place_in_size(), but with a rest in place of a quotient for each row.
-    uint height = uint(source_size.y);
+    uint height = uint(READ_SIZE(source, 1).y);
     uint divisor = 2u * uint(params.target_height);
     uint number = uint(2 * first.y + 1) * height + divisor / 2u;
     uint rest = number % divisor;
     int texel = int(number / divisor) - 1, row = texel - KEPT / 2;
-    vec2 ratio = vec2(source_size.x, height) / vec2(params.target_width, params.target_height);
     float coarse = params.coarse, shares = params.divisor;
-    uvec4 raw[COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        Place place = place_in_size(source_size, ivec2(first.x + i, 0), size);
-        windows[i] = window_of(within_border(axis_x(place, source_size, ratio)), KEPT, true);
-        raw[i] = uvec4(0);
-        [[unroll]] for (int kept = 0; kept < KEPT * KERNELS; ++kept)
-            rows[kept][i] = vec4(0.0);
-    }
     for (int y = first.y; y < end;) {
         // A position has at least one new row if the target is not higher than the source. llvmpipe runs
         // what a loop contains once more than it must if the condition comes first.
@@ -103,13 +126,8 @@ void main()
         // If it is not smaller, a row has at least one position.
         do {
             Axis axis = within_border(
-                Axis(texel, float(rest) / float(divisor), source_size.y, ratio.y));
-            Window window = window_of(axis, KEPT, false);
-            if (HAS_OWN)
-                load_own(first.x, y, raw);
-            [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-                raw[i] = shade(raw[i], coarse * (column_of(window, i) / shares), ivec2(first.x + i, y));
-            store(first.x, y, raw);
+                Axis(texel, float(rest) / float(divisor), int(height), ratio.y));
+            write_row(first.x, y, window_of(axis, KEPT, false), 0, coarse, shares);
             rest += 2u * height;
             ++y;
         } while (ENLARGED != 0 && rest < divisor && y < end);
@@ -117,4 +135,27 @@ void main()
         rest -= moved * divisor;
         texel += int(moved);
     }
+}
+
+void main()
+{
+    copy_shapes();
+    ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
+    ivec2 first = first_pixel(ivec2(COLUMNS, WINDOW_ROWS));
+    int end = min(first.y + WINDOW_ROWS, size.y);
+    vec2 ratio = vec2(source_size) / vec2(params.target_width, params.target_height);
+
+    if (any(greaterThanEqual(first, size)))
+        return;
+    [[unroll]] for (int i = 0; i < PHASES; ++i) {
+        Place place = place_in_size(source_size, ivec2(first.x + i, 0), size);
+        windows[i] = window_of(within_border(axis_x(place, source_size, ratio)), KEPT, true);
+    }
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        [[unroll]] for (int kept = 0; kept < KEPT_ROWS * KERNELS; ++kept)
+            rows[kept][i] = vec4(0.0);
+    if (EXACT_ROWS != 0)
+        write_in_phases(first, end, ratio);
+    else
+        write_strip(first, end, ratio);
 }

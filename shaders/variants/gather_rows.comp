@@ -29,7 +29,7 @@ vec4 filter_row(Window window, int line)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(GATHER_COLUMNS, GATHER_ROWS));
     int end = min(first.y + GATHER_ROWS, size.y);

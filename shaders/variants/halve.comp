@@ -13,8 +13,8 @@ UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-#ifdef WORDS
-const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
+#ifdef LINEAR_TEXELS
+const int COLUMNS = HALVE_LINEAR_COLUMNS, ROWS = HALVE_LINEAR_ROWS;
 #else
 const int COLUMNS = HALVE_COLUMNS, ROWS = HALVE_ROWS;
 #define INVOCATIONS HALVE_INVOCATIONS
@@ -28,7 +28,7 @@ const int LOADED = 2 * COLUMNS + 4;
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);

@@ -14,7 +14,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/groups.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = HALVE_WORDS_COLUMNS, ROWS = HALVE_WORDS_ROWS;
+const int COLUMNS = HALVE_LINEAR_COLUMNS, ROWS = HALVE_LINEAR_ROWS;
 const int LOADED = 2 * COLUMNS + 4;
 const int OUTER = COLUMNS + 2, INNER = COLUMNS + 1;
 
@@ -28,7 +28,7 @@ vec4 middle(vec4 a, vec4 b)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);

@@ -19,7 +19,7 @@
 
 void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
 {
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
     const int BYTES = LOAD_CHANNELS * CHANNEL_BYTES;
     const int BEFORE = (15 - LOAD_FROM * BYTES) / 16;
     const int COUNT = BEFORE + ((LOAD_FROM + LOAD_COUNT) * BYTES + 15) / 16;

@@ -32,7 +32,7 @@ void take_sample(int x, int y, out vec4 taken[COLUMNS])
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     vec4 sums[ROWS][COLUMNS];

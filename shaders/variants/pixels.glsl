@@ -1,4 +1,4 @@
-// How variants load and store runs of pixels. With WORDS (on CPUs) an image is a buffer of 16-byte
+// How variants load and store runs of pixels. With LINEAR_TEXELS (on CPUs) an image is a buffer of 16-byte
 // words, since llvmpipe loads a word nearly as fast as one channel. Otherwise it is a storage image.
 // Include storage.glsl before this file.
 //
@@ -21,12 +21,12 @@
 //   read before the loop: in a loop or after a return, Mesa 22.3 loads them for each invocation.
 // - A float becomes an integer by a sum with 2^23, and a stored word is the maximum of itself and a zero that
 //   the compiler does not know. Else Mesa 25 converts, and LLVM packs, lane by lane.
-// - What is used after a store is copied to variables before the first (read_words): it would be loaded again.
+// - What is used after a store is copied to variables before the first (copy_shapes): it would be loaded again.
 // - Minima and maxima are of integers: of floats they take three operations, because of NaN. A half float is
 //   rounded and packed in one (nearest_half_bits): packHalf2x16 takes forty operations.
 // - A storage buffer reaches maxStorageBufferRange bytes: a larger target takes several dispatches.
 //
-// A `raw` pixel has its channels as bits: with WORDS the bits of CHANNEL_BYTES bytes for each
+// A `raw` pixel has its channels as bits: with LINEAR_TEXELS the bits of CHANNEL_BYTES bytes for each
 // channel, otherwise the bits of single floats. load.glsl and store.glsl define the functions.
 
 // Channels of the source in memory: 3 where it is the caller's array and has no alpha.
@@ -41,7 +41,7 @@
 #define TARGET_CHANNELS 4
 #endif
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 
 // In 64-bit integers: llvmpipe stores one integer after the other, for one invocation after the
 // other. Runs of 24 and 32 bytes need less of its work for each byte than words.
@@ -50,23 +50,23 @@
 #define RUNS(number, type, name) \
     layout(set = 0, binding = number, scalar) writeonly buffer type##_runs { type runs[]; } name
 
-layout(push_constant) uniform Words {
+layout(push_constant) uniform Shapes {
     ivec4 target;    // width, height, words in a row, first row of the bound buffer
     // By binding, from 1 on: width, height, words in a row; of the first also a 0 that compilers do
     // not know.
     ivec4 reads[GATHERED_LEVELS];
-} words;
+} shapes;
 
 // Copies of the members that are used after a store. After a store compilers load a constant again,
 // lane by lane.
 ivec4 target_shape, read_shapes[GATHERED_LEVELS];
 uint unknown_zero;
 
-void read_words()
+void copy_shapes()
 {
-    target_shape = words.target;
-    read_shapes = words.reads;
-    unknown_zero = uint(words.reads[0].w);
+    target_shape = shapes.target;
+    read_shapes = shapes.reads;
+    unknown_zero = uint(shapes.reads[0].w);
 }
 
 // Eight bytes of the target. Without the maximum, LLVM packs lane by lane in the loop that stores.
@@ -77,7 +77,7 @@ uint64_t eighth(uvec2 value)
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
 #define WRITE_IMAGE(number) \
-    RUNS(number, u64vec2, words_of_target); \
+    RUNS(number, u64vec2, runs_of_target); \
     RUNS(number, u64vec3, triples_of_target); \
     RUNS(number, u64vec4, pairs_of_target)
 #define READ_SIZE(name, number) (read_shapes[number - 1].xy)
@@ -95,7 +95,7 @@ uint64_t eighth(uvec2 value)
 #define TARGET_SIZE() imageSize(target)
 #define FIRST_ROW() 0
 
-void read_words()
+void copy_shapes()
 {
 }
 
@@ -196,7 +196,7 @@ uvec4 finished(uvec4 own, vec4 value)
     return result;
 }
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 
 // The pixel at this place of a row, from its word.
 uvec4 pixel_of(uvec4 word, int at)
@@ -211,7 +211,7 @@ uvec4 pixel_of(uvec4 word, int at)
 #endif
 }
 
-// A pixel anywhere in an image of this shape (see Words).
+// A pixel anywhere in an image of this shape (see Shapes).
 uvec4 raw_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
 {
     return pixel_of(texelFetch(image, row * shape.z + at * CHANNEL_BYTES / 4), at);

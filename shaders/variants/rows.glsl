@@ -3,7 +3,7 @@
 // pixels of one row.
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);

@@ -101,7 +101,7 @@ vec4 prefiltered(int i, Line line, vec4 shares)
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, SHRINK_ROWS));
     int end = min(first.y + SHRINK_ROWS, size.y);

@@ -2,7 +2,7 @@
 // TARGET_CHANNELS channels (4 in a storage image). With four channels the pixels are a multiple of 16
 // bytes, with three of 24.
 
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
 // Four bytes of the run in memory, from 4 * number on.
 uint quarter_of(uvec4 raw[STORE_COUNT], int number)
 {
@@ -26,7 +26,7 @@ uint quarter_of(uvec4 raw[STORE_COUNT], int number)
 void store_run(int at, int count, uvec2 part[4])
 {
     if (count == 2)
-        words_of_target.runs[at] = u64vec2(eighth(part[0]), eighth(part[1]));
+        runs_of_target.runs[at] = u64vec2(eighth(part[0]), eighth(part[1]));
     else if (count == 3)
         triples_of_target.runs[at] = u64vec3(eighth(part[0]), eighth(part[1]), eighth(part[2]));
     else
@@ -70,7 +70,7 @@ void store_at(int at, int first, uvec4 raw[STORE_COUNT])
 
 void store(int first, int row, uvec4 raw[STORE_COUNT])
 {
-#ifdef WORDS
+#ifdef LINEAR_TEXELS
     store_at(run_at(first, row), first, raw);
 #else
     [[unroll]] for (int i = 0; i < STORE_COUNT; ++i) {

@@ -71,7 +71,7 @@ void load_moved(int first, int row, out uvec4 raw[COLUMNS + 1])
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 size = TARGET_SIZE();
     ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     int end = min(first.y + ROWS, size.y);

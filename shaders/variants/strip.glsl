@@ -152,7 +152,7 @@ ivec2 first_of_strip()
 
 void main()
 {
-    read_words();
+    copy_shapes();
     ivec2 size = READ_SIZE(source, 1);
     ivec2 first = first_of_strip();
     int end = min(first.x + params.columns, size.x);

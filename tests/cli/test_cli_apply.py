@@ -12,9 +12,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import some
 from tests.io.parts import written
-from tests.processes import python
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 from vkbloom._io.image_writing import save
@@ -237,20 +235,6 @@ class TestErrors:
         result = run(file, tmp_path / "b.png")
         assert result.exit_code == 1
         assert f"vkbloom.write('image.exr', numpy.load('{file}'))" in result.stderr
-
-    @pytest.mark.parametrize("suffix", some(["png", "exr", "tif", "jpg"], 2))
-    def test_libraries_are_silenced(self, tmp_path: Path, suffix: str) -> None:
-        path = tmp_path / f"a.{suffix}"
-        values = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
-        save(Picture.of_values(values), path)
-        content = path.read_bytes()
-        path.write_bytes(content[: len(content) // 2])
-        # As a process, because libpng writes to the descriptor.
-        ended = python("-m", "vkbloom._cli", "apply", path, tmp_path / "b.png")
-        assert (ended.returncode, ended.stdout) == (1, "")
-        assert ended.stderr.startswith(f"vkbloom: {path}: ")
-        assert ended.stderr.count("\n") == 1
-        assert not (tmp_path / "b.png").exists()
 
 
 def picture(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import subprocess
@@ -10,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.cli.calls import run
 from tests.io import foreign
 from tests.io.parts import written
 from tests.io.profiles import store_png
-from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -39,8 +39,7 @@ _cli.main()
 """
 
 
-def apply(*words: object) -> Result:
-    return CliRunner().invoke(program, ["apply", *map(str, words), "--adapter", "software"])
+apply = functools.partial(run, "apply", "--adapter", "software")
 
 
 @pytest.mark.parametrize("under", [0, 255])

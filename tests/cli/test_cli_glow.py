@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.calls import run
 from tests.images import picture
-from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -21,10 +21,6 @@ xr = pytest.importorskip("xarray")
 
 PYRAMID = ("--method", "pyramid", "--levels", "2", "--composite", "mix")
 SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(program, [str(word) for word in words])
 
 
 def done(*words: object) -> Result:
@@ -110,9 +106,6 @@ def test_grids(tmp_path: Path) -> None:
     other = run("grid", source, *store, *PYRAMID, *words[:-2], "--resume")
     assert other.exit_code == 1
     assert "source.emission" in other.stderr
-    refused = run("grid", "-o", tmp_path / "h", "--axis", "intensity=0.5,1", "--mask", mask)
-    assert refused.exit_code == 2
-    assert "--mask and --emission need an IMAGE" in refused.stderr
 
 
 def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
@@ -126,5 +119,3 @@ def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     difference = vkbloom.read(out) - vkbloom.read(tmp_path / "own.png")
     assert np.abs(difference).max() <= 0.01
     assert vkbloom.read(out)[:, 11, 3].min() > 0
-    refused = run("apply", source, out, "--alpha", "blur", "--encoding", "srgb")
-    assert refused.exit_code == 2

@@ -337,31 +337,3 @@ def test_no_bloom_is_noted(tmp_path: Path, words: list[str], said: str | None) -
     else:
         brightest = float(vkbloom.read(path).max())
         assert f"{said}the brightest value is {brightest:.3g}" in result.stderr
-
-
-@pytest.mark.parametrize(
-    ("glare", "said"),
-    [
-        (
-            "streaks:threshold=0.5,halvings=3",
-            "streaks is zero everywhere: no value is above its threshold 0.5 after 3",
-        ),
-        ("streaks:threshold=2,halvings=0+ghosts", "streaks is zero everywhere: no value is"),
-        ("streaks+streaks:threshold=0.5,halvings=2", "streaks_1 is zero everywhere"),
-        ("streaks:threshold=0.1,halvings=0,intensity=0.0001", "streaks adds at most "),
-        ("streaks:threshold=0.5,halvings=0", None),
-        ("streaks:halvings=3", None),
-    ],
-)
-def test_glare_without_light_is_noted(tmp_path: Path, glare: str, said: str | None) -> None:
-    """A threshold is subtracted after the halvings, in which a pixel of light vanishes."""
-    point = np.zeros((64, 64, 3), np.uint8)
-    point[32, 32] = 255
-    path = store_png(tmp_path / "a.png", point)
-    result = run(path, tmp_path / "b.png", "--glare", glare)
-    assert result.exit_code == 0, result.stderr
-    if said is None:
-        assert result.stderr == ""
-    else:
-        assert f"note: {said}" in result.stderr
-        assert result.stderr.count("\n") == 1

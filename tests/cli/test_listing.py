@@ -7,23 +7,18 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from rich.console import Console
 
 import vkbloom
+from tests.cli.calls import run
 from vkbloom._cli import listing
 from vkbloom._cli import presets as presets_command
-from vkbloom._cli.program import program
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._presets.named_settings import PRESETS
 from vkbloom._settings.registry import STAGES
 from vkbloom.psf._base import functions
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(program, [str(word) for word in words])
 
 
 NAMES = {

@@ -12,16 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import vkbloom
-from vkbloom._cli.program import program
+from tests.cli.calls import run
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(program, [str(word) for word in words])
 
 
 @pytest.fixture

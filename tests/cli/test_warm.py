@@ -6,11 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
 from tests.processes import output
-from vkbloom._cli.program import program
 
 APPLY = """
 import numpy as np, vkbloom
@@ -38,7 +36,3 @@ def test_a_later_process_compiles_nothing(tmp_path: Path) -> None:
     assert files(ours)
     output("-c", APPLY, **cached)
     assert {path: path.stat().st_size for path in files(drivers)} == filled
-
-
-def test_an_unknown_preset_is_wrong_use() -> None:
-    assert CliRunner().invoke(program, ["warm", "--preset", "none"]).exit_code == 2

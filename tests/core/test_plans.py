@@ -141,12 +141,12 @@ def test_variants_are_seen_without_a_renderer() -> None:
         ("composite_frag", "fragment"),
     ]
     assert variants("cpu") == [
-        ("threshold_words_rgba16float", "pixels"),
+        ("threshold_linear_rgba16float", "pixels"),
         ("line_comp_rgba16float", "line"),
         ("line_comp_rgba16float", "line"),
-        ("blend_words_rgba16float", "pixels"),
+        ("blend_linear_rgba16float", "pixels"),
     ]
-    assert variants("cpu", ("final",)) == [("strip_words_rgba16float", "strips")]
+    assert variants("cpu", ("final",)) == [("strip_linear_rgba16float", "strips")]
     assert variants("gpu", ("final",)) == [("tile_comp", "tiles")]
 
 

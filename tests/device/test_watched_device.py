@@ -54,7 +54,7 @@ with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as rende
         renderer.render(vkbloom.Scene.ufo(), None, (210, 40), shading=shading)
 """
 
-#: VK_IMAGE_USAGE_TRANSFER_SRC_BIT: of images as words, since none is without a usage.
+#: VK_IMAGE_USAGE_TRANSFER_SRC_BIT: of images with linear texels, since none is without a usage.
 NONE = 1
 #: What rows need that others have replaced each time, and an image that was uploaded for any plan.
 LEFT = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 import math
 import sys
@@ -16,6 +15,7 @@ import pytest
 
 import vkbloom
 from tests.images import noise
+from tests.refusals import assert_refused, rows
 from vkbloom import (
     Frames,
     Pyramid,
@@ -26,10 +26,8 @@ from vkbloom import (
 )
 from vkbloom._grid.filling import Tally
 from vkbloom._grid.layout import Grid, ask, lay_out
+from vkbloom._grid.order import read_part
 from vkbloom._grid.progress import Progress
-
-# For images and scenes that no renderer has rendered.
-UNSEEN = itertools.count(1000)
 
 AXES: dict[str, list[Any]] = {
     "exposure": [0.0, 1.0],
@@ -216,34 +214,6 @@ class TestWholeSettings:
             expected = renderer.apply(half, Separable(format=name))["bloom"]
             np.testing.assert_array_equal(grid["bloom"].sel(format=name).values, expected)
 
-    @pytest.mark.parametrize(
-        ("settings", "axes", "kind", "message"),
-        [
-            (None, {"preset": ["non"]}, ValueError, "unknown preset 'non'; "),
-            (None, {"preset": "kino"}, TypeError, "preset"),
-            (None, {"preset": [[]]}, TypeError, "is not a name"),
-            (None, {"settings": ["kino"]}, TypeError, "'kino' is not Settings"),
-            (None, {"settings": []}, ValueError, "has no values"),
-            (None, {"preset": ["kino"], "settings": [Separable()]}, ValueError, "exclude"),
-            (Separable(), {"preset": ["kino"]}, ValueError, "the axis preset sets all settings"),
-            (None, {"preset": ["kino", "tutorial"], "levels": [1]}, ValueError, "not a field of"),
-            (None, {"preset": ["tutorial"], "intensity": [-9]}, ValueError, "intensity"),
-        ],
-    )
-    def test_refusals(
-        self, filled: Call, settings: Any, axes: Any, kind: type[Exception], message: str
-    ) -> None:
-        with pytest.raises(kind, match=message):
-            filled(np.zeros((4, 4, 3), np.uint8), settings, axes)
-
-    def test_framebuffer_that_some_points_lack_is_refused(self, filled: Call) -> None:
-        with pytest.raises(ValueError, match=r"blur_vertical .* along preset: .* not there at"):
-            filled(
-                np.zeros((8, 8, 3), np.float32),
-                axes={"preset": ["tutorial", "kino"]},
-                framebuffers=("blur_vertical",),
-            )
-
 
 class TestMemory:
     def test_grid_larger_than_memory_is_refused(
@@ -294,112 +264,27 @@ class TestDataset:
 
 class TestRefusals:
     @pytest.mark.parametrize(
-        ("arguments", "kind", "message"),
-        [
-            ({"axes": {"blur_sale": [1]}}, ValueError, "'blur_sale' is not a field"),
-            ({"axes": {"time": [0]}}, ValueError, "'time' is not a field"),
-            ({"axes": {"blur_scale": 1.0}}, TypeError, "blur_scale: 1.0 is not a sequence"),
-            ({"axes": {"tonemap": "aces"}}, TypeError, "tonemap: 'aces' is not a sequence"),
-            ({"axes": {"blur_scale": []}}, ValueError, "blur_scale has no values"),
-            ({"axes": {"blur_scale": [1, 17]}}, ValueError, "blur_scale: 17.* out of range"),
-            ({"axes": {"loops": [1.5]}}, ValueError, "is not an integer"),
-            ({"axes": ["blur_scale"]}, TypeError, "a mapping"),
-            ({"framebuffers": ["glow_depth"]}, ValueError, "no 'glow_depth' here"),
-            ({"framebuffers": ()}, ValueError, "request some"),
-            ({"size": (3, 3)}, ValueError, "size: the source is not a scene"),
-            ({"shading": "deferred"}, ValueError, "shading: the source is not a scene"),
-            ({"time": 0.5}, ValueError, "time: the source is not a scene"),
-            ({"reduce": {"final": len}}, ValueError, "is not a possible name"),
-            ({"reduce": {"m": 3}}, TypeError, "is not callable"),
-            # A name of its own: a function's has its address, and xdist compares the names.
-            pytest.param(
-                {"reduce": {"m": lambda frames: "x"}},
-                ValueError,
-                "is not a number",
-                id="no number",
-            ),
-            ({"progress": 1}, TypeError, "progress"),
-        ],
-        ids=str,
+        ("call", "error"), [*rows(__file__, "grids"), *rows(__file__, "parts")]
     )
-    def test_arguments(
-        self, filled: Call, image: Any, arguments: Any, kind: type[Exception], message: str
+    def test_a_wrong_value_is_refused(self, filled: Call, call: str, error: str) -> None:
+        public = {name: getattr(vkbloom, name) for name in vkbloom.__all__}
+        image = np.zeros((23, 37, 3), np.float32)
+        own = {"np": np, "image": image, "grid": filled, "read_part": read_part}
+        assert_refused(call, error, {**public, **own})
+
+    def test_shapes_are_compared_before_anything_is_rendered(
+        self, filled: Call, image: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        with pytest.raises(kind, match=message):
-            filled(image, Separable(), **arguments)
-
-    @pytest.mark.parametrize("source", [None, "a.png", [], [np.zeros(3)], 3], ids=str)
-    def test_sources(self, filled: Call, source: Any) -> None:
-        with pytest.raises((TypeError, ValueError), match=r"source|image"):
-            filled(source)
-
-    @pytest.fixture
-    def nothing_renders(self, monkeypatch: pytest.MonkeyPatch) -> None:
         for name in ("apply", "_run_requests"):
             monkeypatch.setattr(Renderer, name, None)
-
-    @pytest.mark.parametrize(
-        ("settings", "axes", "names", "message"),
-        [
-            (
-                Separable(),
-                {"exposure": [0, 1], "bloom_scale": [1, 0.5]},
-                ["glow"],
-                r"glow changes .*\(23, 37, 4\).*bloom_scale=1.*\(11, 18, 4\).*=0.5",
-            ),
-            (
-                Separable(),
-                {"bloom_size": [(4, 4), (8, 8)]},
-                "all",
-                r"along bloom_size: .*\(4, 4, 4\)",
-            ),
-            (Pyramid(), {"levels": [3, 2]}, "all", "down_2 .*not there at levels=2"),
-            (Separable(), {"format": ["rgba8unorm", None]}, ["bloom"], "uint8.*float32"),
-            # At either corner the other axis has no effect.
-            (
-                Separable(bloom_scale=0.5),
-                {"bloom_size": [(18, 11), None], "bloom_scale": [0.5, 0.25]},
-                ["glow"],
-                "bloom_scale",
-            ),
-        ],
-        ids=str,
-    )
-    def test_shapes_that_vary_before_anything_is_rendered(
-        self,
-        filled: Call,
-        nothing_renders: None,
-        *,
-        settings: Settings,
-        axes: Any,
-        names: Any,
-        message: str,
-    ) -> None:
-        picture = noise(23, 37, 3, dtype="float32")
-        with pytest.raises(ValueError, match=message):
-            filled(picture, settings, axes, framebuffers=names)
-
-    def test_images_of_two_sizes_are_refused(self, filled: Call) -> None:
-        images = [noise(4, 5, 3, dtype="uint8"), noise(4, 6, 3, dtype="uint8")]
-        with pytest.raises(ValueError, match=r"along image: \(4, 5, 3\).*\(4, 6, 3\)"):
-            filled(images)
-
-    def test_a_reduction_that_changes_its_shape_names_the_point(
-        self, filled: Call, image: Any
-    ) -> None:
-        def growing(frames: Frames) -> Any:
-            return np.zeros(1 + int(frames.settings.exposure))
-
-        with pytest.raises(ValueError, match=r"n: \(2,\) float64 at exposure=1"):
-            filled(image, Separable(), {"exposure": [0, 1]}, reduce={"n": growing})
+        with pytest.raises(ValueError, match="bloom changes its shape or dtype along format"):
+            filled(image, Separable(), {"format": ["rgba8unorm", None]}, framebuffers=["bloom"])
 
     def test_an_error_on_the_way_leaves_the_renderer_usable(
         self, renderer: Renderer, filled: Call, image: Any
     ) -> None:
         def failing(frames: Frames) -> float:
-            if frames.settings.exposure:
-                raise ZeroDivisionError
-            return 0.0
+            return 1 / (1 - frames.settings.exposure)
 
         with pytest.raises(ZeroDivisionError):
             filled(image, Separable(), {"exposure": [0, 1, 2]}, reduce={"n": failing})

@@ -176,7 +176,12 @@ def assert_composite_without_bloom(renderer: Renderer, image: Image, settings: S
     largest = float(np.finfo(image.dtype).max)
     # The reference has no end in float32; the device's numbers do.
     expected = np.clip(reference.composite(image, None, settings), -largest, largest)
-    assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
+    limit = tolerance(image.dtype, expected)
+    if settings.encoding in ("gamma22", "pq"):
+        # Vulkan derives pow(x, y) from exp2(y log2(x)), whose logarithm of 0 need not be infinite:
+        # of a black picture, SwiftShader makes 4e-18 and, with PQ, 2e-10 too much.
+        limit = np.maximum(limit, 1e-9)
+    assert_close("final", frames["final"], expected, limit)
 
 
 @pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=["float16", "float32"]))
@@ -203,25 +208,20 @@ def test_a_grey_level_that_is_the_threshold_stays_out(renderer: Renderer) -> Non
         np.testing.assert_array_equal(glow, np.where(levels > level, levels, 0), str(level))
 
 
-@pytest.mark.parametrize("scale", [0.37, 1.0, 2.5])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("scale", [0.37, 0.5, 1.0, 2.5])
 def test_a_flat_grey_that_is_the_threshold_stays_out_at_every_size(
-    renderer: Renderer, scale: float
+    renderer: Renderer, scale: float, dtype: Any
 ) -> None:
-    for level in (51, 102, 153, 204, 255):
-        flat = np.full((9, 13, 3), level, np.uint8)
-        settings = Separable(threshold=level / 255, bloom_scale=scale)
-        assert not renderer.apply(flat, settings, framebuffers="glow")["glow"][..., :3].any()
-        settings = Separable(threshold=(level - 1) / 255, bloom_scale=scale)
-        glow = renderer.apply(flat, settings, framebuffers="glow")["glow"]
-        np.testing.assert_array_equal(glow[..., :3], level)
-
-
-@pytest.mark.parametrize("dtype", [np.float16, np.float32])
-@pytest.mark.parametrize("scale", [0.37, 0.5, 1.5])
-def test_flat_floats_of_the_threshold_stay_out_at_every_size(
-    renderer: Renderer, scale: float, dtype: type[np.floating[Any]]
-) -> None:
-    for value in (0.1, 0.3, 0.7, 1.0, 1.1, 3.0):
-        flat = np.full((37, 41, 3), value, dtype)
-        settings = Separable(threshold=float(dtype(value)), bloom_scale=scale)
-        assert not renderer.apply(flat, settings, framebuffers="glow")["glow"][..., :3].any()
+    levels = (51, 102, 153, 204, 255) if dtype == "uint8" else (0.1, 0.3, 0.7, 1.0, 1.1, 3.0)
+    for level in levels:
+        image = flat(level, dtype, (41, 37))
+        threshold = float(real(image)[0, 0, 0])
+        settings = Separable(threshold=threshold, bloom_scale=scale)
+        assert not renderer.apply(image, settings, framebuffers="glow")["glow"][..., :3].any()
+        settings = settings.replace(threshold=threshold - 1 / 255)
+        glow = renderer.apply(image, settings, framebuffers="glow")["glow"]
+        if dtype == "uint8":
+            np.testing.assert_array_equal(glow[..., :3], level)
+        else:
+            np.testing.assert_allclose(glow[..., :3], threshold, rtol=1e-3)

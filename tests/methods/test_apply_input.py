@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-import vkbloom
+from tests.device.abilities import infinities
 from tests.exhaustive import by_turns, some
 from tests.framebuffers import assert_same
 from tests.images import picture
@@ -22,7 +22,6 @@ from vkbloom import (
     DualKawase,
     Pyramid,
     Renderer,
-    Scene,
     Separable,
     Settings,
     reference,
@@ -97,27 +96,7 @@ def test_any_strides(renderer: Renderer, view: str, dtype: str) -> None:
     assert_array_equal(image, before)
 
 
-def test_subclasses_and_memory_maps(renderer: Renderer, tmp_path: Any) -> None:
-    image = picture(5, 6, 3, "float32")
-    mapped = np.memmap(tmp_path / "image.raw", np.float32, "w+", shape=image.shape)
-    mapped[:] = image
-    frames = renderer.apply(mapped, Separable())
-    assert_same(frames, renderer.apply(image, Separable()))
-    assert {type(array) for array in frames.values()} == {np.ndarray}
-
-
 # --- Repeated images ---
-
-
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("channels", [3, 4])
-def test_same_image_again_runs_no_pass(renderer: Renderer, dtype: str, channels: int) -> None:
-    image = picture(31, 20, channels, dtype, seed=1)
-    first = renderer.apply(image, Pyramid())
-    assert first.timings
-    again = renderer.apply(image.copy(), Pyramid())
-    assert again.timings == {}
-    assert_same(first, again)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -152,15 +131,18 @@ def test_images_of_all_kinds_by_turns(renderer: Renderer) -> None:
 # --- NaN and infinity ---
 
 
-def with_specials(dtype: str, channels: int, size: tuple[int, int] = (23, 17)) -> Image:
+def with_specials(
+    renderer: Renderer, dtype: str, channels: int, size: tuple[int, int] = (23, 17)
+) -> Image:
     width, height = size
     image = picture(width, height, channels, dtype, seed=5)
+    inf, negative = infinities(renderer, dtype)
     image[0, 0, 0] = np.nan
-    image[-1, -1] = -np.inf
-    image[5, 5] = np.inf
+    image[-1, -1] = negative
+    image[5, 5] = inf
     image[5, 6] = np.nan
-    image[9, 3, 2] = np.inf
-    image[9, 4, 1] = -np.inf
+    image[9, 3, 2] = inf
+    image[9, 4, 1] = negative
     return image
 
 
@@ -176,7 +158,7 @@ def test_nan_and_infinity_stay_in_final(
     renderer: Renderer, tonemap: Any, encoding: Any, other: tuple[str, Any]
 ) -> None:
     dtype, composite = other
-    image = with_specials(dtype, 3)
+    image = with_specials(renderer, dtype, 3)
     settings = Separable(
         composite=composite, tonemap=tonemap, encoding=encoding, exposure=1.0, intensity=0.5
     )
@@ -190,7 +172,7 @@ def test_nan_and_infinity_stay_in_final(
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
 def test_special_counts_follow_the_image(renderer: Renderer, dtype: str) -> None:
-    special = with_specials(dtype, 3)
+    special = with_specials(renderer, dtype, 3)
     counts = (int(np.isnan(special).sum()), int(np.isinf(special).sum()))
     plain = picture(23, 17, 3, dtype)
     for image, expected in [(special, counts), (special, counts), (plain, (0, 0))] * 2:
@@ -219,7 +201,7 @@ def test_no_bloom_is_the_identity_of_every_half_float(renderer: Renderer) -> Non
     bits = np.arange(65536, dtype=np.uint16).reshape(256, 256)
     image = np.stack([bits, bits[::-1], bits.T, bits], axis=-1).view(np.float16)
     final = renderer.apply(image, OFF)["final"]
-    number = ~np.isnan(image)
+    number = np.isfinite(image) | (np.isinf(image) & np.isinf(infinities(renderer, "float16")[0]))
     assert_array_equal(final.view(np.uint16)[number], image.view(np.uint16)[number])
     # Devices may change which NaN it is, not that it is one.
     assert np.isnan(final[~number]).all()
@@ -250,22 +232,6 @@ def test_framebuffers_come_in_the_order_of_the_data_flow(renderer: Renderer) -> 
     assert list(renderer.apply(image, Separable(), framebuffers=())) == []
 
 
-@pytest.mark.parametrize(
-    ("settings", "name"),
-    [
-        (Separable(), "down_0"),
-        (Separable(direct=True), "blur_vertical"),
-        (OFF, "bloom"),
-        (Pyramid(), "blur_vertical"),
-        (Separable(), "scene"),
-        (Separable(), "image"),
-    ],
-)
-def test_unknown_framebuffer(renderer: Renderer, settings: Settings, name: str) -> None:
-    with pytest.raises(ValueError, match=rf"framebuffers: unknown framebuffer '{name}'.*final"):
-        renderer.apply(picture(4, 4, 3, "uint8"), settings, framebuffers=(name,))
-
-
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_out_is_filled_in_place(renderer: Renderer, dtype: str) -> None:
     image = picture(12, 9, 3, dtype, seed=9)
@@ -287,42 +253,6 @@ def test_out_of_a_repeated_image_is_filled(renderer: Renderer) -> None:
     assert_array_equal(out["final"], expected)
 
 
-def test_out_can_be_the_image_itself(renderer: Renderer) -> None:
-    image = picture(12, 9, 3, "float32", seed=11)
-    expected = renderer.apply(image.copy(), Separable())["final"]
-    renderer.apply(image, Separable(), out={"final": image})
-    assert_array_equal(image, expected)
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        pytest.param(np.zeros((9, 12, 4), np.uint8), id="channels"),
-        pytest.param(np.zeros((12, 9, 3), np.uint8), id="shape"),
-        pytest.param(np.zeros((9, 12), np.uint8), id="dimensions"),
-        pytest.param(np.zeros((9, 12, 3), np.float32), id="dtype"),
-        pytest.param(np.zeros((9, 12, 3), np.int8), id="signed"),
-        pytest.param(np.zeros((12, 9, 3), np.uint8).transpose(1, 0, 2), id="transposed"),
-        pytest.param(np.zeros((9, 24, 3), np.uint8)[:, ::2], id="strided"),
-        pytest.param(np.broadcast_to(np.uint8(0), (9, 12, 3)), id="broadcast"),
-        pytest.param(_read_only(np.zeros((9, 12, 3), np.uint8)), id="read-only"),
-    ],
-)
-def test_out_that_does_not_fit(renderer: Renderer, array: Image) -> None:
-    image = picture(12, 9, 3, "uint8")
-    before = array.copy()
-    with pytest.raises(ValueError, match="out: final"):
-        renderer.apply(image, Separable(), out={"final": array})
-    assert_array_equal(array, before)
-    assert_matches_reference(renderer.apply(image, Separable()), image, Separable())
-
-
-def test_out_that_is_no_array(renderer: Renderer) -> None:
-    wrong: Any = {"final": bytearray(9 * 12 * 3)}
-    with pytest.raises(TypeError, match="out: final"):
-        renderer.apply(picture(12, 9, 3, "uint8"), Separable(), out=wrong)
-
-
 def test_out_that_shares_memory(renderer: Renderer) -> None:
     image = picture(12, 9, 3, "uint8")
     whole = np.zeros((18, 12, 4), np.uint8)
@@ -334,121 +264,10 @@ def test_out_that_shares_memory(renderer: Renderer) -> None:
     assert_array_equal(whole[9:], expected["bloom"])
 
 
-def test_framebuffers_are_not_shared(renderer: Renderer) -> None:
-    image = picture(12, 9, 3, "uint8", seed=12)
-    first = renderer.apply(image, Separable())
-    kept = {name: array.copy() for name, array in first.items()}
-    second = renderer.apply(image, Separable())
-    for array in second.values():
-        array[:] = 1
-    renderer.apply(picture(12, 9, 3, "uint8", seed=13), Separable())
-    for name, array in first.items():
-        assert_array_equal(array, kept[name], err_msg=name)
-
-
-def test_framebuffers_outlive_the_renderer() -> None:
-    image = picture(12, 9, 3, "float16", seed=14)
-    with Renderer() as renderer:
-        frames = renderer.apply(image, Separable())
-    assert_matches_reference(frames, image, Separable())
-
-
 # --- Many settings ---
 
 
-def test_sweep_of_images(renderer: Renderer) -> None:
-    image = picture(30, 20, 3, "float32", seed=15)
-    sequence: list[Settings] = [
-        *METHODS.values(),
-        *(Separable(blur_strength=strength) for strength in (0.5, 1.0, 2.0)),
-        OFF,
-        *METHODS.values(),
-    ]
-    count = 0
-    for settings, frames in zip(sequence, renderer.sweep(image, sequence), strict=True):
-        assert frames.settings == settings
-        assert_matches_reference(frames, image, settings)
-        count += 1
-    assert count == len(sequence)
-
-
-def test_sweep_of_images_is_lazy_and_runs_what_changed(renderer: Renderer) -> None:
-    image = picture(30, 20, 3, "float32", seed=16)
-    asked = []
-
-    def exposures() -> Any:
-        for exposure in (0.0, 1.0, 2.0):
-            asked.append(exposure)
-            yield Separable(exposure=exposure, tonemap="aces")
-
-    frames = renderer.sweep(image, exposures(), framebuffers=("final",))
-    assert asked == []
-    first = next(frames)
-    assert asked == [0.0]
-    assert list(first) == ["final"]
-    # The second makes the bloom that all have, which one pass stood for in the first.
-    assert [len(rest.timings) for rest in frames] == [4, 1]
-
-
-def test_sweep_of_images_stops_at_a_wrong_one(renderer: Renderer) -> None:
-    wrong: Any = [Separable(), Separable]
-    frames = renderer.sweep(picture(4, 4, 3, "uint8"), wrong)
-    next(frames)
-    with pytest.raises(TypeError, match="settings"):
-        next(frames)
-
-
-def test_sweep_of_a_scene(renderer: Renderer, scene: Scene) -> None:
-    sequence = [Separable(), Separable(blur_strength=0.5), Separable(bloom=False)]
-    for settings, frames in zip(
-        sequence,
-        renderer.sweep(scene, sequence, size=(64, 36), time=0.25),
-        strict=True,
-    ):
-        assert frames.settings == settings
-        assert_same(frames, renderer.render(scene, settings, (64, 36), time=0.25))
-    names = [
-        list(frames)
-        for frames in renderer.sweep(
-            scene, sequence[:2], size=(64, 36), framebuffers=("bloom", "final")
-        )
-    ]
-    assert names == [["bloom", "final"]] * 2
-
-
-def test_sweep_of_a_scene_runs_what_changed(renderer: Renderer, scene: Scene) -> None:
-    sequence = [Separable(blur_strength=strength) for strength in (1.0, 2.0, 3.0)]
-    # At a time of its own: what an earlier test drew would not be drawn again.
-    frames = list(renderer.sweep(scene, sequence, size=(64, 36), time=0.4321))
-    for later in frames[1:]:
-        assert later.timings
-        assert "glow" not in later.timings
-        assert "glow" in frames[0].timings
-
-
 # --- Wrong arguments ---
-
-
-NO_IMAGES: list[Any] = [
-    *([[[0, 0, 0]]], None, "image.png"),
-    *(np.zeros((4, 4, 3), dtype) for dtype in (np.int8, np.uint16, np.bool_, np.complex64, object)),
-    np.zeros((4, 4), [("r", "f4"), ("g", "f4"), ("b", "f4")]),
-]
-NO_SHAPES = ((), (3,), (4, 4), (4, 4, 1), (4, 4, 2), (4, 4, 5), (1, 4, 4, 3), (0, 4, 3), (4, 0, 3))
-
-
-@pytest.mark.parametrize(
-    ("image", "error"),
-    [
-        *((image, TypeError) for image in NO_IMAGES),
-        *((np.zeros(shape, np.float16), ValueError) for shape in (*NO_SHAPES, (4, 4, 0))),
-    ],
-)
-def test_what_is_no_image_is_refused(
-    renderer: Renderer, image: Any, error: type[Exception]
-) -> None:
-    with pytest.raises(error, match="image"):
-        renderer.apply(image, Separable())
 
 
 def test_masked_images(renderer: Renderer) -> None:
@@ -493,28 +312,3 @@ def test_longest_sides(renderer: Renderer, method: str, less: int) -> None:
     for view in (image, image.transpose(1, 0, 2)):
         frames = renderer.apply(view, METHODS[method])
         assert_matches_reference(frames, view, METHODS[method])
-
-
-def test_closed_renderer() -> None:
-    image = picture(4, 4, 3, "uint8")
-    renderer = vkbloom.Renderer()
-    frames = renderer.sweep(image, [Separable(), Separable()])
-    next(frames)
-    renderer.close()
-    renderer.close()
-    with pytest.raises(ValueError, match="closed"):
-        renderer.apply(image, Separable())
-    with pytest.raises(ValueError, match="closed"):
-        next(frames)
-
-
-def test_failed_call_keeps_the_previous_framebuffers(renderer: Renderer) -> None:
-    image = picture(8, 8, 3, "uint8", seed=18)
-    renderer.apply(image, Separable())
-    with pytest.raises(ValueError, match="framebuffers"):
-        renderer.apply(255 - image, Separable(), framebuffers=("nothing",))
-    with pytest.raises(ValueError, match="out"):
-        renderer.apply(255 - image, Separable(), out={"final": np.zeros((8, 8, 4), np.uint8)})
-    again = renderer.apply(image, Separable())
-    assert again.timings == {}
-    assert_matches_reference(again, image, Separable())

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 import vkbloom
 from tests.exhaustive import by_turns
+from tests.images import random_image
 from tests.methods.cases import METHODS, presets_of_low_levels
-from tests.methods.reference_cases import random_image
 from vkbloom import reference
 from vkbloom.reference._derivatives import DISCRETE, differentiable
 

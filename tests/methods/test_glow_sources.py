@@ -9,7 +9,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-import vkbloom
 from tests.images import hdr_picture, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
@@ -20,7 +19,6 @@ from vkbloom import (
     Scene,
     Separable,
     Settings,
-    reference,
 )
 from vkbloom._explorer.viewer import Viewer
 
@@ -191,22 +189,6 @@ def test_plans_know_mask_and_emission(renderer: Renderer) -> None:
     assert reads["final"] == ("image", "bloom")
 
 
-def test_a_grid_of_a_handle(renderer: Renderer) -> None:
-    image = picture(16, 12, 3)
-    mask = np.random.default_rng(6).random((12, 16), dtype=np.float32)
-    axes: dict[str, list[Any]] = {"intensity": [0.5, 1.0], "composite": ["add", "mix"]}
-    handle = renderer.upload(image, mask=mask)
-    final = vkbloom.grid(handle, Pyramid(levels=2), axes, progress=False, renderer=renderer)[
-        "final"
-    ]
-    for intensity in axes["intensity"]:
-        for composite in axes["composite"]:
-            settings = Pyramid(levels=2, intensity=intensity, composite=composite)
-            expected = renderer.apply(image, settings, mask=mask)["final"]
-            found = final.sel(intensity=intensity, composite=composite).values
-            assert_array_equal(found, expected)
-
-
 def test_the_explorer_reduces_what_is_given_with_the_image(renderer: Renderer) -> None:
     image, emission = picture(64, 48, 3), picture(64, 48, 3, seed=4)
     mask = np.zeros((48, 64), np.float32)
@@ -224,64 +206,3 @@ def test_the_explorer_reduces_what_is_given_with_the_image(renderer: Renderer) -
     assert glow[:, 18:, :3].any()
     with pytest.raises(ValueError, match="mask: the source is a scene"):
         Viewer(Scene.ufo(), mask=mask, renderer=renderer)
-
-
-IMAGE = np.zeros((6, 8, 4), np.float32)
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        (
-            {"mask": np.zeros((8, 6))},
-            ValueError,
-            r"mask: shape \(8, 6\) is not the image's, \(6, 8\)",
-        ),
-        ({"mask": np.zeros((6, 8, 1))}, ValueError, r"take one channel: mask\[..., 0\]"),
-        ({"mask": np.full((6, 8), 1.5)}, ValueError, "mask: 1.5 is out of range, 0 to 1; clip it"),
-        ({"mask": np.full((6, 8), -1e-3)}, ValueError, "mask: -0.001 is out of range"),
-        ({"mask": np.full((6, 8), np.nan)}, ValueError, "mask: nan is out of range"),
-        (
-            {"mask": np.zeros((6, 8), np.uint16)},
-            TypeError,
-            r"\(mask / 65535\).astype\(np.float32\)",
-        ),
-        (
-            {"mask": np.ma.masked_equal(np.zeros((6, 8)), 0)},
-            ValueError,
-            "mask: some values are masked",
-        ),
-        ({"mask": "all"}, TypeError, "mask: an array is needed, not str"),
-        (
-            {"emission": IMAGE[..., :3]},
-            ValueError,
-            r"emission: shape \(6, 8, 3\) is not the image's",
-        ),
-        ({"emission": IMAGE[:5]}, ValueError, r"emission: shape \(5, 8, 4\) is not the image's"),
-        ({"emission": IMAGE.astype(np.float16)}, ValueError, "emission: dtype float16 is not the"),
-        ({"emission": IMAGE[..., 0]}, ValueError, r"emission: shape \(6, 8\) is not \(H, W, 3\)"),
-        ({"emission": 1}, TypeError, "emission: an array is needed, not int"),
-    ],
-)
-def test_wrong_mask_emission_or_alpha_is_refused(
-    renderer: Renderer, kwargs: dict[str, Any], error: type[Exception], message: str
-) -> None:
-    with pytest.raises(error, match=message):
-        renderer.apply(IMAGE, **kwargs)
-    assert not renderer.apply(IMAGE, Separable())["bloom"][..., :3].any()
-
-
-@pytest.mark.parametrize("alpha", ["max", "blur"])
-@pytest.mark.parametrize("bloom", [True, False])
-def test_missing_alpha_is_refused(renderer: Renderer, alpha: Any, bloom: bool) -> None:
-    settings = Separable(alpha=alpha, bloom=bloom)
-    with pytest.raises(ValueError, match=f"alpha: '{alpha}' needs an image of 4 channels"):
-        renderer.apply(IMAGE[..., :3], settings)
-    buffers = settings.replace(format="rg11b10ufloat")
-    with pytest.raises(ValueError, match="needs bloom buffers that have an alpha"):
-        renderer.apply(IMAGE, buffers)
-    for image, asked in ((IMAGE[..., :3], settings), (IMAGE, buffers)):
-        with pytest.raises(ValueError, match="alpha"):
-            reference.apply(image, asked)
-    with pytest.raises(ValueError, match="alpha: 'most' is not one of keep, max, blur"):
-        settings.replace(alpha="most")

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from tests.images import hdr_picture
+from tests.images import hdr_picture, lights
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     BlenderGlare,
@@ -23,16 +23,6 @@ from vkbloom import (
 Array = NDArray[Any]
 
 COMPOSITES = ("screen", "soft_light", "add", "replace", "mix")
-
-
-def lights(size: tuple[int, int], dtype: str = "float32", channels: int = 3) -> Array:
-    width, height = size
-    generator = np.random.default_rng(11)
-    image = 0.6 * generator.random((height, width, channels))
-    image[generator.random((height, width)) < 0.02, :3] *= 1.6 if dtype == "uint8" else 30
-    if dtype == "uint8":
-        return np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
-    return image.astype(dtype)
 
 
 def real(array: Array) -> Array:
@@ -74,7 +64,7 @@ def test_soft_light_comes_after_the_curve() -> None:
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (2, 2), (3, 3), (9, 1), (13, 7)])
 @pytest.mark.parametrize("bicubic", [True, False])
 def test_godot_at_sides_of_1(renderer: Renderer, size: tuple[int, int], bicubic: bool) -> None:
-    image = lights(size) * 5
+    image = lights(*size) * 5
     settings = GodotBloom(bicubic=bicubic, level_weights=(0.5,) * 7, format="rgba32float")
     frames, expected = renderer.apply(image, settings), reference.apply(image, settings)
     assert list(frames) == list(expected)
@@ -83,7 +73,7 @@ def test_godot_at_sides_of_1(renderer: Renderer, size: tuple[int, int], bicubic:
 
 
 def test_levels_after_the_last_weight_are_not_made(renderer: Renderer) -> None:
-    image = lights((64, 64))
+    image = lights(64, 64)
     frames = renderer.apply(image, GodotBloom(level_weights=(0, 1, 0, 1e-4, 0, 0, 0)))
     assert [name for name in frames if name.startswith("down")] == ["down_0", "down_1"]
     none = renderer.apply(image, GodotBloom(level_weights=(0,) * 7))
@@ -138,7 +128,7 @@ def test_blenders_threshold_by_hand(
 def test_blenders_levels(
     renderer: Renderer, frame: tuple[int, int], size: float, levels: int
 ) -> None:
-    frames = renderer.apply(lights(frame), BlenderGlare(size=size))
+    frames = renderer.apply(lights(*frame), BlenderGlare(size=size))
     # The glow is the first.
     assert 1 + sum(name.startswith("down") for name in frames) == levels
     assert frames["glow"].shape[:2] == frame[::-1]

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from tests.images import lights
 from vkbloom import DualKawase, PygfxBloom, Pyramid, Renderer, Scene, Separable, Settings, reference
 from vkbloom.reference._image import storage
 
@@ -48,14 +49,6 @@ def test_alpha_is_linear(renderer: Renderer) -> None:
     assert_allclose(frames["glow"][0, 0, 0], levels()[188], atol=1e-6)
 
 
-def lights(size: tuple[int, int]) -> Array:
-    width, height = size
-    generator = np.random.default_rng(7)
-    image = 0.5 * generator.random((height, width, 3)) ** 2
-    image[generator.random((height, width)) < 0.02] *= 4
-    return image.astype(np.float32)
-
-
 @pytest.mark.parametrize(
     "settings",
     [
@@ -68,7 +61,7 @@ def lights(size: tuple[int, int]) -> Array:
 )
 def test_a_value_is_a_level_off_at_most(renderer: Renderer, settings: Settings) -> None:
     """A sum falls on the other side of a step than the reference's, and later sums have it, too."""
-    image = lights((67, 45))
+    image = lights(67, 45, highest=2.0)
     settings = settings.replace(format=FORMAT)
     frames, expected = renderer.apply(image, settings), reference.apply(image, settings)
     assert list(frames) == list(expected)
@@ -79,7 +72,7 @@ def test_a_value_is_a_level_off_at_most(renderer: Renderer, settings: Settings) 
 
 
 def test_of_a_published_method_the_bloom_is_not_rounded(renderer: Renderer) -> None:
-    frames = renderer.apply(0.1 * lights((67, 45)), PygfxBloom(format=FORMAT))
+    frames = renderer.apply(0.1 * lights(67, 45, highest=2.0), PygfxBloom(format=FORMAT))
     is_level = {
         name: np.isclose(frames[name][..., :1], levels(), atol=1e-6).any(axis=2).mean()
         for name in ("glow", "down_0", "up_0", "bloom")
@@ -101,7 +94,7 @@ def test_all_variants_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     for variant in ("fragment", "cpu", "gpu"):
         monkeypatch.setenv("VKBLOOM_VARIANT", variant)
         with Renderer(validation=True) as renderer:
-            results.append(renderer.apply(lights((75, 46)), PygfxBloom(format=FORMAT)))
+            results.append(renderer.apply(lights(75, 46, highest=2.0), PygfxBloom(format=FORMAT)))
     for name, values in results[0].items():
         for other in results[1:]:
             np.testing.assert_array_equal(other[name], values, err_msg=name)

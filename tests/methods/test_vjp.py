@@ -9,63 +9,8 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.methods.reference_cases import random_image
-from tests.methods.test_derivatives import CURVED, channels_of
+from tests.images import random_image
 from vkbloom import Renderer, reference
-
-
-def check_against_reference(renderer: Renderer, settings: Any, image: Any, **given: Any) -> None:
-    frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
-    expected_frames, expected_pullback = reference.vjp(image, settings, **given)
-    random = np.random.default_rng(7)
-    cotangents = {
-        name: random.standard_normal(frames[name].shape, np.float32)
-        for name in ("glow", "bloom", "final")
-        if name in frames
-    }
-    found, expected = pullback(cotangents), expected_pullback(cotangents)
-    assert found.keys() == expected.keys()
-    for name, part in expected.items():
-        assert found[name].dtype == np.float32, name
-        limit = 1e-5 * max(np.abs(part).max(), 1e-3)
-        assert np.abs(found[name] - part).max() <= limit, name
-    repeated = pullback(cotangents)
-    assert all(np.array_equal(part, repeated[name]) for name, part in found.items())
-    for name in cotangents:
-        assert np.abs(frames[name] - expected_frames[name]).max() <= 1e-4 * max(
-            1, np.abs(expected_frames[name]).max()
-        ), name
-
-
-CHOSEN = (
-    *("tutorial", "jimenez2014", "dual_kawase", "bevy_natural", "kino", "filament", "unity_urp"),
-    *("threejs_unreal", "godot_4_5", "blender_bloom", "camera_lens", "knee", "glare", "alpha"),
-    *("aces-srgb", "exponential-none", "agx-gamma22", "none-pq", "firefly"),
-)
-
-
-@pytest.mark.parametrize("name", CHOSEN)
-def test_derivatives_are_those_of_the_reference(renderer: Renderer, name: str) -> None:
-    settings = CURVED[name].replace(format=None)
-    channels = channels_of(settings)
-    image = random_image(11, 14, channels=channels, seed=1)
-    check_against_reference(renderer, settings, image)
-
-
-@pytest.mark.parametrize("name", ["darktable", "blender 5.2"])
-def test_methods_without_adjoint_passes_have_derivatives(renderer: Renderer, name: str) -> None:
-    """The reference derives them: darktable's boxes, and what Blender 5.2 reads by rounding."""
-    settings: vkbloom.Settings = vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0)
-    if name == "blender 5.2":
-        settings = vkbloom.BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2)
-    check_against_reference(renderer, settings, random_image(9, 41, channels=3, seed=1))
-
-
-def test_mask_and_emission_have_derivatives(renderer: Renderer) -> None:
-    image, emission = (random_image(7, 9, seed=seed).astype(np.float32) for seed in (1, 2))
-    mask = np.random.default_rng(3).random((7, 9), np.float32)
-    settings = vkbloom.Pyramid(levels=2, threshold=0.3, knee=0.5)
-    check_against_reference(renderer, settings, image, mask=mask, emission=emission)
 
 
 def test_arrays_may_change_before_the_pullback(renderer: Renderer) -> None:

@@ -20,7 +20,7 @@ from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import FrameRegression, diagnose
 from vkbloom.testing._judging import judge
 from vkbloom.testing._regression import Mode
-from vkbloom.testing._report_parts import figures
+from vkbloom.testing._test_report import figures
 
 Image = NDArray[Any]
 

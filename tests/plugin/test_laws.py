@@ -270,29 +270,6 @@ class TestMeasurements:
         with pytest.raises(ValueError, match=r"at: .* is not inside an image"):
             testing.point_spread(BOX, SMALL, at=at)
 
-    def test_response(self) -> None:
-        def blur(image: Image, *, sigma: float) -> Image:
-            blurred = ndimage.gaussian_filter(image, (sigma, sigma / 2, 0), mode="nearest")
-            return np.asarray(3 * blurred)
-
-        found = testing.response(blur, "sigma", [2.0, 4.0], Probe(size=(81, 81)))
-        np.testing.assert_allclose(found.gain, 3, rtol=1e-5)
-        # y first: the filter's axes are those of arrays.
-        np.testing.assert_allclose(found.sigma[:, 1], [2.0, 4.0], rtol=2e-3)
-        np.testing.assert_allclose(found.sigma[:, 0], [1.0, 2.0], rtol=2e-3)
-        np.testing.assert_allclose(found.shift, 0, atol=1e-5)
-        assert found.peak[0] > found.peak[1]
-        lines = str(found).splitlines()
-        assert lines[0].split()[:3] == ["sigma", "gain", "peak"]
-        assert len(lines) == 3
-
-    def test_response_of_nothing(self) -> None:
-        found = testing.response(lambda image, gain: gain * image, "gain", [0.0, 1.0], SMALL)
-        assert np.isnan(found.sigma[0]).all()
-        np.testing.assert_array_equal(found.sigma[1], 0)
-        with pytest.raises(ValueError, match="values"):
-            testing.response(lambda image, gain: image, "gain", [], SMALL)
-
 
 class TestProbe:
     @pytest.mark.parametrize(

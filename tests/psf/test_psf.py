@@ -6,13 +6,14 @@ import math
 import pickle
 import tracemalloc
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.refusals import assert_refused, rows
 from vkbloom import psf
 from vkbloom.psf._bessel import bessel
 from vkbloom.psf._eye import cie_general, cie_total
@@ -359,36 +360,6 @@ def test_picture() -> None:
     assert psf.gaussian(4)._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: psf.gaussian(0), "sigma: 0 is out of range, above 0"),
-        (
-            lambda: psf.spencer(cast("Any", "noon")),
-            "state: 'noon' is not one of photopic, me",
-        ),
-        (lambda: psf.spencer(wavelengths=cast("Any", (600, 500))), r"wavelengths: .* is not \(red"),
-        (lambda: psf.cie_general(age=-1), "age: -1 is out of range, 0 to 120"),
-        (lambda: psf.cie_total(pigment=2), "pigment: 2 is out of range, 0 to 1.2"),
-        (lambda: psf.harvey_shack(s=1), "s: 1 is out of range"),
-        (lambda: psf.airy(f_number=math.nan), "f_number: nan is out of range"),
-        (lambda: psf.iris(blades=2), "blades: 2 is out of range, 3 to 64"),
-        (lambda: psf.aperture(np.zeros((8, 8))), "mask: its values are not between 0 and 1"),
-        (lambda: psf.aperture(np.ones((8, 9))), r"mask: shape \(8, 9\) is not \(n, n\)"),
-        (lambda: psf.aperture(psf.iris(), wavelengths=(500, 501)), "wavelengths: the sum of"),
-        (lambda: psf.fog_glow(1), "size: 1 is out of range, 2 to 4096"),
-        (lambda: psf.unreal(-np.ones((3, 3))), "image: some values are below 0"),
-        (lambda: psf.unreal(np.ones((8, 8)), center=(2, 0)), "center: .* 0 to 1"),
-        (lambda: psf.samples(np.ones((2, 2, 4))), r"values: shape \(2, 2, 4\) is not \(h, w\)"),
-        (lambda: psf.samples([[math.inf]]), "values: some numbers are not finite"),
-        (lambda: psf.measured(vkbloom.BevyBloom(threshold=1.0)), "threshold: 1.0 is not None"),
-        (lambda: psf.gaussian(1).array((0, 3)), "size: .* out of range"),
-        (lambda: psf.spencer().array((3, 3), -1), "pixels_per_degree: -1 is out of range"),
-        (lambda: psf.gaussian(1).encircled_energy([-1]), "radii: .* at least 0"),
-        (lambda: psf.PSF.from_dict({"psf": "lens"}), "psf: 'lens' is not one of airy, aperture"),
-        (lambda: psf.PSF.from_dict({"psf": "airy", "f": 1}), "psf: airy has no 'f'; it has f_n"),
-    ],
-)
-def test_errors(make: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "point spread functions"))
+def test_a_wrong_value_is_refused(call: str, error: str) -> None:
+    assert_refused(call, error, {"psf": psf, "np": np, "math": math, "vkbloom": vkbloom})

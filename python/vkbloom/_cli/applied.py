@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-import itertools
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -21,16 +20,14 @@ import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.glow_options import accompanying, uploaded
-from vkbloom._cli.image_files import FileOptions, finished, read_picture
-from vkbloom._cli.overlapped import read_ahead, rendered
+from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import detail, hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
-from vkbloom._io.images import Picture
+from vkbloom._io.displayed import Saved
+from vkbloom._io.images import Colour, Picture, SavedColour
 from vkbloom._renderer.frame_files import settings_facts
-
-__all__ = ["Begun", "Options", "Pair", "Run", "of_format"]
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
@@ -46,15 +43,32 @@ _OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options(FileOptions):
+class Options:
     """The options of the command by their names."""
 
+    subimage: int
+    layer: str | None
+    input_colour: Colour | None
+    raw: bool
+    mask: str | None
+    emission: str | None
+    half: bool | None
+    output_colour: SavedColour | None
+    primaries: str
+    view: str | None
+    bits: int | None
+    quality: int | None
     pipe_format: str
     framebuffers: str
     overwrite: bool
     skip_existing: bool
     expand: float | None
     settings: Callable[[str], Begun]
+
+    @property
+    def saved(self) -> Saved:
+        """What the colours of a written file are to be."""
+        return Saved(self.output_colour, self.primaries, self.view)
 
     @property
     def names(self) -> str | list[str]:
@@ -101,37 +115,12 @@ class Run:
             self.failures[pair[0]] = error
 
     def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
-        """Add bloom to files one after the other; read and write others meanwhile."""
-        is_blended = settings.alpha != "keep"
-        wanted = no_bloom.with_bloom(self._options.names, settings)
-        glow_of = self._glow_of(is_blended)
-
-        def prepared(found: tuple[Pair, Picture]) -> Any:
-            """Return a picture's image with its mask and emission."""
-            pixels = found[1].pixels
-            return uploaded(self._renderer(), pixels, glow_of(pixels))
-
-        def read(pair: Pair) -> tuple[Pair, Picture] | None:
-            with self._of_file(pair):
-                return pair, self._read(pair[0], expand, is_blended=is_blended)
-            return None
-
-        rest = iter(files)
-        # Read before the device is opened, so that a wrong file fails at once.
-        first = next(filter(None, map(read, rest)), None)
-        if first is None:
-            return
-        renderer = self._renderer()
-        with self._wrong_use_of_all():
-            renderer.plan(prepared(first), settings, framebuffers=wanted)
-        pictures = filter(None, itertools.chain([first], read_ahead(read, rest)))
-        del first
-        results = rendered(renderer, pictures, settings, wanted, prepared)
+        """Add bloom to files one after the other; each is written while the next one is made."""
         hidden = self._hidden if self._several else True
-        bar = tqdm(results, total=len(files), unit="image", leave=False, disable=hidden)
-        with contextlib.closing(results):
-            for _ in written_in_background(self._made(bar, expand)):
-                pass
+        bar = tqdm(files, unit="image", leave=False, disable=hidden)
+        for texts in written_in_background(self._made(bar, settings, expand)):
+            for text in texts:
+                note(text)
 
     @contextlib.contextmanager
     def _wrong_use_of_all(self) -> Iterator[None]:
@@ -146,23 +135,46 @@ class Run:
             raise click.UsageError(str(error)) from error
 
     def _made(
-        self, results: Iterable[Any], expand: float | None
-    ) -> Iterator[tuple[str, Callable[[], object]]]:
-        """Yield the name of each file, and the function that writes it."""
-        for (pair, picture), frames in results:
-            name, target = pair
+        self, files: Iterable[Pair], settings: vkbloom.Settings, expand: float | None
+    ) -> Iterator[tuple[list[str], Callable[[], object]]]:
+        """Yield of each file a list for notes, and the function that writes it and fills the list.
+
+        Notes are printed by the thread that reads files, because it silences standard error.
+        """
+        is_blended = settings.alpha != "keep"
+        wanted = no_bloom.with_bloom(self._options.names, settings)
+        glow_of = self._glow_of(is_blended)
+        is_planned = False
+        for pair in files:
+            picture = None
             with self._of_file(pair):
-                if isinstance(frames, Exception):
-                    raise frames
-                texts = [*no_bloom.notes(frames, picture.pixels)]
-                if not no_bloom.is_without(frames) and self._is_straight(picture, target):
-                    texts.append(no_bloom.hidden(frames["final"], frames.settings))
-                for text in filter(None, texts):
-                    note(f"{name}: {text}" if self._several else text)
-                seconds = sum(frames.timings.values())
-                detail(f"{name}: {1e3 * seconds:.2f} ms on the device")
+                picture = self._read(pair[0], expand, is_blended=is_blended)
+            if picture is None:
+                continue
+            # Opened after the first file is read, so that a wrong file fails at once.
+            renderer = self._renderer()
+            if not is_planned:
+                is_planned = True
+                with self._wrong_use_of_all():
+                    given = uploaded(renderer, picture.pixels, glow_of(picture.pixels))
+                    renderer.plan(given, settings, framebuffers=wanted)
+            with self._of_file(pair):
+                given = uploaded(renderer, picture.pixels, glow_of(picture.pixels))
+                frames = renderer.apply(given, settings, framebuffers=wanted)
+                self._tell(pair, picture, frames)
                 kept = no_bloom.only(frames, self._options.names)
-                yield target, functools.partial(self._write, pair, picture, kept, expand)
+                texts: list[str] = []
+                yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
+
+    def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
+        """Print notes about the bloom of a file, and its time."""
+        name, target = pair
+        texts = [*no_bloom.notes(frames, picture.pixels)]
+        if not no_bloom.is_without(frames) and self._is_straight(picture, target):
+            texts.append(no_bloom.hidden(frames["final"], frames.settings))
+        for text in filter(None, texts):
+            note(f"{name}: {text}" if self._several else text)
+        detail(f"{name}: {1e3 * sum(frames.timings.values()):.2f} ms on the device")
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
         file = of_format(target, self._options.pipe_format)
@@ -204,7 +216,12 @@ class Run:
             Path(target).parent.mkdir(exist_ok=True)
 
     def _write(
-        self, pair: Pair, picture: Picture, frames: vkbloom.Frames, expand: float | None
+        self,
+        pair: Pair,
+        picture: Picture,
+        frames: vkbloom.Frames,
+        expand: float | None,
+        notes: list[str],
     ) -> None:
         target = pair[1]
         with self._of_file(pair):
@@ -213,11 +230,19 @@ class Run:
             if is_stream(target):
                 suffix = Path(of_format(target, self._options.pipe_format)).suffix
                 file = self._folder / f"output{suffix}"
-            written = _written(picture, frames, file, self._options, expand)
+            written = _save_others(frames, file)
+            notes += image_writing.save(
+                finished(picture, frames["final"], frames.settings),
+                file,
+                self._options.saved,
+                settings_facts(frames.settings, expand),
+                self._options.quality,
+                bits=self._options.bits,
+            )
             if is_stream(target):
                 _send(file, target)
             elif not self._several:
-                for path in written:
+                for path in (file, *written):
                     say(f"wrote {path}")
 
 
@@ -230,28 +255,6 @@ def _send(file: Path, target: str) -> None:
             sys.stdout.buffer.flush()
         else:
             shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
-
-
-def _written(
-    picture: Picture,
-    frames: vkbloom.Frames,
-    target: Path,
-    options: Options,
-    expand: float | None,
-) -> list[Path]:
-    """Write `final` and the other framebuffers, and return the files."""
-    written = _save_others(frames, target)
-    notes = image_writing.save(
-        finished(picture, frames["final"], frames.settings),
-        target,
-        options.saved,
-        settings_facts(frames.settings, expand),
-        options.quality,
-        bits=options.bits,
-    )
-    for text in notes:
-        note(text)
-    return [target, *written]
 
 
 def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:

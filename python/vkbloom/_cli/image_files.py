@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, suppress
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 import click
@@ -21,9 +20,8 @@ from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes
 from vkbloom._io.array_files import has_straight
 from vkbloom._io.colour import check_space
-from vkbloom._io.displayed import Saved
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.images import Colour, Picture, SavedColour, StoredImage
+from vkbloom._io.images import Colour, Picture, StoredImage
 from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
@@ -32,35 +30,11 @@ COLOURS: Final = ("linear", "srgb")
 _STANDARD_ERROR = 2
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class FileOptions:
-    """How image files are read and written: options of commands by their names."""
-
-    subimage: int = 0
-    layer: str | None = None
-    input_colour: Colour | None = None
-    raw: bool = False
-    mask: str | None = None
-    emission: str | None = None
-    half: bool | None = None
-    output_colour: SavedColour | None = None
-    primaries: str = "rec709"
-    view: str | None = None
-    bits: int | None = None
-    quality: int | None = None
-
-    @property
-    def saved(self) -> Saved:
-        """What the colours of a written file are to be."""
-        return Saved(self.output_colour, self.primaries, self.view)
-
-
 subimage_option: Final = click.option(
     "--subimage",
     metavar="N",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Index of the part to read from a file with several parts.",
 )
 layer_option: Final = click.option(
@@ -122,11 +96,13 @@ def read_picture(
     stored = read(source, subimage, layer)
     source = shown(source)
     if raw and stored.pixels.dtype != np.uint8:
-        raise not_of_bytes(source, stored.numbers[0])
+        raise click.UsageError(
+            f"--raw: {source} has {stored.numbers[0]}, not 8-bit integers; leave out --raw"
+        )
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
-    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]
@@ -152,11 +128,6 @@ def is_photograph(source: str) -> bool:
     return False
 
 
-def not_of_bytes(source: str, numbers: str) -> click.UsageError:
-    """Return the error for --raw with a file that does not have 8-bit integers."""
-    return click.UsageError(f"--raw: {source} has {numbers}, not 8-bit integers; leave out --raw")
-
-
 def part_notes(stored: StoredImage, layer: str | None) -> list[str]:
     """Return a text if the first of several parts is read without --subimage."""
     if len(stored.parts) <= 1 or layer is not None or given("subimage"):
@@ -173,60 +144,22 @@ def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Pictu
     return dataclasses.replace(picture, pixels=final, encoding=encoding)
 
 
-_quiet = threading.Lock()
-
-
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress what C libraries print on standard error.
+    """Suppress what C libraries print on standard error, and this process meanwhile.
 
-    libpng prints messages about damaged files, instead of passing them to OpenImageIO. The output
-    of this program still goes to standard error. A nested call does nothing.
+    libpng prints messages about damaged files, instead of passing them to OpenImageIO.
     """
     # Standard error was closed when this process began, so descriptor 2 may be another file.
-    if sys.stderr is None or not _quiet.acquire(blocking=False):
+    if sys.stderr is None:
         yield
         return
-    try:
-        with _redirected():
-            yield
-    finally:
-        _quiet.release()
-
-
-@contextmanager
-def _redirected() -> Iterator[None]:
     sys.stderr.flush()
-    try:
-        kept = os.dup(_STANDARD_ERROR)
-    except OSError:
-        # Descriptor 2 is closed, so nothing can be printed.
-        yield
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    kept, nowhere = os.dup(_STANDARD_ERROR), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, _STANDARD_ERROR)
-        with _elsewhere(kept):
-            yield
+        yield
     finally:
         os.dup2(kept, _STANDARD_ERROR)
         os.close(nowhere)
         os.close(kept)
-
-
-@contextmanager
-def _elsewhere(descriptor: int) -> Iterator[None]:
-    """Redirect Python's standard error to a descriptor, if it is that of the process."""
-    stream = sys.stderr
-    try:
-        is_own = stream.fileno() == _STANDARD_ERROR
-    except (OSError, ValueError, AttributeError):
-        is_own = False
-    if not is_own:
-        yield
-        return
-    own = os.fdopen(
-        descriptor, "w", 1, encoding=stream.encoding, errors=stream.errors, closefd=False
-    )
-    with own, redirect_stderr(own):
-        yield

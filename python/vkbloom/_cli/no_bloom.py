@@ -1,4 +1,4 @@
-"""Notes for a bloom or a stage of glare that is zero, and for a bloom that darkens or is hidden."""
+"""Notes for a bloom that is zero, that darkens, or that alpha hides."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._renderer.frames import Frames
-from vkbloom._settings.glare import GlareLight
 from vkbloom._settings.settings import Settings
 
 # Highlights that keep this share are as bright as before: a level of 8 bits near white is 0.9 %.
@@ -17,32 +16,14 @@ _DARKER = 0.985
 # No pixel of an image whose values are below it is a highlight.
 _BLACK = 1e-6
 # The smallest alpha and the smallest light that 8 bits can hold.
-_LEAST = 1 / 255
-
-# Light that no display with 8 bits shows.
-_LEVEL = 1 / 255
-
-__all__ = [
-    "brightest_of",
-    "darkening",
-    "empty_stages",
-    "hidden",
-    "is_without",
-    "notes",
-    "only",
-    "reason",
-    "with_bloom",
-]
+_MIN_VISIBLE = 1 / 255
 
 
 def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
-    """Return the framebuffers to request: also bloom and glare, unless the bloom is off."""
+    """Return the framebuffers to request: also bloom, unless it is off."""
     if isinstance(names, str):
         return names
-    if not settings.bloom:
-        return [*names]
-    noted = ["bloom", *(name for name, _ in _stages(settings))]
-    return [*names, *(name for name in noted if name not in names)]
+    return [*names, *["bloom"] * (settings.bloom and "bloom" not in names)]
 
 
 def only(frames: Frames, names: str | Sequence[str]) -> Frames:
@@ -81,7 +62,7 @@ def darkening(pixels: NDArray[Any], frames: Frames) -> str:
     before, after = (
         np.clip(np.nan_to_num(image[:, :, :3].astype(np.float32)) / scale, 0, 1).max(axis=2)
         for image, scale in (
-            (one, 255 if one.dtype == np.uint8 else 1) for one in (pixels, frames["final"])
+            (item, 255 if item.dtype == np.uint8 else 1) for item in (pixels, frames["final"])
         )
     )
     brightest = float(before.max(initial=0))
@@ -101,7 +82,7 @@ def hidden(final: NDArray[Any], settings: Settings) -> str:
     """Return a text if light lies on transparent pixels of a file with straight alpha; else ""."""
     if not settings.bloom or settings.alpha != "keep" or final.shape[2] != 4:
         return ""
-    least = _LEAST * (255 if final.dtype == np.uint8 else 1)
+    least = _MIN_VISIBLE * (255 if final.dtype == np.uint8 else 1)
     is_clear = final[:, :, 3] < least
     if not (final[:, :, :3].max(axis=2, where=is_clear[:, :, None], initial=0) >= least).any():
         return ""
@@ -120,39 +101,8 @@ def reason(settings: Settings, brightest: float | None = None) -> str:
 
 
 def notes(frames: Frames, image: NDArray[Any]) -> Iterator[str]:
-    """Yield what is zero everywhere, bloom or stages of glare, and a bloom that darkens."""
+    """Yield that the bloom is zero everywhere, or that it darkens."""
     if is_without(frames):
         yield reason(frames.settings, brightest_of(image))
     elif text := darkening(image, frames):
         yield text
-    yield from empty_stages(frames, frames.settings)
-
-
-def empty_stages(frames: Frames, settings: Settings) -> Iterator[str]:
-    """Yield a text for each stage of glare whose threshold leaves nothing, or nothing visible."""
-    for name, stage in _stages(settings):
-        if name not in frames:
-            continue
-        light = float(np.nan_to_num(frames[name][:, :, :3]).max(initial=0)) * stage.intensity
-        if 0 < light * 2**settings.exposure < _LEVEL:
-            yield (
-                f"{name} adds at most {light:.2g}, less than a level of 8 bits: little is above "
-                f"its threshold {stage.threshold:g}; use a lower one or a higher intensity"
-            )
-        elif not light and stage.intensity:
-            halved = f" after {stage.halvings} halvings" * bool(stage.halvings)
-            hint = ", in which small highlights vanish; use fewer" * bool(stage.halvings)
-            yield (
-                f"{name} is zero everywhere: no value is above its threshold "
-                f"{stage.threshold:g}{halved}{hint or '; use a lower one'}"
-            )
-
-
-def _stages(settings: Settings) -> Iterator[tuple[str, GlareLight]]:
-    """Yield the stages that have a threshold, with the names of their framebuffers."""
-    kinds = [stage.stage for stage in settings.glare]
-    for index, stage in enumerate(settings.glare):
-        if isinstance(stage, GlareLight) and stage.threshold > 0:
-            kind = stage.stage
-            number = f"_{kinds[:index].count(kind)}" if kinds.count(kind) > 1 else ""
-            yield f"{kind}{number}", stage

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
-from rich import box
-from rich.table import Table
 from tqdm import tqdm
 
 import vkbloom
@@ -18,7 +16,7 @@ from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
-from vkbloom._cli.terminal import detail, hides_progress, is_quiet, note, say, show, tell_device
+from vkbloom._cli.terminal import detail, hides_progress, note, say, tell_device
 from vkbloom._settings.settings import SHADINGS, Shading
 
 
@@ -32,12 +30,8 @@ from vkbloom._settings.settings import SHADINGS, Shading
     "formats have a file for each framebuffer. A name without extension is a folder of PNG files. "
     "A framebuffer that the format cannot hold is written as .exr.",
 )
-@click.option(
-    "--size", type=SIZE, default="1280x720", show_default=True, help="Size of the frame, in pixels."
-)
-@click.option(
-    "--time", default=0.0, show_default=True, help="Time of the animation; its period is 1."
-)
+@click.option("--size", type=SIZE, default="1280x720", help="Size of the frame, in pixels.")
+@click.option("--time", default=0.0, help="Time of the animation; its period is 1.")
 @click.option(
     "--frames",
     "count",
@@ -45,7 +39,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
     type=click.IntRange(min=1),
     help="Render N frames of one period of the animation, starting at --time, to numbered files.",
 )
-@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
 @click.option(
     "--framebuffers",
     metavar="all|NAME,...",
@@ -93,16 +87,13 @@ def command(
                 )
                 if index == 0 and loaded.glow is not None and no_bloom.is_without(frames):
                     note(no_bloom.reason(settings))
-                for text in no_bloom.empty_stages(frames, settings) if index == 0 else ():
-                    note(text)
                 shown = no_bloom.only(frames, names)
                 target = out if count is None else _numbered(out, index, count)
                 written += shown.save(target)
             for name, duration in frames.timings.items():
                 seconds.setdefault(name, []).append(duration)
-    if not is_quiet():
-        show(_times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU"))
-    for line in _listed(written, is_animation=count is not None):
+    times = _times(seconds, "CPU" if renderer.info.type == "cpu" else "GPU")
+    for line in [*times, *_listed(written, is_animation=count is not None)]:
         say(line)
 
 
@@ -116,16 +107,13 @@ def _numbered(out: str, index: int, count: int) -> Path:
     return target.with_name(f"{target.stem}_{number}{target.suffix}")
 
 
-def _times(seconds: dict[str, list[float]], device: str) -> Table:
+def _times(seconds: dict[str, list[float]], device: str) -> list[str]:
     """Return a table of each pass's mean time over the frames in which it ran."""
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("pass")
-    table.add_column(f"ms on the {device}", justify="right")
-    table.add_column("runs", justify="right")
+    lines = [f"  {'pass':<32}{f'ms on the {device}':>14}{'runs':>8}"]
     for name, durations in seconds.items():
         mean = sum(durations) / len(durations)
-        table.add_row(name, f"{1e3 * mean:.3f}", str(len(durations)))
-    return table
+        lines.append(f"  {name:<32}{1e3 * mean:14.3f}{len(durations):8}")
+    return lines
 
 
 def _listed(written: list[Path], *, is_animation: bool) -> list[str]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._checks import import_extra
+from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.renderer import Renderer
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
-
-__all__ = ["explore"]
 
 
 def explore(
@@ -84,7 +83,6 @@ def explore(
     texels looks wider in a reduced frame.
     """
     import_extra("anywidget", "notebook", "explore")
-    from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(

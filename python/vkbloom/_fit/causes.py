@@ -8,8 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["is_found", "likely_cause"]
-
 NOTHING_FOUND: Final = "no bloom was found"
 # A bloom explains more than changes of colours do: its difference is at most this share of theirs.
 _BEYOND_COLOURS: Final = 0.8

@@ -14,8 +14,6 @@ from vkbloom._fit.search import CLOSE, ENOUGH, STEPS, Search, SpentError
 from vkbloom._fit.space import Point, Space
 from vkbloom.reference._derivatives import differentiable
 
-__all__ = ["Descent", "check_derivatives"]
-
 #: From settings to the function that takes a cotangent to the derivatives by each field.
 Back = Callable[[Any], Callable[[NDArray[np.float64]], Any]]
 

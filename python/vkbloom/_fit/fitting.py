@@ -30,8 +30,6 @@ from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings
 
-__all__ = ["Maker", "fit"]
-
 #: A function of an image, such as `vkbloom.testing.command` makes of a program.
 Maker = Callable[[NDArray[Any]], NDArray[Any]]
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._views.comparison import flip_map
 
-__all__ = ["Loss", "LossName", "Measure", "light", "loss_named", "reduced"]
-
 LossName = Literal["relative", "l2", "log", "flip"]
 #: A loss by name, or a callable of two arrays (the framebuffer and the target) of float64.
 Loss = LossName | Callable[[NDArray[np.float64], NDArray[np.float64]], float]

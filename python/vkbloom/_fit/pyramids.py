@@ -18,8 +18,6 @@ from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom.psf import PSF
 
-__all__ = ["fit_pyramid"]
-
 PyramidLoss = Literal["relative", "log"]
 # Rows of the matrix are not weighted by more than 1 over this share of the peak.
 _DARK: Final = 1e-4

@@ -12,8 +12,6 @@ from vkbloom._checks import import_extra
 from vkbloom._fit.losses import Measure
 from vkbloom._fit.space import Point, Space
 
-__all__ = ["CLOSE", "ENOUGH", "STEPS", "Search", "SpentError"]
-
 # Coordinates are from 0 to 1.
 # Steps of finite differences: first large compared with the rounding of half floats, then small.
 STEPS: Final = (1e-2, 1e-3)

@@ -15,8 +15,6 @@ from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.settings import Settings
 from vkbloom._suggestions import did_you_mean
 
-__all__ = ["Axis", "Bounds", "Point", "Space", "space_of", "spaces_of_all"]
-
 #: Coordinates, 0 to 1, one for each axis.
 Point = NDArray[np.float64]
 

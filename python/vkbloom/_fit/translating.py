@@ -21,8 +21,6 @@ from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, check_settings
 
-__all__ = ["lights", "translate"]
-
 # What a user of a method turns; other fields of `to` stay as they are.
 _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "separable": ("blur_scale", "blur_strength"),

@@ -27,8 +27,6 @@ from vkbloom.reference._derivatives import check_cotangents
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
-__all__ = ["number_of", "refuse_capture", "replaced", "text_of"]
-
 
 @functools.lru_cache(64)
 def _text(settings: Settings) -> str:

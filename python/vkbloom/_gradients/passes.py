@@ -19,8 +19,6 @@ from vkbloom.reference._derivatives import check_known, differentiable
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["DeviceGradients", "Passes", "Running", "check_finite", "device_fields", "on_device"]
-
 #: The most framebuffers with cotangents that a source can bring.
 _MAX_LEVELS: Final = 7
 #: The fields whose derivatives are the channels of a sum.

@@ -27,8 +27,6 @@ from vkbloom.reference._derivatives import Gradients, check_cotangents, check_sh
 if TYPE_CHECKING:
     from vkbloom._renderer.device_arrays import Destination, Device
 
-__all__ = ["Pullback", "pull_each", "pullback_of", "vjp"]
-
 Derivatives = Mapping[str, NDArray[Any]]
 #: From cotangents by framebuffer to derivatives by name.
 Pullback = Callable[[Mapping[str, NDArray[Any]]], Derivatives]

@@ -17,8 +17,6 @@ from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings, field_info
 from vkbloom._suggestions import did_you_mean
 
-__all__ = ["WHOLE", "Axis", "image_axis", "read_axes"]
-
 Kind = Literal["settings", "time", "image", "preset"]
 
 #: Axes whose values are settings of any methods, on which the other axes' fields are changed.

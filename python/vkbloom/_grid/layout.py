@@ -23,8 +23,6 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, check_settings
 from vkbloom._version import installed_version
 
-__all__ = ["Grid", "Layout", "Variable", "ask", "lay_out", "origin"]
-
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
 _CHANNELS: Final = ("r", "g", "b", "a")

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import xarray
 
 
-__all__ = ["BLOCK_BYTES", "BLOCK_POINTS", "chunk_of", "in_memory"]
-
 #: Limits of a block: large enough for an efficient file, small enough to render again if lost.
 BLOCK_BYTES = 1 << 20
 BLOCK_POINTS = 1024

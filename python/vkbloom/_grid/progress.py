@@ -9,8 +9,6 @@ from typing import Any
 from vkbloom._checks import import_extra
 from vkbloom._grid.filling import Tally
 
-__all__ = ["Progress"]
-
 
 def _is_watched() -> bool:
     """Return whether standard error is a terminal, or this process a notebook's kernel."""

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Shading
 
-__all__ = ["ImageSource", "Point", "SceneSource", "Source", "read_source", "visit"]
-
 
 @dataclass(frozen=True)
 class Point:

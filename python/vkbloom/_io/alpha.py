@@ -45,17 +45,6 @@ from vkbloom._io.images import failure_of
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = [
-    "Meaning",
-    "channels_of",
-    "divided",
-    "hidden_notes",
-    "in_order",
-    "light_of",
-    "meaning_of",
-    "multiplied",
-]
-
 # ExtraSamples of TIFF 6.0, and its value for colours that are multiplied by alpha.
 _EXTRA_SAMPLES: Final = 338
 _ASSOCIATED: Final = 1

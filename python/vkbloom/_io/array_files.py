@@ -20,8 +20,6 @@ from vkbloom._io.displayed import Saved, check_saved
 from vkbloom._io.expansion import check_expansion
 from vkbloom._io.images import PIXEL_TYPES, Picture, SavedColour, check_name, is_exr
 
-__all__ = ["has_straight", "premultiplied", "read", "write"]
-
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
 _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")

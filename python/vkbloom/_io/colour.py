@@ -20,8 +20,6 @@ from vkbloom._io.icc import Profile, from_lab, read_profile
 from vkbloom._io.images import SPACES, Colour, StoredImage
 from vkbloom._io.srgb import decode_srgb
 
-__all__ = ["LAB", "check_space", "linear"]
-
 _CONFIGURATION: Final = "ocio://default"
 _LINEAR: Final = SPACES["linear"]
 # Spaces of an exponent. OpenColorIO's own powers are off by 2e-5.

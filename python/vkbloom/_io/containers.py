@@ -15,17 +15,6 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "HEIF_ADVICE",
-    "is_heif",
-    "late_exif",
-    "orientation_of",
-    "padded",
-    "png_chunks",
-    "tiff_field",
-    "upright",
-]
-
 #: What to do with AVIF and HEIF.
 HEIF_ADVICE: Final = (
     "this OpenImageIO is built without libheif, which reads AVIF and HEIF; convert the file to "

@@ -15,8 +15,6 @@ from pathlib import Path
 
 from vkbloom._io.safe_writing import write_file
 
-__all__ = ["DiskCache", "folder"]
-
 MAGIC = b"vkbloom cache 1\n"
 _DIGEST_SIZE = 32
 HEADER_SIZE = len(MAGIC) + _DIGEST_SIZE

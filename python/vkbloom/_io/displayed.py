@@ -16,23 +16,6 @@ from vkbloom._io.hdr_curves import ENCODERS
 from vkbloom._io.images import SPACES
 from vkbloom._io.srgb import encode_srgb
 
-__all__ = [
-    "HDR_CURVES",
-    "PRIMARIES",
-    "Attributes",
-    "Saved",
-    "check_primaries",
-    "check_saved",
-    "converted",
-    "encoded",
-    "from_primaries",
-    "has_hdr_curve",
-    "is_hdr",
-    "of_code_points",
-    "scaled_to_1",
-    "with_names",
-]
-
 #: A file's attributes by OpenImageIO's names, each with its type and value.
 Attributes = Mapping[str, tuple[Any, Any]]
 

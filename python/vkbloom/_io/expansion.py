@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import as_float
 
-__all__ = ["KNEE", "PHOTO_EXPANSION", "check_expansion", "expanded"]
-
 #: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
 KNEE: Final = 0.8
 #: What the command line expands photographs to for the preset "photo".

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["alike", "grey_mask"]
-
 
 def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
     """Return the values of a mask."""

@@ -8,8 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["DECODERS", "ENCODERS"]
-
 Curve = Callable[[NDArray[Any]], NDArray[np.float64]]
 
 # Table 4, PQ; and Rec. ITU-R BT.2408: the luminance of diffuse white in cd/m2.

@@ -9,8 +9,6 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Profile", "from_lab", "read_profile"]
-
 #: A curve for values of 0..1.
 Curve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 

@@ -35,23 +35,6 @@ from vkbloom._io.png_gamma import png_gamma
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = [
-    "check_plausible",
-    "chosen_part",
-    "decode",
-    "decode_file",
-    "describe",
-    "is_photograph",
-    "listed_parts",
-    "load",
-    "non_finite_note",
-    "of_layer",
-    "opened",
-    "points_of",
-    "readable_extensions",
-    "size_of",
-]
-
 _LARGEST_SIDE: Final = 65536
 # Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
 _LARGEST_AREA: Final = 1 << 28

@@ -20,18 +20,6 @@ from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, is_exr
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = [
-    "BITS",
-    "Part",
-    "check_bits",
-    "check_quality",
-    "check_writable",
-    "described_as",
-    "is_straight",
-    "put",
-    "save",
-]
-
 # Number types to write, in order of preference, by the number type of the picture. For floats
 # uint8 comes before uint16, because a PNG of a float picture is expected to have 8 bits.
 _PREFERENCES: Final[Mapping[str, tuple[str, ...]]] = {

@@ -25,23 +25,6 @@ from typing import Any, Final, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "DTYPES",
-    "PIXEL_TYPES",
-    "SPACES",
-    "Colour",
-    "Picture",
-    "SavedColour",
-    "StoredImage",
-    "Window",
-    "check_name",
-    "complete",
-    "failure_of",
-    "is_exr",
-    "is_kept",
-    "warnings_of",
-]
-
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.

@@ -7,8 +7,6 @@ from typing import Final
 
 from vkbloom._io.containers import png_chunks
 
-__all__ = ["png_gamma"]
-
 # A gAMA chunk holds the exponent of the encoding times this number.
 _SCALE: Final = 100_000
 # The largest four-byte integer of PNG. 0 is no exponent.

@@ -26,20 +26,6 @@ from vkbloom._io.images import check_name, failure_of
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = [
-    "Steps",
-    "check_extension",
-    "has_alpha",
-    "holds",
-    "is_stream",
-    "is_temporary",
-    "remove",
-    "replacing",
-    "write_error",
-    "write_file",
-    "writing",
-]
-
 #: A writer of OpenImageIO, its file, and a check of the results of its calls.
 Steps: TypeAlias = tuple[Any, Path, Callable[[bool], None]]
 

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["decode_srgb", "encode_srgb"]
-
 
 def decode_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
     """Decode sRGB values to linear values.

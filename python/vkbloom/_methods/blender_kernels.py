@@ -15,8 +15,6 @@ from vkbloom.psf._eye import spencer
 if TYPE_CHECKING:
     from vkbloom.psf._base import PSF
 
-__all__ = ["core_kernel_of", "glare_size", "kernel_of", "kernel_sides"]
-
 
 class KernelSettings(Protocol):
     """The settings that a kernel follows from."""

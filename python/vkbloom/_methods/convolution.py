@@ -20,8 +20,6 @@ from vkbloom.psf._eye import spencer
 from vkbloom.psf._resampling import box_resample
 from vkbloom.psf._sampled import samples
 
-__all__ = ["Boundary", "Convolution", "PSFLike", "read_psf"]
-
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: The types of a kernel: a function, the result of its `to_dict`, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike

@@ -13,8 +13,6 @@ from vkbloom._array_cache import kept
 from vkbloom._core_kernel import CoreKernel, core_kernel
 from vkbloom._settings.settings import Settings
 
-__all__ = ["GaussianSum", "gaussian"]
-
 Size = tuple[int, int]
 
 

@@ -15,8 +15,6 @@ from typing import Final, NamedTuple
 from vkbloom import _core
 from vkbloom._renderer.adapter import AdapterInfo, from_core
 
-__all__ = ["chosen_adapter"]
-
 # For "auto", from the best to the last.
 _TYPES: Final = ("discrete", "integrated", "virtual", "cpu", "other")
 _NVIDIA: Final = 0x10DE

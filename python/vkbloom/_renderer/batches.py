@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.requests import PendingSubmissions
     from vkbloom._settings.settings import Settings
 
-__all__ = ["Batches"]
-
 #: The most bytes of images on the device, half of what the core keeps.
 MAX_BYTES = 128 << 20
 #: The most layers, which every device has.

@@ -24,8 +24,6 @@ from vkbloom._settings.settings import Settings, Shading, check_settings
 if TYPE_CHECKING:
     from vkbloom._scene import Scene
 
-__all__ = ["apply", "default_renderer", "render"]
-
 
 class _Default:
     """The renderers of calls without one, by adapter.

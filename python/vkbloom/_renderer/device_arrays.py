@@ -16,22 +16,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "Destination",
-    "Device",
-    "DeviceArray",
-    "ImportedArray",
-    "fill",
-    "likeness",
-    "memory_for",
-    "merged",
-    "on_cuda",
-    "on_host",
-    "place_of",
-    "placed",
-    "take",
-]
-
 #: Where framebuffers are wanted.
 Device = Literal["host", "device"]
 #: Where framebuffers go: arrays of NumPy; the same as a `DeviceArray`; memory that CUDA shares.

@@ -29,8 +29,6 @@ from vkbloom._version import installed_version
 if TYPE_CHECKING:
     import OpenImageIO
 
-__all__ = ["facts_of", "load", "save", "settings_facts"]
-
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
 # Attributes that `_attributes` writes in addition to the entries of `info`.

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from vkbloom._settings.settings import Settings
 
-__all__ = ["Frames", "dimensions"]
-
 _IMAGE_DTYPES = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
 _CHANNELS = ("r", "g", "b", "a")
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from vkbloom import _core
 
-__all__ = ["Image"]
-
 
 class Image:
     """A copy of an image on a renderer's device, made by `Renderer.upload`.

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 
 from vkbloom._renderer.renderer import Renderer
 
-__all__ = ["opened_renderer"]
-
 
 @contextmanager
 def opened_renderer(adapter: str, validation: bool) -> Iterator[Renderer]:

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from vkbloom import _core
     from vkbloom._settings.settings import Settings
 
-__all__ = ["Pass", "Plan", "framebuffers_of"]
-
 Framebuffer = tuple[tuple[int, ...], np.dtype[Any]]
 
 

@@ -21,7 +21,14 @@ from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom._renderer.adapter_choice import chosen_adapter
 from vkbloom._renderer.batches import Batches
-from vkbloom._renderer.device_arrays import Device, DeviceArray, fill, likeness, on_cuda
+from vkbloom._renderer.device_arrays import (
+    Destination,
+    Device,
+    DeviceArray,
+    fill,
+    likeness,
+    on_cuda,
+)
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.sources import (
@@ -86,7 +93,7 @@ def _arrays_for(
     core: _core.Renderer,
     plan: _core.Plan,
     out: Mapping[str, Any] | None,
-    place: requests.Destination,
+    place: Destination,
 ) -> tuple[NDArray[Any] | _core.Exported, ...]:
     """Return the arrays to fill: those of `out`, and new ones.
 
@@ -709,7 +716,7 @@ class Renderer:
         images: Any,
         settings: Settings,
         names: tuple[str, ...] | None,
-        place: Callable[[_core.Source], requests.Destination],
+        place: Callable[[_core.Source], Destination],
     ) -> Iterator[Frames]:
         self._pending.wait()
         batch = take_batch(images, self._core)
@@ -722,12 +729,12 @@ class Renderer:
             self._save_pipelines()
             yield frames
 
-    def _placed(self, device: Device | None) -> Callable[[_core.Source], requests.Destination]:
+    def _placed(self, device: Device | None) -> Callable[[_core.Source], Destination]:
         """Return where the framebuffers of a source go."""
         if device not in (None, "host", "device"):
             raise ValueError(f"device: {device!r} is not 'host' or 'device'")
 
-        def place(source: _core.Source) -> requests.Destination:
+        def place(source: _core.Source) -> Destination:
             if device == "host" or (device is None and not source.exported):
                 return "host"
             # The memory of a CPU adapter is the host's.
@@ -798,7 +805,7 @@ class Renderer:
         self,
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,
-        place: Callable[[_core.Source], requests.Destination] = lambda _: "host",
+        place: Callable[[_core.Source], Destination] = lambda _: "host",
         *,
         alone: bool = False,
     ) -> Iterator[Frames]:

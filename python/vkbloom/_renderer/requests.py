@@ -21,20 +21,6 @@ if TYPE_CHECKING:
 
     from vkbloom._settings.settings import Settings
 
-__all__ = [
-    "Destination",
-    "PendingSubmission",
-    "PendingSubmissions",
-    "Request",
-    "Result",
-    "named",
-    "new_array",
-    "new_arrays",
-    "new_memory",
-    "run",
-    "uploaded",
-]
-
 #: The most requests in one submission.
 MAX_REQUESTS = 32
 #: The most bytes of framebuffers in one submission. A single request may have more.

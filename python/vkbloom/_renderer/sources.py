@@ -21,20 +21,6 @@ if TYPE_CHECKING:
     from vkbloom._scene.textures import Texture
     from vkbloom._settings.settings import Shading
 
-__all__ = [
-    "SCENE_SIZE",
-    "Inputs",
-    "any_source",
-    "batch_sources",
-    "checked_inputs",
-    "image_source",
-    "is_image",
-    "scene_arguments",
-    "scene_source",
-    "take_batch",
-    "uploaded_inputs",
-]
-
 
 #: Width and height of a scene's frame, where none are given.
 SCENE_SIZE = (1280, 720)

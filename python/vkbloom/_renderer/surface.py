@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
 
-__all__ = ["Surface"]
-
 _FRAMES_IN_FLIGHT: Final = 2
 
 

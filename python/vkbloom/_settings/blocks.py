@@ -11,8 +11,6 @@ from vkbloom import _core
 if TYPE_CHECKING:
     from vkbloom._settings.glare import Glare
 
-__all__ = ["settings_block"]
-
 Table = Mapping[str, tuple[int, str, int]]
 Values = Mapping[str, tuple[float, float, float]]
 

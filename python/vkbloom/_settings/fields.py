@@ -20,20 +20,6 @@ from vkbloom import _core
 from vkbloom._checks import check_above, check_floats, check_integer, check_number, check_size
 from vkbloom._suggestions import did_you_mean, lacking
 
-__all__ = [
-    "FieldInfo",
-    "Kind",
-    "Record",
-    "check_fields",
-    "choice_field",
-    "fields_of",
-    "flag_field",
-    "number_field",
-    "plain_value",
-    "read_numbers",
-    "value_field",
-]
-
 Kind = Literal[
     "flag",
     "integer",

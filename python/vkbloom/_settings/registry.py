@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from vkbloom._settings.glare import Glare
     from vkbloom._settings.settings import Settings
 
-__all__ = ["METHODS", "STAGES", "Methods", "Reference", "Registry", "glares", "presets"]
-
 
 class Reference(Protocol):
     """A method in NumPy, such as the modules of `vkbloom.reference`.

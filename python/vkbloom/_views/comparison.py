@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
@@ -12,17 +12,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import as_float, check_number, import_extra, native_order
 from vkbloom._io.srgb import decode_srgb
-
-__all__ = [
-    "ALL_METRICS",
-    "USUAL_METRICS",
-    "Comparison",
-    "Metric",
-    "checked_image",
-    "compare",
-    "difference",
-    "flip_map",
-]
 
 Metric = Literal["ssim", "psnr", "flip", "cvvdp"]
 
@@ -48,7 +37,8 @@ class Comparison:
     - `percent_over`: Percentage of pixels that have a channel which differs by more than
       `threshold` and `relative` allow, or which is not finite in only one image.
     - `threshold`, `relative`: The arguments of `compare`.
-    - `data_range`: The data range for SSIM and PSNR.
+    - `data_range`: The data range for SSIM and PSNR: 1 for integers; for floats the range of the
+      values, 0 and 1, which is 1 for images within 0..1.
     - `ssim`, `psnr`, `flip`: Structural similarity, peak signal-to-noise ratio in dB (inf if
       nothing differs) and mean FLIP.
     - `cvvdp`: ColorVideoVDP in just-objectionable differences: 10 where no difference is visible.
@@ -98,57 +88,23 @@ def compare(
     threshold: float = 0.0,
     relative: float = 0.0,
     allow_nan: bool = False,
-    data_range: float | None = None,
     metrics: Collection[Metric] = USUAL_METRICS,
     nits_per_unit: float | None = None,
     pixels_per_degree: float | None = None,
 ) -> Comparison:
-    """Compare two images.
+    """Compare two images; `a` is the reference.
 
-    Parameters
-    ----------
-    a, b : ndarray, shape (H, W) or (H, W, C)
-        uint8, uint16 (both scaled to 0..1), float16, float32 or float64. `a` is the reference. All
-        channels are compared, including alpha; FLIP uses the first three, or the first as grey.
-    threshold : float, default 0
-        A pixel counts in `percent_over` if it differs by more than this.
-    relative : float, default 0
-        Added to `threshold` after multiplying with the absolute value in `a`.
-    allow_nan : bool, default False
-        Whether NaN, and infinity of the same sign, are equal if both images have it.
-    data_range : float, optional
-        Data range for SSIM and PSNR. Default: 1 for integers; for floats the range of the values,
-        0 and 1, which is 1 for images within 0..1.
-    metrics : collection of {"ssim", "psnr", "flip", "cvvdp"}
-        The metrics to compute; the others are None. They are far slower than the other figures.
-        Default: all but "cvvdp", which is left out with a reason in `not_computed` where its
-        package is missing: ``pip install vkbloom[cvvdp]``.
-    nits_per_unit : float, optional
-        Luminance of a linear value of 1 on the display in cd/m2, above 0; "cvvdp" needs it.
-        Integers are decoded from sRGB first: it is the display's white.
-    pixels_per_degree : float, optional
-        Pixels of the image that one degree of the observer's view spans, above 0. "flip" has
-        67.02 where it is None (a 4K monitor of 0.69 m width at 0.7 m), "cvvdp" needs it.
-
-    Returns
-    -------
-    Comparison
-        SSIM and PSNR are scikit-image's (SSIM with its window of 7 x 7), FLIP is OpenImageIO's:
-        for integers, decoded from sRGB, LDR-FLIP; for floats, taken as linear, HDR-FLIP with
-        OpenImageIO's exposures, which are made for luminances up to 2. Values that are not
-        finite count as 0 in SSIM and FLIP and not at all in the others.
-
-    Raises
-    ------
-    ValueError
-        An image has another number of dimensions or no pixels; `threshold`, `relative` or
-        `data_range` is out of range, or a metric is unknown.
+    They are (H, W) or (H, W, C); uint8 and uint16 are scaled to 0..1. All channels are compared,
+    including alpha; FLIP uses the first three, or the first as grey. A pixel counts in
+    `percent_over` if it differs by more than threshold + relative * abs(a). With `allow_nan`, NaN
+    and infinity of the same sign are equal. SSIM and PSNR are scikit-image's (SSIM with its window
+    of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats. "cvvdp" needs the
+    luminance of a linear 1 in cd/m2 and the pixels of a degree of the observer's view; FLIP has 67
+    where that is None. Values that are not finite count as 0 in SSIM and FLIP only.
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
     _check_metrics(metrics, nits_per_unit=nits_per_unit, pixels_per_degree=pixels_per_degree)
-    if data_range is not None and not 0 < data_range < math.inf:
-        raise ValueError(f"data_range: {data_range!r} is out of range, finite and above 0")
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
@@ -164,20 +120,19 @@ def compare(
         mismatches += (f"NaN or infinity in one image only, {_places(unequal)}",)
     if common.any() and not allow_nan:
         mismatches += (f"NaN or infinity in both images, {_places(common)}",)
-    if data_range is None:
-        data_range = 1.0 if pair.is_integer else _span(pair)
+    data_range = 1.0 if pair.is_integer else _span(pair)
     computed, not_computed = _metrics(
         pair, metrics, data_range=data_range, nits=nits_per_unit, degree=pixels_per_degree
     )
     over = _over(pair, threshold, relative)
-    place, values = _largest(pair)
+    position, values = _largest(pair)
     is_any = bool(pair.valid.any())
     return Comparison(
         mismatches=mismatches,
         threshold=threshold,
         relative=relative,
         max_error=float(pair.error.max()) if is_any else None,
-        max_error_at=place,
+        max_error_at=position,
         max_error_values=values,
         mean_error=float(pair.error.mean(where=pair.valid)) if is_any else None,
         percent_over=100.0 * float(over.any(axis=2).mean()),
@@ -198,20 +153,15 @@ def _check_metrics(metrics: Collection[Metric], **viewing: float | None) -> None
             raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
 
 
-def difference(
-    a: NDArray[Any], b: NDArray[Any], scale: float | None = None
-) -> tuple[NDArray[np.float32], float]:
-    """Make a picture of the differences of two images."""
-    if scale is not None and not 0 < scale < math.inf:
-        raise ValueError(f"scale: {scale!r} is out of range, finite and above 0")
+def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[NDArray[np.float32], float]:
+    """Make a picture of the differences of two images, and return it with its scale."""
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     pair = _pair(a, b)
     largest = min(float(pair.error.max()), float(np.finfo(np.float64).max))
-    if scale is None:
-        scale = 1.0 / largest if largest else 1.0
+    scale = 1.0 / largest if largest else 1.0
     colours = 3 if a.shape[2] >= 3 else 1
     picture = np.repeat(pair.error[:, :, :colours], 3 // colours, axis=2)
     if a.shape[2] > colours:
@@ -238,15 +188,15 @@ def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
     """Return the reasons why two images cannot be compared value by value."""
-    found: list[str] = []
+    results: list[str] = []
     if a.shape[:2] != b.shape[:2]:
         sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
-        found.append(f"the sizes differ, {' against '.join(sizes)}")
+        results.append(f"the sizes differ, {' against '.join(sizes)}")
     if a.shape[2] != b.shape[2]:
-        found.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
+        results.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
     if a.dtype.kind != b.dtype.kind:
-        found.append(f"integers against floats, {a.dtype} against {b.dtype}")
-    return tuple(found)
+        results.append(f"integers against floats, {a.dtype} against {b.dtype}")
+    return tuple(results)
 
 
 def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
@@ -308,62 +258,56 @@ def _metrics(
     degree: float | None,
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return the computed metrics, and the reasons for the others, by name."""
+    measures: dict[Metric, Callable[[], float | str]] = {
+        "ssim": lambda: _ssim(pair, data_range),
+        "psnr": lambda: _psnr(pair, data_range),
+        "flip": lambda: _mean_flip(pair, degree),
+        "cvvdp": lambda: _cvvdp(pair, nits or 0.0, degree or 0.0),
+    }
     computed: dict[str, float] = {}
     reasons: dict[str, str] = dict.fromkeys(set(USUAL_METRICS) - set(wanted), "not asked for")
-    # Extreme floats give figures that are not finite, which are checked below.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        if "ssim" in wanted:
-            _add_ssim(pair, data_range, computed, reasons)
-        if "psnr" in wanted:
-            _add_psnr(pair, data_range, computed, reasons)
-    if "flip" in wanted:
-        if hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
-            computed["flip"] = float(_flip(pair, degree).mean(dtype=np.float64))
-        else:
-            reasons["flip"] = "OpenImageIO 3.2 is needed"
-    if "cvvdp" in wanted and nits is not None and degree is not None:
-        _add_cvvdp(pair, nits, degree, computed, reasons)
-    for name, value in list(computed.items()):
-        if math.isnan(value) or value == -math.inf:
+    for name in wanted:
+        # Extreme floats give figures that are not finite.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            value = measures[name]()
+        if isinstance(value, str):
+            reasons[name] = value
+        elif math.isnan(value) or value == -math.inf:
             reasons[name] = "the values are too large"
-            del computed[name]
+        else:
+            computed[name] = value
     return computed, reasons
 
 
-def _add_ssim(
-    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
-) -> None:
+def _ssim(pair: _Pair, data_range: float) -> float | str:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if min(pair.a.shape[:2]) < _SSIM_WINDOW:
-        reasons["ssim"] = f"a side is under the window's {_SSIM_WINDOW} pixels"
-        return
-    computed["ssim"] = float(
+        return f"a side is under the window's {_SSIM_WINDOW} pixels"
+    return float(
         metrics.structural_similarity(
             pair.a, pair.b, win_size=_SSIM_WINDOW, data_range=data_range, channel_axis=-1
         )
     )
 
 
-def _add_psnr(
-    pair: _Pair, data_range: float, computed: dict[str, float], reasons: dict[str, str]
-) -> None:
+def _psnr(pair: _Pair, data_range: float) -> float | str:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if not pair.valid.any():
-        reasons["psnr"] = "no values to compare"
-    elif not pair.error.any():
-        computed["psnr"] = math.inf
-    else:
-        computed["psnr"] = float(
-            metrics.peak_signal_noise_ratio(
-                pair.a[pair.valid], pair.b[pair.valid], data_range=data_range
-            )
-        )
+        return "no values to compare"
+    if not pair.error.any():
+        return math.inf
+    a, b = pair.a[pair.valid], pair.b[pair.valid]
+    return float(metrics.peak_signal_noise_ratio(a, b, data_range=data_range))
 
 
-def _add_cvvdp(
-    pair: _Pair, nits: float, degree: float, computed: dict[str, float], reasons: dict[str, str]
-) -> None:
-    """Add ColorVideoVDP of two still images.
+def _mean_flip(pair: _Pair, degree: float | None) -> float | str:
+    if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
+        return "OpenImageIO 3.2 is needed"
+    return float(_flip(pair, degree).mean(dtype=np.float64))
+
+
+def _cvvdp(pair: _Pair, nits: float, degree: float) -> float | str:
+    """Return ColorVideoVDP of two still images.
 
     Source: Mantiuk et al., "ColorVideoVDP: A Visual Difference Predictor for Image, Video and
     Display Distortions", SIGGRAPH 2024.
@@ -371,8 +315,7 @@ def _add_cvvdp(
     try:
         package = import_extra("pycvvdp", "cvvdp", "ColorVideoVDP")
     except ModuleNotFoundError as error:
-        reasons["cvvdp"] = str(error)
-        return
+        return str(error)
     images = [np.float32(nits) * image for image in _linear(pair)]
     height, width = images[0].shape[:2]
     # A display that shows all luminances of both images, and adds no light of its own.
@@ -385,7 +328,7 @@ def _add_cvvdp(
         quiet=True,
     )
     score, _ = metric.predict(images[1], images[0], dim_order="HWC")
-    computed["cvvdp"] = float(score)
+    return float(score)
 
 
 def flip_map(
@@ -409,14 +352,14 @@ def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
     """Return both images as linear (H, W, 3) of float32."""
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
-    found = []
+    results = []
     for image in (pair.a, pair.b):
         linear = image[:, :, :colours]
         if pair.is_integer:
             linear = decode_srgb(linear)
         limited = np.clip(linear, -largest, largest).astype(np.float32)
-        found.append(np.repeat(limited, 3 // colours, axis=2))
-    return found
+        results.append(np.repeat(limited, 3 // colours, axis=2))
+    return results
 
 
 def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:

@@ -15,8 +15,6 @@ from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._views.comparison import checked_image
 from vkbloom._views.shifts import MIN_SHIFT, find_shift
 
-__all__ = ["Cause", "Diagnosis", "diagnose"]
-
 Cause = Literal[
     "equal",
     "gain",
@@ -141,13 +139,13 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     scale = max(float(np.abs(plain_a).max()), float(np.abs(plain_b).max()))
     if scale > 1e150:
         plain_a, plain_b = plain_a / scale, plain_b / scale
-    found = _of_rounding(a, b, plain_a, plain_b)
-    if found is None:
+    result = _of_rounding(a, b, plain_a, plain_b)
+    if result is None:
         for candidate in _candidates(plain_a, plain_b):
-            found = _judged(candidate, plain_a, plain_b, step, tiny)
-            if found is not None:
+            result = _judged(candidate, plain_a, plain_b, step, tiny)
+            if result is not None:
                 break
-    return found or _of_shift(plain_a, plain_b, step)
+    return result or _of_shift(plain_a, plain_b, step)
 
 
 def _none(a: _Image, b: _Image) -> Diagnosis:
@@ -334,10 +332,10 @@ def _judged(
 
 def _of_shift(a: _Image, b: _Image, step: float) -> Diagnosis:
     """Return the diagnosis of a shift by any number of pixels, or of no known cause."""
-    found = find_shift(a, b, step)
-    if found is None:
+    result = find_shift(a, b, step)
+    if result is None:
         return _none(a, b)
-    shift, residual = found
+    shift, residual = result
     return Diagnosis(
         cause="shift",
         value=(round(shift[0], 3) + 0.0, round(shift[1], 3) + 0.0),

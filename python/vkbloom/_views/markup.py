@@ -10,11 +10,16 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-__all__ = ["Markup", "element", "encoded_image", "figure", "image", "joined", "page", "table"]
-
 _NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
 # Of cells: some notebooks, such as marimo, have no padding of their own.
 _CELL: Final = "padding:2px 8px"
+# Of a page, which is no notebook.
+_STYLE: Final = (
+    ":root{color-scheme:light dark;font:15px/1.4 sans-serif}body{max-width:80em;margin:2em auto;"
+    "padding:0 1em;background:canvas}pre{white-space:pre-wrap}"
+    "td,th,pre{overflow-wrap:anywhere;text-align:left}"
+    "figure{display:inline-block;margin:0 12px 12px 0}img{max-width:100%;image-rendering:pixelated}"
+)
 
 
 class Markup(str):
@@ -46,11 +51,7 @@ def element(name: str, *content: object, **attributes: object) -> Markup:
 
 def image(png: bytes, alt: str, **attributes: object) -> Markup:
     """Return an image with its data."""
-    return encoded_image(base64.b64encode(png).decode("ascii"), alt, **attributes)
-
-
-def encoded_image(data: str, alt: str, **attributes: object) -> Markup:
-    """Return an image of a PNG file in base64."""
+    data = base64.b64encode(png).decode("ascii")
     return element("img", src=f"data:image/png;base64,{data}", alt=alt, **attributes)
 
 
@@ -88,9 +89,15 @@ def table(
     )
 
 
-def page(title: str, *content: object, style: str = "") -> str:
+def page(title: str, *content: object) -> str:
     """Return a complete document."""
     head = joined(
-        (element("meta", charset="utf-8"), element("title", title), element("style", Markup(style)))
+        (
+            element("meta", charset="utf-8"),
+            element("meta", name_="viewport", content="width=device-width"),
+            element("title", title),
+            element("style", Markup(_STYLE)),
+        )
     )
-    return f'<!doctype html><html lang="en">{head}{element("body", *content)}</html>\n'
+    body = element("body", element("main", *content))
+    return f'<!doctype html><html lang="en">{head}{body}</html>\n'

@@ -16,8 +16,6 @@ from vkbloom.psf._base import Array, centred, check_wavelengths
 from vkbloom.psf._sampled import SampledPSF
 from vkbloom.psf._values import ArrayValue
 
-__all__ = ["aperture", "iris"]
-
 # Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4
 # Rows that are computed at a time: of masks, and of sums.

@@ -18,17 +18,6 @@ from vkbloom._settings.fields import Record
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = [
-    "FRAME_DEGREES",
-    "PSF",
-    "Array",
-    "centred",
-    "check_radii",
-    "check_wavelengths",
-    "functions",
-    "in_grey",
-]
-
 Array = NDArray[np.float64]
 
 #: Degrees that the longer side of a frame spans where `pixels_per_degree` is None.

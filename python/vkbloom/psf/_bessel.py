@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bessel"]
-
 # The asymptotic series is exact to 1e-15 from here on, the integral below.
 _FAR = 25.0
 _NODES = 32

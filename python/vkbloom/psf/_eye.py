@@ -12,8 +12,6 @@ from vkbloom._settings.fields import number_field, value_field
 from vkbloom.psf._base import Array, check_wavelengths, in_grey
 from vkbloom.psf._radial import RadialPSF
 
-__all__ = ["State", "cie_general", "cie_total", "spencer"]
-
 State = Literal["photopic", "mesopic", "scotopic"]
 
 # Shares of f0, f1, f2 and f3.

@@ -23,8 +23,6 @@ from vkbloom._core_kernel import CoreKernel
 from vkbloom._io.disk_cache import DiskCache
 from vkbloom.psf._values import ArrayValue
 
-__all__ = ["CACHE", "MIN_SECONDS", "find_or_make"]
-
 CACHE: Final = DiskCache("kernels")
 #: Of processor time of the thread.
 MIN_SECONDS: Final = 0.02

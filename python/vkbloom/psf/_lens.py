@@ -14,8 +14,6 @@ from vkbloom.psf._base import PSF, Array, check_radii, in_grey
 from vkbloom.psf._bessel import bessel
 from vkbloom.psf._radial import RadialPSF, integrate_pixels
 
-__all__ = ["airy", "gaussian", "harvey_shack"]
-
 
 @dataclasses.dataclass(frozen=True)
 class gaussian(PSF):

@@ -15,8 +15,6 @@ from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import Array
 from vkbloom.psf._sampled import SampledPSF
 
-__all__ = ["measured"]
-
 
 def _read_settings(settings: Any) -> Settings:
     if isinstance(settings, Mapping):

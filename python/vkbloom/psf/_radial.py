@@ -14,8 +14,6 @@ from vkbloom._checks import check_above, check_size
 from vkbloom.psf._base import FRAME_DEGREES, PSF, Array, check_radii
 from vkbloom.psf._bessel import bessel
 
-__all__ = ["RadialPSF", "integrate_pixels"]
-
 # (first distance in pixels, nodes along a side of a pixel). The outer parts are smooth and need
 # few nodes. The inner parts may have a core or a halo that is narrower than a pixel.
 _RINGS = ((0.0, 16), (24.0, 4), (96.0, 2))

@@ -19,8 +19,6 @@ from vkbloom.psf._sampled import SampledPSF, check_values, rgb
 if TYPE_CHECKING:
     from vkbloom.psf._values import ArrayValue
 
-__all__ = ["fog_glow", "unreal"]
-
 
 @dataclasses.dataclass(frozen=True)
 class fog_glow(SampledPSF):

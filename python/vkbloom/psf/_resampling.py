@@ -8,8 +8,6 @@ import numpy as np
 
 from vkbloom.psf._base import Array
 
-__all__ = ["box_resample", "integrals"]
-
 
 def box_resample(
     kernel: Array,

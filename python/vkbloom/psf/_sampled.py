@@ -15,8 +15,6 @@ from vkbloom._settings.fields import value_field
 from vkbloom.psf._base import PSF, Array, centred, check_radii, in_grey
 from vkbloom.psf._values import ArrayValue
 
-__all__ = ["SampledPSF", "check_values", "samples"]
-
 
 class SampledPSF(PSF):
     """A point-spread function that is an array of energies per pixel, of a fixed size."""

@@ -12,8 +12,6 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ARRAYS", "ArrayValue"]
-
 #: The arrays of this process by names that are never used again: PyTorch compiles with strings as
 #: constants, but not with objects.
 ARRAYS: Final[weakref.WeakValueDictionary[str, ArrayValue]] = weakref.WeakValueDictionary()

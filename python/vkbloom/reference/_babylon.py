@@ -19,8 +19,6 @@ from ._threshold import luminance, masked
 if TYPE_CHECKING:
     from vkbloom._methods.babylon import BabylonBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: BabylonBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -22,8 +22,6 @@ from ._upsampling import combine, flat_gain, tent
 if TYPE_CHECKING:
     from vkbloom._methods.bevy import BevyBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -23,8 +23,6 @@ from ._upsampling import combine, linear, tent_of_target
 if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
 
-__all__ = ["gain", "passes", "saturated"]
-
 
 def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     """Return the framebuffers: "glow" are the highlights, "bloom" the glare over the intensity.

@@ -20,8 +20,6 @@ from ._tape import value_of
 if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
 
-__all__ = ["FACTORS", "GAINS", "LIGHTS"]
-
 #: What the sides of the highlights are divided by, for each quality.
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
 

@@ -19,8 +19,6 @@ from ._tone_map import ENCODINGS, TONE_MAPS
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["composite", "composite_checked", "strength_of"]
-
 
 @checked_as(bloom=ANY, settings=SETTINGS)
 def composite(

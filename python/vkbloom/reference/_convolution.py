@@ -14,8 +14,6 @@ from ._threshold import luminance
 if TYPE_CHECKING:
     from vkbloom._methods.convolution import Convolution
 
-__all__ = ["convolve", "gain", "passes", "prefiltered"]
-
 
 def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
     """Return "kernel" and "bloom".

@@ -17,8 +17,6 @@ from ._threshold import masked
 if TYPE_CHECKING:
     from vkbloom._methods.darktable import DarktableBloom
 
-__all__ = ["gain", "passes", "screened"]
-
 # XYZ of linear Rec. 709, with a white of D50, over the white.
 _XYZ = np.array(
     [

@@ -18,16 +18,6 @@ from ._tape import Traced, gradients, value_of
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = [
-    "DISCRETE",
-    "Gradients",
-    "check_cotangents",
-    "check_known",
-    "check_shape",
-    "differentiable",
-    "vjp",
-]
-
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
     {

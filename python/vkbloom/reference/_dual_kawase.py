@@ -14,8 +14,6 @@ from ._sampling import CENTRE, Array, Taps, sample
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import DualKawase
 
-__all__ = ["down", "gain", "passes", "up"]
-
 
 def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
     """Return the framebuffers on the way down and up; nothing is added on the way up."""

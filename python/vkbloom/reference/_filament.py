@@ -22,8 +22,6 @@ from ._upsampling import combine, linear, tent_of_target
 if TYPE_CHECKING:
     from vkbloom._methods.filament import FilamentBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -21,8 +21,6 @@ from ._threshold import apply_threshold, masked
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["apply", "blur", "gain", "passes"]
-
 
 @checked_as(settings=SETTINGS)
 def apply(

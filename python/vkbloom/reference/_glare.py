@@ -14,17 +14,6 @@ from ._pyramid import downsample
 from ._sampling import Array, sample
 from ._tape import Traced
 
-__all__ = [
-    "light",
-    "moved_by",
-    "places",
-    "read",
-    "stage_format",
-    "stages",
-    "tap_colours",
-    "texels_at",
-]
-
 
 def stage_format(format: str) -> str:
     """Return the format of the stages' images, for bloom buffers of a format."""

@@ -19,8 +19,6 @@ from ._upsampling import cubic, linear
 if TYPE_CHECKING:
     from vkbloom._methods.godot import GodotBloom
 
-__all__ = ["gain", "passes"]
-
 _WEIGHTS = (0.2024, 0.1790, 0.1240, 0.0672, 0.0285)
 _LUMINANCE = np.array([0.299, 0.587, 0.114])
 # Levels with a weight up to this one are left out.

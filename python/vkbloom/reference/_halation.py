@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ._unreal import passes
+from . import _unreal
 
-__all__ = ["gain", "passes"]
+# The passes of Unreal's bloom, with other kernels.
+passes = _unreal.passes
 
 
 def gain(settings: Any, size: tuple[int, int]) -> float:

@@ -22,8 +22,6 @@ from ._upsampling import combine, cubic, spline_taps
 if TYPE_CHECKING:
     from vkbloom._methods.unity import HdrpBloom
 
-__all__ = ["gain", "passes"]
-
 # (x, y) in texels of the frame.
 _PREFILTER_TAPS = ((0.0, 0.0), (0.9, -0.4), (-0.9, 0.4), (0.4, 0.9), (-0.4, -0.9))
 _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])

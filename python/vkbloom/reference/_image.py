@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from ._sampling import Array
 
-__all__ = ["BlurInput", "Storage", "as_float", "as_mask", "finite", "format_of", "storage"]
-
 _FORMATS = {
     "uint8": "rgba8unorm",
     "float16": "rgba16float",

@@ -20,8 +20,6 @@ from ._upsampling import combine, tent
 if TYPE_CHECKING:
     from vkbloom._methods.kino import KinoBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["WIDEST_LEVEL", "halved", "level_sizes"]
-
 #: The widest level of a method that gives its levels a height and the aspect of the frame.
 WIDEST_LEVEL: Final = 16384
 

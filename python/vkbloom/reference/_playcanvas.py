@@ -21,8 +21,6 @@ from ._upsampling import combine, linear, tent
 if TYPE_CHECKING:
     from vkbloom._methods.playcanvas import PlayCanvasBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: PlayCanvasBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -18,8 +18,6 @@ from ._upsampling import combine, linear, tent
 if TYPE_CHECKING:
     from vkbloom._methods.pmndrs import PmndrsBloom
 
-__all__ = ["gain", "passes"]
-
 # (weight, offsets along both axes) of two grids of taps, in texels of the image that is read. The
 # weights are rounded in the source, so that they add up to 1.00004.
 _DOWN = ((0.125, (-1, 1)), (0.05556, (-2, 0, 2)))

@@ -21,8 +21,6 @@ from ._upsampling import combine, tent
 if TYPE_CHECKING:
     from vkbloom._methods.unity import PostProcessingBloom
 
-__all__ = ["gain", "linear_light", "passes"]
-
 
 def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]:
     """Return the framebuffers.

@@ -20,8 +20,6 @@ from ._upsampling import combine, linear, tent
 if TYPE_CHECKING:
     from vkbloom._methods.pygfx import PygfxBloom
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
     """Return the framebuffers.

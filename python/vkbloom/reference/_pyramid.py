@@ -15,8 +15,6 @@ from ._upsampling import combine, tent
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import Pyramid
 
-__all__ = ["GROUPS", "downsample", "gain", "groups", "passes"]
-
 #: The 13 taps are five 2 x 2 groups: (share of the group, x offsets, y offsets), in texels of the
 #: source. The four outer groups overlap: all have the centre tap, and each tap on an axis belongs
 #: to two of them. From Jimenez, "Next Generation Post Processing in Call of

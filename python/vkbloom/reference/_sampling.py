@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from ._tape import Traced, contiguous, operation, value_of
 
-__all__ = ["CENTRE", "Array", "Taps", "read_rows", "sample", "weighted_mean"]
-
 Array = NDArray[np.float64]
 
 # (offset in texels of the image that is read, weight) of each tap along one axis.

@@ -12,8 +12,6 @@ from ._sampling import Array, sample
 if TYPE_CHECKING:
     from vkbloom._methods.separable import Separable
 
-__all__ = ["gain", "passes"]
-
 
 def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
     """Return the framebuffers.

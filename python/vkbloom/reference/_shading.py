@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from ._image import as_float, storage
 from ._sampling import Array
 
-__all__ = ["shade"]
-
 # Values of the forward system's Phong pass. The light has a fixed position in view space.
 _LIGHT = np.array([-5.0, -5.0, 0.0])
 _LAMP = 0.9

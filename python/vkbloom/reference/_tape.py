@@ -21,8 +21,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Traced", "contiguous", "gradients", "joined", "operation", "value_of"]
-
 Array = NDArray[np.float64]
 # From the derivative by the result to the derivative by one argument.
 Rule = Callable[[Array], Array]

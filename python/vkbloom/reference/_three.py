@@ -20,8 +20,6 @@ from ._threshold import luminance, masked, smooth_step, with_alpha
 if TYPE_CHECKING:
     from vkbloom._methods.three import ThreeBloom
 
-__all__ = ["gain", "passes"]
-
 _TAP_COUNTS = (6, 10, 14, 18, 22)
 _FACTORS = (1.0, 0.8, 0.6, 0.4, 0.2)
 _LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])

@@ -9,17 +9,6 @@ import numpy as np
 from ._sampling import Array, sample
 from ._tape import joined
 
-__all__ = [
-    "apply_threshold",
-    "brightest",
-    "firefly_weight",
-    "luminance",
-    "masked",
-    "smooth_step",
-    "soften",
-    "with_alpha",
-]
-
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

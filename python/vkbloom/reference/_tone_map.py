@@ -10,8 +10,6 @@ import numpy as np
 from ._sampling import Array
 from ._tape import joined
 
-__all__ = ["ENCODINGS", "TONE_MAPS"]
-
 
 def _none(rgb: Array) -> Array:
     return rgb

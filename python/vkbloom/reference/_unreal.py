@@ -12,8 +12,6 @@ from ._image import BlurInput
 from ._sampling import Array
 from ._threshold import luminance, masked
 
-__all__ = ["gain", "passes"]
-
 
 def gain(settings: Any, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: the sum of the tints, times the threshold's share."""

@@ -10,16 +10,6 @@ from ._image import BlurInput
 from ._sampling import Array, sample
 from ._tape import contiguous
 
-__all__ = [
-    "combine",
-    "cubic",
-    "flat_gain",
-    "linear",
-    "spline_taps",
-    "tent",
-    "tent_of_target",
-]
-
 # (image, size of the result) -> the image enlarged
 Filter = Callable[[Array, tuple[int, int]], Array]
 

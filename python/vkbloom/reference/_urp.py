@@ -27,8 +27,6 @@ from ._upsampling import combine, cubic, flat_gain, linear
 if TYPE_CHECKING:
     from vkbloom._methods.unity import UrpBloom
 
-__all__ = ["gain", "passes"]
-
 # As in the shader; their sum is 1 - 1e-8.
 _WEIGHTS = (0.22702703, 0.19459459, 0.12162162, 0.05405405, 0.01621622)
 

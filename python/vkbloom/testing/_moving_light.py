@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,22 +16,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "LIMITS",
-    "MovingBloom",
-    "Stability",
-    "area_sampled",
-    "assert_stable",
-    "check_stable",
-    "moments",
-    "stability",
-]
-
-#: A temporal bloom: takes the images of a sequence, in their order, and returns their blooms.
-MovingBloom = Callable[[list[NDArray[Any]]], Iterable[NDArray[Any]]]
-
-PATHS: Final = ("x", "y", "xy")
-_FIGURES: Final = ("ripple", "jitter", "flicker", "growth")
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.
@@ -105,29 +88,13 @@ class Stability:
         """(largest - smallest radius) / mean radius."""
         return _variation(self.radius)
 
-    def __str__(self) -> str:
-        """Return a table of each path."""
-        rows: list[tuple[str, ...]] = [("along", *_FIGURES)]
-        for index, path in enumerate(PATHS):
-            one = self._path(index)
-            figures = [getattr(one, name) for name in _FIGURES]
-            rows.append((path, *(f"{figure:.3g}" for figure in figures)))
-        return "\n".join("  ".join(cell.rjust(7) for cell in row) for row in rows)
-
-    def _path(self, index: int) -> Stability:
-        names = ("positions", "energy", "shift", "peak", "ideal", "radius")
-        arrays = {name: getattr(self, name)[index : index + 1] for name in names}
-        return dataclasses.replace(self, **arrays)
-
 
 @checked
 def stability(
-    bloom: Bloom | MovingBloom,
+    bloom: Bloom,
     *,
     texel: int = 8,
     steps: float = 8,
-    temporal: bool = False,
-    settle: int = 0,
     probe: Probe | None = None,
 ) -> Stability:
     """Measure how much the bloom of a small moving light changes.
@@ -141,18 +108,12 @@ def stability(
     Parameters
     ----------
     bloom : callable
-        Takes an image and returns the bloom alone, of the same height and width. With `temporal`:
-        takes a list of images, in their order, and returns an iterable of as many blooms.
+        Takes an image and returns the bloom alone, of the same height and width.
     texel : int
         Length of each path in pixels, at least 1: the size of a texel of the coarsest level. For a
         chain of N halvings this is 2^N.
     steps : float
         Positions for each pixel of a path, above 0.
-    temporal : bool
-        Whether `bloom` takes the images of a path as a sequence, as methods with a history do.
-    settle : int
-        With `temporal`: number of images before each path with the light at its first position.
-        They are not measured.
     probe : Probe, optional
         The kind of image; its `value` is the light's sum over all pixels. For a method with a
         threshold, it must be large, because a pixel may get only a quarter of the light or less.
@@ -177,9 +138,6 @@ def stability(
     __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)
     check_number("steps", steps, 1e-3, 1e3)
-    check_index("settle", settle, 0, 1_000_000)
-    if settle and not temporal:
-        raise ValueError(f"settle: {settle} is not 0; only a temporal bloom needs frames to settle")
     probe = probe or _wide(texel)
     if texel + 2 > min(probe.size):
         raise ValueError(f"probe: a path of {texel} pixels leaves an image of {probe.size}")
@@ -191,12 +149,17 @@ def stability(
             for direction in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
         ]
     )
-    if not callable(bloom):
-        raise TypeError(f"bloom: {bloom!r} is not callable")
-    moving: Any = bloom if temporal else lambda images: map(bloom, images)
-    spread = _of_a_pixel(moving, probe, settle)
-    rows = [_along(moving, probe, path, settle, spread) for path in positions]
-    energy, across, down, peak, ideal, radius, border = np.moveaxis(np.array(rows), -1, 0)
+    dark = probe.apply(bloom, probe.flat(0.0))[0][:, :, 0]
+    lit = probe.apply(bloom, probe.point(probe.centre, probe.value))[0][:, :, 0]
+    spread = (lit - dark) / probe.value
+    rows = []
+    for position in positions.reshape(-1, 2):
+        given = _light(probe, position)
+        result = probe.values(bloom(given), given)[0][:, :, 0]
+        rows.append(_figures(result - dark, probe, given, spread))
+    energy, across, down, peak, ideal, radius, border = np.array(rows).T.reshape(
+        -1, *positions.shape[:2]
+    )
     faint = ~(energy > _DIM * energy.max())
     shift = np.where(faint[..., np.newaxis], math.nan, np.stack([across, down], axis=-1))
     return Stability(
@@ -212,7 +175,7 @@ def stability(
 
 @checked
 def assert_stable(
-    bloom: Bloom | MovingBloom,
+    bloom: Bloom,
     *,
     ripple: float = LIMITS["ripple"],
     jitter: float = LIMITS["jitter"],
@@ -220,8 +183,6 @@ def assert_stable(
     growth: float = LIMITS["growth"],
     texel: int = 8,
     steps: float = 8,
-    temporal: bool = False,
-    settle: int = 0,
     probe: Probe | None = None,
 ) -> None:
     """Assert that the bloom of a small moving light neither flickers nor jumps.
@@ -239,7 +200,7 @@ def assert_stable(
         the mean. The peak is judged beside that of a convolution: `Stability.shimmer`.
     jitter : float
         Allowed distance of the centroids in pixels.
-    texel, steps, temporal, settle, probe
+    texel, steps, probe
         As for `stability`. The image must be large enough that no light reaches the border.
     """
     __tracebackhide__ = True
@@ -247,49 +208,47 @@ def assert_stable(
     for name, limit in limits.items():
         check_number(name, limit, 0.0, math.inf)
     probe = probe or _wide(texel)
-    found = stability(
-        bloom, texel=texel, steps=steps, temporal=temporal, settle=settle, probe=probe
-    )
-    check_stable(found, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
+    figures = stability(bloom, texel=texel, steps=steps, probe=probe)
+    check_stable(figures, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
 
 
-def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) -> None:
+def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
     """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
     __tracebackhide__ = True
-    if not found.energy.max() > 0:
+    if not figures.energy.max() > 0:
         fail(
             "assert_stable",
             "the bloom of a light is not black",
-            f"the largest sum of the bloom is {found.energy.max():.3g}: only sums above 0 are "
+            f"the largest sum of the bloom is {figures.energy.max():.3g}: only sums above 0 are "
             "allowed",
         )
-    check_inside(found.at_border, probe.size)
+    check_inside(figures.at_border, probe.size)
     shown = {
-        "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
+        "ripple": (figures.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
         "jitter": (
-            np.hypot(found.shift[..., 0], found.shift[..., 1]),
+            np.hypot(figures.shift[..., 0], figures.shift[..., 1]),
             "the centroid of the bloom",
             "is {:.3g} pixels from that of the image",
         ),
         "shimmer": (
-            found.peak / found.ideal,
+            figures.peak / figures.ideal,
             "the peak of the bloom",
             "changes by {:.3g} of its mean, beside that of a convolution",
         ),
-        "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
+        "growth": (figures.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
     }
     laws = {
         name: f"{shown[name][1]} stays the same while a light smaller than a pixel moves"
         for name in limits
     }
-    off = {name: getattr(found, name) for name in limits}
+    off = {name: getattr(figures, name) for name in limits}
     over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
     for name in over[:1]:
         values, what, how = shown[name]
         fail(
             "assert_stable",
             laws[name],
-            f"{what} {how.format(off[name])}, {_extremes(found, values)}: {limits[name]:.3g} "
+            f"{what} {how.format(off[name])}, {_extremes(figures, values)}: {limits[name]:.3g} "
             "allowed" + f"; also above their limits: {', '.join(over[1:])}" * bool(over[1:]),
         )
 
@@ -299,9 +258,9 @@ def area_sampled(
 ) -> Image:
     """Return the share of each pixel that a rectangle covers."""
     covered = []
-    for count, place, side in zip(size, centre, sides, strict=True):
+    for count, position, side in zip(size, centre, sides, strict=True):
         edges = np.arange(count + 1) - 0.5
-        covered.append(np.diff(np.clip(edges, place - side / 2, place + side / 2)))
+        covered.append(np.diff(np.clip(edges, position - side / 2, position + side / 2)))
     return np.outer(covered[1], covered[0])
 
 
@@ -310,31 +269,10 @@ def _wide(texel: int) -> Probe:
     return Probe(size=(side, side))
 
 
-def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
+def _light(probe: Probe, position: NDArray[np.float64]) -> NDArray[Any]:
     """Return the image of the light in the probe's dtype."""
-    share = area_sampled(probe.size, (place[0], place[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
+    share = area_sampled(probe.size, (position[0], position[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
     return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
-
-
-def _along(
-    bloom: MovingBloom, probe: Probe, path: NDArray[np.float64], settle: int, spread: Image
-) -> list[tuple[float, ...]]:
-    """Return the figures of each position."""
-    __tracebackhide__ = True
-    (dark,) = _results(bloom, probe, [probe.given(probe.flat(0.0))])
-    still = [_light(probe, path[0])] * settle
-    images = still + [_light(probe, place) for place in path]
-    results = _results(bloom, probe, images)
-    pairs = zip(results[settle:], images[settle:], strict=True)
-    return [_figures(result - dark, probe, given, spread) for result, given in pairs]
-
-
-def _of_a_pixel(bloom: MovingBloom, probe: Probe, settle: int) -> Image:
-    """Return the first channel of the point spread."""
-    __tracebackhide__ = True
-    images = [probe.given(probe.point(probe.centre, value)) for value in (0.0, probe.value)]
-    dark, lit = (_results(bloom, probe, [image] * (settle + 1))[-1] for image in images)
-    return (lit - dark) / probe.value
 
 
 def _convolved_peak(spread: Image, image: Image) -> float:
@@ -346,27 +284,17 @@ def _convolved_peak(spread: Image, image: Image) -> float:
     return peak if peak > 0 else 1.0
 
 
-def _results(bloom: MovingBloom, probe: Probe, images: list[NDArray[Any]]) -> list[Image]:
-    """Return the first channel of each result."""
-    __tracebackhide__ = True
-    # Copied one by one, since a bloom may reuse the memory of its results.
-    results = [probe.values(result, images[0])[0][:, :, 0] for result in bloom(list(images))]
-    if len(results) != len(images):
-        raise ValueError(f"bloom: it returns {len(results)} images for {len(images)}")
-    return results
-
-
 def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:
     """Return energy, x and y of the shift, peak, ideal, radius, and the share at the border."""
     image = probe.values(given, given)[0][:, :, 0]
-    energy, place, variance = moments(bloom)
+    energy, position, variance = moments(bloom)
     _, from_place, from_variance = moments(image)
     # Replace the variance of the sampled light by that of the square.
     left = variance - from_variance + _LIGHT**2 / 6
     return (
         energy,
-        place[0] - from_place[0],
-        place[1] - from_place[1],
+        position[0] - from_place[0],
+        position[1] - from_place[1],
         float(bloom.max()),
         _convolved_peak(spread, image),
         math.sqrt(left) if left >= 0 else math.nan,
@@ -402,11 +330,11 @@ def _largest(values: NDArray[np.float64]) -> float:
     return float(known.max()) if known.size else math.nan
 
 
-def _extremes(found: Stability, values: NDArray[np.float64]) -> str:
+def _extremes(figures: Stability, values: NDArray[np.float64]) -> str:
     """Return a text with the positions of the smallest and the largest value."""
     parts = []
     for index in (np.nanargmin(values), np.nanargmax(values)):
-        place = np.unravel_index(int(index), values.shape)
-        x, y = found.positions[place]
-        parts.append(f"{values[place]:.4g} with the light at x {x:.4g}, y {y:.4g}")
+        position = np.unravel_index(int(index), values.shape)
+        x, y = figures.positions[position]
+        parts.append(f"{values[position]:.4g} with the light at x {x:.4g}, y {y:.4g}")
     return f"from {parts[0]} to {parts[1]}"

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law, fail, is_within
 from vkbloom.testing._probe import Bloom, Image, Probe
-
-__all__ = [
-    "Response",
-    "assert_centroid_kept",
-    "assert_separable",
-    "assert_spread",
-    "border_share",
-    "check_inside",
-    "measured_spread",
-    "point_spread",
-    "response",
-]
 
 _DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
@@ -142,11 +126,11 @@ def assert_centroid_kept(
     spread, error = measured_spread(bloom, probe, at)
     _check_lit("assert_centroid_kept", spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
-    place = at or probe.centre
+    position = at or probe.centre
     for channel in range(spread.shape[2]):
         for axis, name in ((0, "x"), (1, "y")):
             profile = spread[:, :, channel].sum(axis=axis)
-            distance = np.arange(len(profile), dtype=np.float64) - place[axis]
+            distance = np.arange(len(profile), dtype=np.float64) - position[axis]
             off = float((profile * distance).sum() / profile.sum())
             allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
             law = "the centroid of the light of a pixel is that pixel"
@@ -154,8 +138,8 @@ def assert_centroid_kept(
                 fail(
                     "assert_centroid_kept",
                     law,
-                    f"the centroid is {name} {place[axis] + off:.6g}, {off:+.3g} pixels from "
-                    f"{name} {place[axis]}, channel {channel}: {allowed:.3g} allowed",
+                    f"the centroid is {name} {position[axis] + off:.6g}, {off:+.3g} pixels from "
+                    f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed",
                 )
 
 
@@ -198,138 +182,21 @@ def assert_spread(
         for axis, name in ((0, "x"), (1, "y")):
             profile = spread[:, :, channel].sum(axis=axis)
             distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
-            found = _deviation(profile)
+            result = _deviation(profile)
             # The error of the variance is 2 sigma times the error of the standard deviation.
             variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
-            allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
+            allowed = rtol * pair[axis] + variance_error / max(2 * result, 1e-6)
             law = (
                 f"the standard deviation of the light of a pixel along {name} is "
                 f"{pair[axis]:.6g} pixels"
             )
-            if not is_within(law, abs(found - pair[axis]), allowed):
+            if not is_within(law, abs(result - pair[axis]), allowed):
                 fail(
                     "assert_spread",
                     law,
-                    f"it is {found:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
-                    f"{channel}: off by {abs(found - pair[axis]):.3g}, {allowed:.3g} allowed",
+                    f"it is {result:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
+                    f"{channel}: off by {abs(result - pair[axis]):.3g}, {allowed:.3g} allowed",
                 )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Response:
-    """Figures of a bloom's point spread for each value of a parameter.
-
-    All figures are of the first channel.
-
-    Parameters
-    ----------
-    parameter : str
-        Name of the parameter.
-    values : tuple
-        The N values of the parameter.
-    gain : ndarray of float64, shape (N,)
-        The sum of the light of a pixel of 1.
-    peak : ndarray of float64, shape (N,)
-        The largest value.
-    shift : ndarray of float64, shape (N, 2)
-        Shift of the centroid in pixels along x and y; NaN if there is no light.
-    sigma : ndarray of float64, shape (N, 2)
-        Standard deviation along x and y in pixels; NaN if there is no light, or if negative values
-        make the variance negative.
-    at_border : ndarray of float64, shape (N,)
-        Share of the light in the outermost pixels. If it is not small, the image cuts off light
-        and the other figures are too small.
-    """
-
-    parameter: str
-    values: tuple[Any, ...]
-    gain: NDArray[np.float64]
-    peak: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    at_border: NDArray[np.float64]
-
-    def __str__(self) -> str:
-        """Return a table."""
-        rows = [(self.parameter, "gain", "peak", "shift x, y", "sigma x, y", "at border")]
-        for index, value in enumerate(self.values):
-            rows.append(
-                (
-                    str(value),
-                    f"{self.gain[index]:.5g}",
-                    f"{self.peak[index]:.5g}",
-                    "{:.3g}, {:.3g}".format(*self.shift[index]),
-                    "{:.4g}, {:.4g}".format(*self.sigma[index]),
-                    f"{self.at_border[index]:.2g}",
-                )
-            )
-        widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-        return "\n".join(
-            "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-            for row in rows
-        )
-
-
-@checked
-def response(
-    bloom: Callable[..., NDArray[Any]],
-    parameter: str,
-    values: Sequence[Any],
-    probe: Probe = _DEFAULT,
-) -> Response:
-    """Measure the point spread of a bloom for each value of a parameter.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and the parameter as a keyword; returns an image of the same height and
-        width.
-    parameter : str
-        Name of the keyword.
-    values : sequence
-        Values of the parameter.
-    probe : Probe
-
-    Returns
-    -------
-    Response
-    """
-    __tracebackhide__ = True
-    if not len(values):
-        raise ValueError("values: the sequence is empty; give at least one value")
-    rows = []
-    for value in values:
-        one = functools.partial(bloom, **{parameter: value})
-        spread = point_spread(one, probe)[:, :, 0]
-        total = float(spread.sum())
-        profiles = [spread.sum(axis=0), spread.sum(axis=1)]
-        shifts = [math.nan, math.nan]
-        if total:
-            shifts = [
-                _centroid(profile) - place
-                for profile, place in zip(profiles, probe.centre, strict=True)
-            ]
-        rows.append(
-            (
-                total,
-                float(spread.max()),
-                shifts,
-                [_deviation(profile) for profile in profiles],
-                border_share(spread),
-            )
-        )
-    gain, peak, shift, sigma, at_border = (
-        np.array(column, np.float64) for column in zip(*rows, strict=True)
-    )
-    return Response(
-        parameter=parameter,
-        values=tuple(values),
-        gain=gain,
-        peak=peak,
-        shift=shift,
-        sigma=sigma,
-        at_border=at_border,
-    )
 
 
 def measured_spread(
@@ -337,10 +204,10 @@ def measured_spread(
 ) -> tuple[Image, float]:
     """Return the point spread and the error of its values."""
     __tracebackhide__ = True
-    place = at or probe.centre
-    if not all(0 <= number < side for number, side in zip(place, probe.size, strict=True)):
+    position = at or probe.centre
+    if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
-    lit, lit_error = probe.apply(bloom, probe.point(place, probe.value))
+    lit, lit_error = probe.apply(bloom, probe.point(position, probe.value))
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
 

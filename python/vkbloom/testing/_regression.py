@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,16 +17,10 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import _hashes as hashes
-from vkbloom.testing import _report_parts as report_parts
+from vkbloom.testing import _test_report as test_report
 from vkbloom.testing._judging import Verdict, first_failure, judge
-from vkbloom.testing._records import Record
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
-
-__all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
-
-
-class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``."""
+from vkbloom.testing._test_report import Record
 
 
 class Limits(TypedDict, total=False):
@@ -37,7 +30,6 @@ class Limits(TypedDict, total=False):
     rtol: float | None
     fail_percent: float
     hard_fail: float | None
-    warn: float | None
     ssim: float | None
     psnr: float | None
     flip: float | None
@@ -133,7 +125,7 @@ class FrameRegression:
             reference. `Frames` have their own.
         **limits
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
-            decide. A difference above `warn` that passes issues a `FrameDifferenceWarning`.
+            decide.
 
         Raises
         ------
@@ -246,9 +238,13 @@ class FrameRegression:
                 "results may differ between machines; use the driver of vkbloom-lavapipe, or "
                 "tolerances"
             )
-        same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
+        same = [
+            reference
+            for reference in references
+            if reference.origin.driver_sha256 == origin.driver_sha256
+        ]
         if references and not same and not (self._mode.update or self._mode.add):
-            made_by = "; ".join(one.origin.summary for one in references)
+            made_by = "; ".join(reference.origin.summary for reference in references)
             raise ValueError(
                 f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
                 f"({origin.summary}), only of {made_by}; install that version of "
@@ -266,19 +262,18 @@ class FrameRegression:
                 "use the driver of vkbloom-lavapipe"
             )
         file = self._folder.file(given.name).with_suffix(".hashes")
-        listed, found = hashes.load(file), hashes.hashes_of(given.images)
+        listed, results = hashes.load(file), hashes.hashes_of(given.images)
         expected = listed.get(driver)
         message = (
-            "there is no reference" if expected is None else hashes.difference(expected, found)
+            "there is no reference" if expected is None else hashes.difference(expected, results)
         )
         if message and (self._mode.update or self._mode.add):
-            hashes.save(file, {**(listed if self._mode.add else {}), driver: found})
+            hashes.save(file, {**(listed if self._mode.add else {}), driver: results})
             self._record(given, "written", None)
             return
         missing = expected is None
         outcome = "missing" if missing else "failed" if message else "passed"
         record = self._record(given, outcome, None)
-        record["has_files"] = False
         if message and not (missing and self._mode.allow_missing):
             record["message"] = (
                 f"{given.name}: {message} of {file} for the driver {driver[:12]}. Compare images "
@@ -324,20 +319,15 @@ class FrameRegression:
         __tracebackhide__ = True
         failure = first_failure(verdicts)
         record = self._record(given, "failed" if failure else "passed", reference)
-        record["has_files"] = count is not None
         record["first_failure"] = failure.name if failure else None
         record["framebuffers"] = [
-            report_parts.figures(verdict, given.images) for verdict in verdicts
+            test_report.figures(verdict, given.images) for verdict in verdicts
         ]
         if failure is None:
-            for verdict in verdicts:
-                if verdict.warning:
-                    text = f"{given.name}: {verdict.warning}"
-                    warnings.warn(text, FrameDifferenceWarning, stacklevel=3)
             return
         record["message"] = _message(given, verdicts, reference, count)
         if self._mode.parts is not None:
-            record["part"] = report_parts.write(
+            record["part"] = test_report.write_part(
                 self._mode.parts, verdicts, reference.images, given.images
             )
         raise AssertionError(record["message"])
@@ -347,7 +337,6 @@ class FrameRegression:
             "test": self._test,
             "name": given.name,
             "folder": str(self._folder.path),
-            "has_files": True,
             "outcome": outcome,
             "origin": given.origin.summary,
             "reference_origin": reference.origin.summary if reference else None,

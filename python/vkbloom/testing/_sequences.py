@@ -15,8 +15,6 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
-__all__ = ["Flash", "Flicker", "flash", "flicker"]
-
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
 # relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
 # a quarter of any field of ten degrees.
@@ -141,7 +139,7 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
         red_flashes=red[0],
         area=general[1],
         red_area=red[1],
-        second=max(general, red, key=lambda found: found[1])[2],
+        second=max(general, red, key=lambda match: match[1])[2],
     )
 
 

@@ -8,8 +8,6 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number, check_size
 from vkbloom.testing._probe import Bloom, Probe
 
-__all__ = ["veiling_glare_index"]
-
 
 @checked
 def veiling_glare_index(
