@@ -25,47 +25,28 @@ _RUN = pytest.StashKey["_Run"]()
 # Attribute of a test's report, which carries its checks from an xdist worker to the controller.
 _CHECKS = "vkbloom_checks"
 _FOLDER = "bloom_references"
+# Options that are set or not.
+_FLAGS = {
+    "update": "replace the references of failed checks, and write missing ones",
+    "add": "write further references for failed checks, beside those of other machines",
+    "allow-missing": "let checks without a reference pass",
+    "hash": "references are hashes, for drivers that draw equal bits; every value must be equal",
+}
+# Options with a value: its name, its default, and the help.
+_VALUES = {
+    "adapter": ("NAME", "auto", 'adapter of bloom_renderer: "software", "hardware" or a name'),
+    "expect-adapter": ("NAME", None, "a part of the adapter's name; another adapter is an error"),
+    "report": ("DIR", None, "write an HTML page with all checks, and pictures of the failed ones"),
+}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("vkbloom", "bloom and other rendered images")
-    group.addoption(
-        "--bloom-update",
-        action="store_true",
-        help="replace the references of failed checks, and write missing ones",
-    )
-    group.addoption(
-        "--bloom-add",
-        action="store_true",
-        help="write further references for failed checks, beside those of other machines",
-    )
-    group.addoption(
-        "--bloom-allow-missing",
-        action="store_true",
-        help="let checks without a reference pass",
-    )
-    group.addoption(
-        "--bloom-hash",
-        action="store_true",
-        help="references are hashes, for drivers that draw equal bits; every value must be equal",
-    )
-    group.addoption(
-        "--bloom-adapter",
-        metavar="NAME",
-        default="auto",
-        help='adapter of bloom_renderer: "software", "hardware" or a part of its name',
-    )
-    group.addoption(
-        "--bloom-expect-adapter",
-        metavar="NAME",
-        help="a part of the adapter's name or driver; another adapter is an error",
-    )
-    group.addoption(
-        "--bloom-report",
-        metavar="DIR",
-        help="write an HTML page with all checks, and pictures of the failed ones",
-    )
+    for name, text in _FLAGS.items():
+        group.addoption(f"--bloom-{name}", action="store_true", help=text)
+    for name, (metavar, default, text) in _VALUES.items():
+        group.addoption(f"--bloom-{name}", metavar=metavar, default=default, help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:

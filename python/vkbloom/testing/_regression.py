@@ -126,14 +126,6 @@ class FrameRegression:
         **limits
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
             decide.
-
-        Raises
-        ------
-        AssertionError
-            The frames differ, or there is no reference. The message names the position and the
-            remedy.
-        OSError
-            A file cannot be read or written.
         """
         __tracebackhide__ = True
         if exact:
@@ -186,10 +178,6 @@ class FrameRegression:
         **limits
             As for `check`.
 
-        Raises
-        ------
-        AssertionError
-            The frames differ.
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)
