@@ -35,7 +35,6 @@ _FLAGS = {
 # Options with a value: its name, its default, and the help.
 _VALUES = {
     "adapter": ("NAME", "auto", 'adapter of bloom_renderer: "software", "hardware" or a name'),
-    "expect-adapter": ("NAME", None, "a part of the adapter's name; another adapter is an error"),
     "report": ("DIR", None, "write an HTML page with all checks, and pictures of the failed ones"),
 }
 
@@ -61,8 +60,6 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(
             "--bloom-update and --bloom-add exclude each other; give one of them"
         )
-    if config.getoption("bloom_expect_adapter") == "":
-        raise pytest.UsageError("--bloom-expect-adapter: empty; give a part of the adapter's name")
     if config.getoption("bloom_report") == "":
         raise pytest.UsageError("--bloom-report: empty; give a folder")
     run = _Run(config)
@@ -97,19 +94,17 @@ def pytest_runtest_makereport(
 
 @pytest.fixture(scope="session")
 def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
-    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
+    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``."""
+    from vkbloom import (  # noqa: PLC0415  costs start-up time, as all of vkbloom
+        AdapterNotFoundError,
+        Renderer,
+    )
 
-    It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
-    """
-    from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
-
-    with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:
-        wanted = pytestconfig.getoption("bloom_expect_adapter")
-        info = renderer.info
-        known = f"{info.name} {info.driver_info or info.driver}"
-        if wanted is not None and wanted.lower() not in known.lower():
-            text = f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}"
-            pytest.fail(text, pytrace=False)
+    try:
+        renderer = Renderer(pytestconfig.getoption("bloom_adapter"))
+    except AdapterNotFoundError as error:
+        pytest.fail(str(error), pytrace=False)
+    with renderer:
         yield renderer
 
 
@@ -143,7 +138,6 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
             add=config.getoption("bloom_add"),
             allow_missing=config.getoption("bloom_allow_missing"),
             hashed=config.getoption("bloom_hash"),
-            expect_adapter=config.getoption("bloom_expect_adapter"),
             parts=config.stash[_RUN].parts,
         ),
         records=item.stash.setdefault(_RECORDS, []),
