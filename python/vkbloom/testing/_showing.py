@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
+from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
 from vkbloom.testing._measuring import VIEW, Measured
@@ -82,7 +80,7 @@ def as_values(measured: Measured) -> dict[str, Any]:
         measured.subject.stability,
         measured.subject.resolution,
     )
-    value: dict[str, Any] = _plain(
+    value: dict[str, Any] = plain(
         {
             "name": measured.name,
             "adapter": measured.device,
@@ -141,13 +139,11 @@ def broken(report: LawReport) -> list[LawRow]:
 
 
 def as_page(measured: Measured) -> str:
-    """Return a page with tables, the point spread with its curve, and pictures."""
+    """Return a page with tables, the point spread, and pictures."""
     spread, subject = measured.spread, measured.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in measured.passes.items()]
-    lit = spread.radii > 0
-    curve = _curve(spread.radii[lit], spread.encircled[lit])
     shown = (
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
@@ -163,7 +159,6 @@ def as_page(measured: Measured) -> str:
         element("p", f"On {measured.device}."),
         element("h2", "Pictures"),
         *images,
-        curve,
         element("h2", "Laws"),
         Markup(measured.report._repr_html_()),
         element("h2", "Figures"),
@@ -179,29 +174,3 @@ def _width(name: str) -> int:
 
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
-
-
-def _plain(value: Any) -> Any:
-    """Return a value for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
-
-
-def _curve(radii: NDArray[np.float64], energies: NDArray[np.float64]) -> Markup:
-    """Return the encircled energy over the logarithm of the radius, as SVG."""
-    if not energies.any():
-        return Markup()
-    x = np.log(radii / radii[0]) / (np.log(radii[-1] / radii[0]) or 1.0)
-    ends = zip(300 * x, 180 * (1 - energies / energies.max()), strict=True)
-    points = " ".join(f"{across:.1f},{down:.1f}" for across, down in ends)
-    line = element("polyline", points=points, fill="none", stroke="currentColor")
-    drawn = element("svg", line, width=300, height=180, viewBox="-2 -2 304 184", role="img")
-    note = f" {radii[0]:.3g} to {radii[-1]:.3g} pixels, up to {energies.max():.2g}"
-    return markup.figure(drawn, element("b", "encircled energy"), note, style="margin:0")
