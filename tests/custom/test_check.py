@@ -165,7 +165,7 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
     assert set(found["reference"]) == {"half", "rows", "bloom", "final"}
     text = page.read_text()
     assert text.count("data:image/png") == 3
-    assert "encircled energy" in text
+    assert "point spread, logarithmic" in text
     wrong = tmp_path / "wrong.py"
     wrong.write_text("def doubled(image, settings):\n    return {'bloom': 2 * image}\n")
     done, found = checked(*words, "--reference", f"{wrong}:doubled", "--require", "reference")

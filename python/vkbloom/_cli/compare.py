@@ -20,6 +20,7 @@ from vkbloom._io import image_writing
 from vkbloom._io.images import Picture, StoredImage
 from vkbloom._views.comparison import ALL_METRICS, USUAL_METRICS, Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
+from vkbloom._views.plain_values import plain
 from vkbloom._views.tolerances import Tolerances, failures
 
 
@@ -192,18 +193,14 @@ def _object(
     cause: Diagnosis,
 ) -> dict[str, Any]:
     """Return the object that --json prints. JSON has no infinity, so it becomes None."""
-    figures = {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in dataclasses.asdict(comparison).items()
-    }
     return {
         "a": files[0],
         "b": files[1],
         "passed": not failed,
         "failures": failed,
         "identical": comparison.identical,
-        "diagnosis": dataclasses.asdict(cause),
-        **figures,
+        "diagnosis": plain(cause),
+        **plain(comparison),
         "diff_scale": scale,
     }
 

@@ -13,8 +13,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-__all__ = ["Entry", "listing_command"]
-
 # Console width for output to a file or another program, where lines must not be wrapped.
 _UNBROKEN: Final = 4096
 

@@ -10,8 +10,6 @@ from typing import Any, Final
 import vkbloom
 from vkbloom._settings.settings import Settings, Shading
 
-__all__ = ["HELP", "Live"]
-
 HELP: Final = """\
 B              bloom on, off
 Up, Down       scale of the blur, 0.1 to 2

@@ -18,17 +18,6 @@ _BLACK = 1e-6
 # The smallest alpha and the smallest light that 8 bits can hold.
 _MIN_VISIBLE = 1 / 255
 
-__all__ = [
-    "brightest_of",
-    "darkening",
-    "hidden",
-    "is_without",
-    "notes",
-    "only",
-    "reason",
-    "with_bloom",
-]
-
 
 def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
     """Return the framebuffers to request: also bloom, unless it is off."""

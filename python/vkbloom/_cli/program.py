@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.util import find_spec
 from typing import Any, Final, NoReturn
 
 import click
@@ -23,24 +22,24 @@ from vkbloom._free_memory import ADVICE, memory_left
 from vkbloom._settings.registry import METHODS
 from vkbloom._suggestions import did_you_mean
 
-#: Names of the modules of this package that have a click command called `command`.
-COMMANDS: Final = (
-    "render",
-    "apply",
-    "view",
-    "explore",
-    "grid",
-    "fit",
-    "translate",
-    "check",
-    "compare",
-    "presets",
-    "glares",
-    "psfs",
-    "adapters",
-    "doctor",
-    "warm",
-)
+#: What the commands do, by the modules of this package that have a click command `command`.
+COMMANDS: Final = {
+    "render": "Render a scene or its animation to image files",
+    "apply": "Add bloom to an image file",
+    "view": "Show the bloom of a scene or an image in a window",
+    "explore": "Explore the bloom of an image or a scene in a browser",
+    "grid": "Render all combinations of axis values to a Zarr store or image files",
+    "fit": "Find the settings whose bloom matches a picture",
+    "translate": "Find another method's parameters whose bloom comes closest to settings",
+    "check": "Measure a bloom by every law",
+    "compare": "Measure the differences of two image files",
+    "presets": "List the presets",
+    "glares": "List the stages and published names of glare",
+    "psfs": "List the point-spread functions",
+    "adapters": "List the Vulkan adapters that vkbloom can use",
+    "doctor": "Check whether this machine can render, and explain what prevents it",
+    "warm": "Fill the caches of pipelines and kernels before the first call needs them",
+}
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -84,13 +83,13 @@ class Program(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what the commands do, without an import of them."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(name)) for name in COMMANDS])
+            formatter.write_dl([*COMMANDS.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the commands that begin with some letters, without an import of them."""
         results = [
-            CompletionItem(name, help=_summary(name))
-            for name in COMMANDS
+            CompletionItem(name, help=summary)
+            for name, summary in COMMANDS.items()
             if name.startswith(incomplete)
         ]
         # Not the group's own: it would list the commands again.
@@ -147,16 +146,6 @@ class Program(click.Group):
             raise
         terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
         sys.exit(status)
-
-
-def _summary(name: str) -> str:
-    """Return what a command does: the first line of its module."""
-    spec = find_spec(f"vkbloom._cli.{name}")
-    # A loader of source files has the text; others leave the summary out.
-    read = getattr(spec and spec.loader, "get_source", None)
-    first = ((read and read(f"vkbloom._cli.{name}")) or "").partition("\n")[0]
-    text = first.partition("``: ")[2].rstrip('".')
-    return text[:1].upper() + text[1:]
 
 
 def with_methods(words: Sequence[str]) -> list[str]:

@@ -15,8 +15,6 @@ from vkbloom._cli.terminal import is_quiet
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
 
-__all__ = ["search_options"]
-
 
 def search_options(
     *, vary: str | None, loss: LossName, max_calls: int

@@ -17,8 +17,6 @@ from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import note
 from vkbloom._io.image_reading import readable_extensions
 
-__all__ = ["check_targets", "is_terminal", "pairs"]
-
 #: The most names in a note.
 _MAX_NAMES: Final = 5
 

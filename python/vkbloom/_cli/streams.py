@@ -16,8 +16,6 @@ import click
 
 from vkbloom._io import safe_writing
 
-__all__ = ["PIPE", "as_file", "is_stream", "shown"]
-
 #: Stands for standard input and standard output.
 PIPE: Final = "-"
 

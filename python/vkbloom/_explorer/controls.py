@@ -15,8 +15,6 @@ from vkbloom._settings.registry import METHODS, STAGES, glares, presets
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import PSF, functions
 
-__all__ = ["as_code", "as_fields", "code_with_image", "controls", "described", "settings_from"]
-
 # Fields of everyday use: these, in this order, with the numbers that only this method has between
 # them.
 _FIRST: Final = ("bloom", "intensity", "threshold")

@@ -14,8 +14,6 @@ from vkbloom._settings.registry import METHODS
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["CustomFiles", "current"]
-
 
 class CustomFiles:
     """The custom methods that a page knows, and the errors of their files."""

@@ -61,7 +61,6 @@ if TYPE_CHECKING:
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
 
-__all__ = ["GLOW", "SIDES", "Viewer"]
 
 SIDES: Final = ("a", "b")
 #: The glow's intensity in the default scene: bright enough to show the differences between the

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
     from vkbloom._settings.settings import Settings
 
-__all__ = ["Explorer"]
 
 _FILES: Final = resources.files("vkbloom._explorer")
 # Traits of the sides' settings.

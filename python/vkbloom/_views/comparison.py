@@ -13,17 +13,6 @@ from numpy.typing import NDArray
 from vkbloom._checks import as_float, check_number, import_extra, native_order
 from vkbloom._io.srgb import decode_srgb
 
-__all__ = [
-    "ALL_METRICS",
-    "USUAL_METRICS",
-    "Comparison",
-    "Metric",
-    "checked_image",
-    "compare",
-    "difference",
-    "flip_map",
-]
-
 Metric = Literal["ssim", "psnr", "flip", "cvvdp"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")

@@ -15,8 +15,6 @@ from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._views.comparison import checked_image
 from vkbloom._views.shifts import MIN_SHIFT, find_shift
 
-__all__ = ["Cause", "Diagnosis", "diagnose"]
-
 Cause = Literal[
     "equal",
     "gain",

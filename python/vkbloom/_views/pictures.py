@@ -15,8 +15,6 @@ from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
 from vkbloom._views.markup import element
 
-__all__ = ["contact_sheet_html", "leading_png", "picture", "png", "reduced"]
-
 _CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 

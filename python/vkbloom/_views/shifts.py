@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
 
-__all__ = ["MIN_SHIFT", "find_shift"]
-
 _Image = NDArray[np.float64]
 _Shift = tuple[float, float]
 

@@ -12,8 +12,6 @@ import numpy as np
 from vkbloom._checks import check_number
 from vkbloom._views.comparison import Comparison, Metric
 
-__all__ = ["DEFAULTS", "Stage", "Tolerances", "failures", "worst"]
-
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
 
 #: (atol, rtol) of each dtype. Integers: one level, by which a value near the middle of two levels

@@ -15,8 +15,6 @@ from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figu
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
-__all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
-
 _DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
 #: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
@@ -65,12 +63,6 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
 
     E(p) / E(c), where E(p) is the sum of the bloom of a square of 3 x 3 pixels from the pixel p on,
     less that of a black image, and c is the middle.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
 
     Returns
     -------

@@ -9,8 +9,6 @@ from typing import Any, Final, Literal
 
 from vkbloom.testing._shape import LEVELS
 
-__all__ = ["Change", "changes", "newly_broken"]
-
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
 #: Figures by name: their place in the values of a bloom, and whether less of them is better.

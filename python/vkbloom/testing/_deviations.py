@@ -13,18 +13,6 @@ import numpy as np
 
 from vkbloom.testing._probe import Image
 
-__all__ = [
-    "Deviation",
-    "Measured",
-    "NotTaken",
-    "breaches",
-    "compare_with_law",
-    "fail",
-    "figure",
-    "is_within",
-    "measuring",
-]
-
 
 class NotTaken(ValueError):
     """A bloom does not take what a law needs, such as a region or alpha; so it is not tested."""

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from vkbloom._io import safe_writing
 
-__all__ = ["difference", "hashes_of", "load", "save"]
-
 # Hashes of framebuffers by name, by the hash of the driver that drew them.
 Hashes = dict[str, dict[str, str]]
 

@@ -21,8 +21,6 @@ from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import Subject, fitting_probe
 
-__all__ = ["COLOURS", "LawReport", "LawRow", "law_report", "report"]
-
 #: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
 COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
 

@@ -16,16 +16,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "LIMITS",
-    "Stability",
-    "area_sampled",
-    "assert_stable",
-    "check_stable",
-    "moments",
-    "stability",
-]
-
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.
@@ -134,16 +124,6 @@ def stability(
     Stability
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
-
-    Examples
-    --------
-    A pyramid whose first reduction drops every second pixel loses a small light half of the time:
-
-    >>> from vkbloom import testing
-    >>> def dropping(image):
-    ...     return image[::2, ::2].repeat(2, axis=0).repeat(2, axis=1)
-    >>> testing.stability(dropping, texel=2).ripple > 1
-    True
     """
     __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)

@@ -12,16 +12,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law, fail, is_within
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "assert_centroid_kept",
-    "assert_separable",
-    "assert_spread",
-    "border_share",
-    "check_inside",
-    "measured_spread",
-    "point_spread",
-]
-
 _DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
 # that light, which moves a centroid by a thousandth of half the image.

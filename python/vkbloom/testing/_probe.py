@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size
 
-__all__ = ["Bloom", "Image", "Probe", "beside_multiple", "small_probe"]
-
 #: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
 

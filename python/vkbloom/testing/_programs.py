@@ -22,8 +22,6 @@ from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
 from vkbloom.testing._probe import Bloom
 
-__all__ = ["COARSE_ERROR", "Program", "command"]
-
 _PLACES: Final = ("{input}", "{output}")
 #: Keywords of the bloom, by what stands for them in a command.
 _KEYWORDS: Final = {"{region}": "region", "{frame}": "time"}

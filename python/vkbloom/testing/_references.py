@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.images import Picture
 
-__all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
-
 #: Allowed names of references and framebuffers: safe as file names on every system.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
 _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")

@@ -17,13 +17,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "ResolutionResponse",
-    "assert_resolution_independent",
-    "check_independent",
-    "resolution_response",
-]
-
 _DEFAULT = Probe(size=(128, 128))
 _SCALES: Final = (0.5, 1.0, 2.0, 4.0)
 # Rings that the light is sorted into, for each pixel of distance, and pixels of the shorter side.
@@ -81,17 +74,6 @@ def resolution_response(
     Returns
     -------
     ResolutionResponse
-
-    Examples
-    --------
-    The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
-
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable(blur_scale=4.0))
-    >>> found = testing.resolution_response(bloom, scales=(1, 2))
-    >>> bool(found.r90[1] < 0.7 * found.r90[0])
-    True
     """
     __tracebackhide__ = True
     check_number("light", light, math.ulp(0.0), 1.0)

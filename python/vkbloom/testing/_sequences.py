@@ -15,8 +15,6 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
-__all__ = ["Flash", "Flicker", "flash", "flicker"]
-
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
 # relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
 # a quarter of any field of ten degrees.

@@ -16,8 +16,6 @@ from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
-__all__ = ["SIZE_LIMITS", "assert_round", "assert_sizes", "roundness"]
-
 _DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
@@ -41,12 +39,6 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     centroid, divided by the smallest. 1 is a circle, 1.41 a square. Distances below three pixels
     count as three. Contours that are nearer everywhere, or that leave the image, are not in the
     result.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
 
     Returns
     -------

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import click
-import numpy as np
 
-from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
+from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
 from vkbloom.testing._measuring import VIEW, Measured
@@ -82,7 +80,7 @@ def as_values(measured: Measured) -> dict[str, Any]:
         measured.subject.stability,
         measured.subject.resolution,
     )
-    value: dict[str, Any] = _plain(
+    value: dict[str, Any] = plain(
         {
             "name": measured.name,
             "adapter": measured.device,
@@ -141,15 +139,11 @@ def broken(report: LawReport) -> list[LawRow]:
 
 
 def as_page(measured: Measured) -> str:
-    """Return a page with tables, the point spread with its curve, and pictures."""
+    """Return a page with tables, the point spread, and pictures."""
     spread, subject = measured.spread, measured.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
     times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in measured.passes.items()]
-    lit = spread.radii > 0
-    curve = diagram(
-        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
-    )
     shown = (
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
@@ -165,7 +159,6 @@ def as_page(measured: Measured) -> str:
         element("p", f"On {measured.device}."),
         element("h2", "Pictures"),
         *images,
-        curve,
         element("h2", "Laws"),
         Markup(measured.report._repr_html_()),
         element("h2", "Figures"),
@@ -181,16 +174,3 @@ def _width(name: str) -> int:
 
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
-
-
-def _plain(value: Any) -> Any:
-    """Return a value for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value

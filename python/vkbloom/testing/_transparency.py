@@ -12,8 +12,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, is_within
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
 
-__all__ = ["assert_alpha"]
-
 _DEFAULT = Probe()
 # Below common thresholds, since a threshold is not linear.
 _BACKDROPS = (0.0, 0.25)
