@@ -13,14 +13,12 @@ from vkbloom._checks import check_number
 from vkbloom._core_kernel import CoreKernel, core_kernel
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field
+from vkbloom.psf._sampled import check_values
 
 DirtMode = Literal["multiply", "lerp"]
 
 
 def _read_image(image: Any) -> Any:
-    # Imported here, since settings are used without point-spread functions, too.
-    from vkbloom.psf._sampled import check_values  # noqa: PLC0415
-
     return check_values("image", image)
 
 
