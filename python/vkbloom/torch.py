@@ -2,16 +2,6 @@
 
 Tensors of float64 are computed by `vkbloom.reference`, all others by a renderer. The bloom buffers
 are "rgba32float".
-
-Examples
---------
->>> import torch
->>> import vkbloom.torch
->>> image = torch.full((8, 8, 3), 0.5, requires_grad=True)
->>> final = vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=1, intensity=0.5))
->>> final.sum().backward()
->>> round(float(image.grad.mean()), 4)
-1.5
 """
 
 from __future__ import annotations
@@ -67,11 +57,6 @@ def bloom(
     ------
     RuntimeError
         From a backward pass: a second derivative was asked for.
-
-    See Also
-    --------
-    Bloom : The same as a module, which can learn fields of the settings.
-    vkbloom.vjp : The derivatives as arrays.
 
     Notes
     -----

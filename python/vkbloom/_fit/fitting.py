@@ -138,12 +138,6 @@ def fit(
         target has another size or is black; an argument is out of range; or, with `gradient`, a
         field or the loss has no derivative, or the image is an `Image`.
 
-    See Also
-    --------
-    translate : Settings of another method, without a picture.
-    fit_pyramid : The weights of a pyramid for a point-spread function.
-    grid : All combinations of some values.
-
     Notes
     -----
     Images of more than 384 pixels are reduced first, by boxes. There,

@@ -122,12 +122,6 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     tuple of float
         w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
         w0 + 2 (w1 + ... + w_radius) = 1.
-
-    Examples
-    --------
-    >>> weights = vkbloom.gaussian_weights(1.0, radius=2)
-    >>> [round(weight, 4) for weight in weights]
-    [0.4026, 0.2442, 0.0545]
     """
     limit = _core.MAX_WEIGHTS - 1
     deviation = as_float("sigma", sigma)

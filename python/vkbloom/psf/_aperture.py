@@ -170,11 +170,6 @@ class aperture(SampledPSF):
     wavelengths : sequence of float or None
         In nm, 380 to 780. A single wavelength is shown in grey. None: 390 to 730 in steps of 10.
 
-    See Also
-    --------
-    iris : Makes masks.
-    airy : The formula for a circle at one wavelength.
-
     Notes
     -----
     A is the mask's Fourier transform, and P(u) = ``|A(u)|^2``. At the position r and the wavelength

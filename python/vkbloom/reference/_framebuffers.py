@@ -258,14 +258,6 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     -------
     float, or ndarray of float64, shape (3,)
         For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> reference.gain(vkbloom.Pyramid(levels=3))
-    1.0
-    >>> round(reference.gain(vkbloom.Separable()), 3)
-    1.922
     """
     method = _method(settings)
     threshold = None if settings.published else settings.threshold
