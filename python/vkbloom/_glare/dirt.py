@@ -42,15 +42,6 @@ class Dirt(Glare):
     -----
     Source: "multiply" from google/filament, colorGrading.mat @ 263d042924de; "lerp" from
     godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
-
-    Examples
-    --------
-    >>> image = np.ones((4, 4, 3), np.float32)
-    >>> dirt = vkbloom.Dirt(image=[[0.5, 1]], mode="lerp", strength=0.5)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     final = renderer.apply(image, vkbloom.Pyramid(glare=(dirt,)))["final"]
-    >>> final[0, :, 0]
-    array([1.75  , 1.8125, 1.9375, 2.    ], dtype=float32)
     """
 
     stage: ClassVar[str] = "dirt"
