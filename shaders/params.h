@@ -157,14 +157,17 @@
     VEC4S(B, shares, 2)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
-// weight of each for each channel. The threshold is for the first iteration.
+// weight of each for each channel. The threshold is for the first iteration. With `reads_next`,
+// `next` has the bits of next_texel() for each tap.
 #define STREAKS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
     INPUT(B, float, limit) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
     INPUT(B, int, count) \
-    VEC4S(B, weights, MAX_TAPS)
+    INPUT(B, int, reads_next) \
+    VEC4S(B, weights, MAX_TAPS) \
+    VEC4S(B, next, MAX_TAPS)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
 // ghosts.
@@ -192,7 +195,9 @@
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
     INPUT(B, float, rounding) \
-    VEC4S(B, factors, 1)
+    INPUT(B, int, reads_next) \
+    VEC4S(B, factors, 1) \
+    VEC4S(B, next, 1)
 
 // Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows
 // from its end at the left or right or at the bottom, or back from its other end. `distance` is
@@ -348,7 +353,8 @@
     COUNT(diagonal, 1, 0, 1) \
     COUNT(fast, 0, 0, 1) \
     COUNT(quarter, 0, 0, 1) \
-    COUNT(urp_12, 0, 0, 1)
+    COUNT(urp_12, 0, 0, 1) \
+    COUNT(blender_5_2, 0, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \

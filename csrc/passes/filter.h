@@ -35,12 +35,6 @@ bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t fr
 bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
                    struct vkb_error *error);
 
-// Whether a level of exactly twice the size is filtered with the pyramid's 13 taps.
-static inline bool vkb_filter_exact(const struct vkb_pass_row *pass)
-{
-    return pass->constants.exact == EXACT_HALF;
-}
-
 static inline bool vkb_is_filter(const struct vkb_pass_row *pass)
 {
     return pass->block == VKB_BLOCK_filter;

@@ -8,6 +8,7 @@
 
 static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter);
+static const struct vkb_shader *const halved_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(filter_comp);
 static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter_final);
 static const struct vkb_shader *const mixed_shaders[VKB_FORMAT_COUNT] = {
@@ -94,7 +95,7 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
 // Whether the pass is a filter whose taps are in a window.
 static bool has_window(const struct vkb_pass_row *pass)
 {
-    return vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass);
+    return vkb_is_filter(pass) && pass->constants.window > 0;
 }
 
 // The same, whose images have one format.
@@ -163,6 +164,27 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
         return true;
     memcpy(&row, pass, sizeof row);
     make_strips(choice, pass, &row, strip_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && vkb_add_from_image(choice, pass, &row, error);
+}
+
+// On a GPU, strips are faster than tiles where the source has twice the size.
+bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                    bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = has_window(pass) && !pass->constants.add_own;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    take_filter(choice, pass, &row);
+    *fits = row.constants.exact == EXACT_HALF && row.constants.exact_rows == EXACT_HALF;
+    if (!*fits)
+        return true;
+    vkb_make_dispatch(&row, halved_shaders[choice->plain.images[pass->reads[0]].format],
+                      HALVE_INVOCATIONS * HALVE_COLUMNS, HALVE_ROWS);
+    row.reading = VKB_READING_LOADED;
     return vkb_graph_add_pass(choice->graph, &row, error)
         && vkb_add_from_image(choice, pass, &row, error);
 }

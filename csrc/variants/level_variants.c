@@ -5,8 +5,6 @@
 
 #include <string.h>
 
-static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
-static const struct vkb_shader *const halve_linear[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(halve);
 static const struct vkb_shader *const halve_taps_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(halve_taps);
 static const struct vkb_shader *const prefilter_linear[VKB_FORMAT_COUNT] =
@@ -17,44 +15,12 @@ static const struct vkb_shader *const rows_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(nine_rows);
 static const struct vkb_shader *const columns_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(nine_columns);
-// Sets the shader, and the block of pixels that each invocation writes, for storage images or
-// linear texels.
-static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                         enum vkb_format format)
-{
-    if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_linear(row, halve_linear[format], HALVE_LINEAR_COLUMNS, HALVE_LINEAR_ROWS);
-    } else {
-        vkb_make_dispatch(row, halve_shaders[format], HALVE_INVOCATIONS * HALVE_COLUMNS,
-                          HALVE_ROWS);
-        row->reading = VKB_READING_LOADED;
-    }
-}
-
-// Whether the device can run the pass as make_halving sets it. Shaders for linear texels
-// are compiled for one format of all images.
+// Whether the pass can be one of linear texels, whose shaders are compiled for one format of all
+// images.
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    return choice->variants != VKB_VARIANTS_CPU
-        || (vkb_fits_linear(choice, pass)
-            && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]));
-}
-
-bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
-{
-    const struct vkb_graph *plain = &choice->plain;
-    struct vkb_pass_row row;
-
-    *fits = vkb_filter_exact(pass) && loads(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
-    vkb_drop_reads(&row, 1);
-    make_halving(choice, &row, plain->images[pass->reads[0]].format);
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_from_image(choice, pass, &row, error);
+    return vkb_fits_linear(choice, pass)
+        && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
 }
 
 // What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.

@@ -48,7 +48,6 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_CPU, "strips", vkb_add_strips, 0},
     {VKB_VARIANTS_CPU, "from_lines", vkb_add_from_lines, 0},
-    {VKB_VARIANTS_CPU, "halved", vkb_add_halved, 0},
     {VKB_VARIANTS_CPU, "halved", vkb_add_halved_taps, 0},
     {VKB_VARIANTS_CPU, "runs", vkb_add_prefiltered, 0},
     {VKB_VARIANTS_CPU, "shrunk", vkb_add_shrunk, 0},

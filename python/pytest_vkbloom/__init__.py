@@ -25,47 +25,27 @@ _RUN = pytest.StashKey["_Run"]()
 # Attribute of a test's report, which carries its checks from an xdist worker to the controller.
 _CHECKS = "vkbloom_checks"
 _FOLDER = "bloom_references"
+# Options that are set or not.
+_FLAGS = {
+    "update": "replace the references of failed checks, and write missing ones",
+    "add": "write further references for failed checks, beside those of other machines",
+    "allow-missing": "let checks without a reference pass",
+    "hash": "references are hashes, for drivers that draw equal bits; every value must be equal",
+}
+# Options with a value: its name, its default, and the help.
+_VALUES = {
+    "adapter": ("NAME", "auto", 'adapter of bloom_renderer: "software", "hardware" or a name'),
+    "report": ("DIR", None, "write an HTML page with all checks, and pictures of the failed ones"),
+}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("vkbloom", "bloom and other rendered images")
-    group.addoption(
-        "--bloom-update",
-        action="store_true",
-        help="replace the references of failed checks, and write missing ones",
-    )
-    group.addoption(
-        "--bloom-add",
-        action="store_true",
-        help="write further references for failed checks, beside those of other machines",
-    )
-    group.addoption(
-        "--bloom-allow-missing",
-        action="store_true",
-        help="let checks without a reference pass",
-    )
-    group.addoption(
-        "--bloom-hash",
-        action="store_true",
-        help="references are hashes, for drivers that draw equal bits; every value must be equal",
-    )
-    group.addoption(
-        "--bloom-adapter",
-        metavar="NAME",
-        default="auto",
-        help='adapter of bloom_renderer: "software", "hardware" or a part of its name',
-    )
-    group.addoption(
-        "--bloom-expect-adapter",
-        metavar="NAME",
-        help="a part of the adapter's name or driver; another adapter is an error",
-    )
-    group.addoption(
-        "--bloom-report",
-        metavar="DIR",
-        help="write an HTML page with all checks, and pictures of the failed ones",
-    )
+    for name, text in _FLAGS.items():
+        group.addoption(f"--bloom-{name}", action="store_true", help=text)
+    for name, (metavar, default, text) in _VALUES.items():
+        group.addoption(f"--bloom-{name}", metavar=metavar, default=default, help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -80,8 +60,6 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(
             "--bloom-update and --bloom-add exclude each other; give one of them"
         )
-    if config.getoption("bloom_expect_adapter") == "":
-        raise pytest.UsageError("--bloom-expect-adapter: empty; give a part of the adapter's name")
     if config.getoption("bloom_report") == "":
         raise pytest.UsageError("--bloom-report: empty; give a folder")
     run = _Run(config)
@@ -116,19 +94,17 @@ def pytest_runtest_makereport(
 
 @pytest.fixture(scope="session")
 def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
-    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
+    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``."""
+    from vkbloom import (  # noqa: PLC0415  costs start-up time, as all of vkbloom
+        AdapterNotFoundError,
+        Renderer,
+    )
 
-    It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
-    """
-    from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
-
-    with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:
-        wanted = pytestconfig.getoption("bloom_expect_adapter")
-        info = renderer.info
-        known = f"{info.name} {info.driver_info or info.driver}"
-        if wanted is not None and wanted.lower() not in known.lower():
-            text = f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}"
-            pytest.fail(text, pytrace=False)
+    try:
+        renderer = Renderer(pytestconfig.getoption("bloom_adapter"))
+    except AdapterNotFoundError as error:
+        pytest.fail(str(error), pytrace=False)
+    with renderer:
         yield renderer
 
 
@@ -162,7 +138,6 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
             add=config.getoption("bloom_add"),
             allow_missing=config.getoption("bloom_allow_missing"),
             hashed=config.getoption("bloom_hash"),
-            expect_adapter=config.getoption("bloom_expect_adapter"),
             parts=config.stash[_RUN].parts,
         ),
         records=item.stash.setdefault(_RECORDS, []),

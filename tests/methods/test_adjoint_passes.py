@@ -173,6 +173,24 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
         assert np.array_equal(found["image"], again["image"])
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
+        BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2),
+    ],
+    ids=["darktable", "blender 5.2"],
+)
+def test_the_reference_derives_what_has_no_transpose(renderer: Renderer, settings: Any) -> None:
+    """Boxes of darktable, and what Blender 5.2 reads by rounding (in 41 columns)."""
+    image = random_image(9, 41, channels=3, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pulled(renderer, image, settings)
+    found = pullback(cotangents)
+    assert not isinstance(found, DeviceGradients)
+    for name in expected:
+        check(found, expected, name)
+
+
 @witness("HDRP's filter of small frames has the same border")
 def test_the_cubic_filter_of_large_frames_is_transposed(renderer: Renderer) -> None:
     image = random_image(450, 800, channels=3, seed=1).astype(np.float32)

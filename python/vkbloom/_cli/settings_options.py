@@ -96,7 +96,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             return command(settings=start.of, **rest)
         images = _images_of(rest)
         # An axis of presets gives every image the same settings.
-        axes: Any = rest.get("axis_words", ())
+        axes: Any = rest.get("words", ())
         has_presets = any(str(word).startswith("preset=") for word in axes)
         settings, expand = start.of_all(images[:1] if has_presets else images)
         if "expand" in rest:

@@ -1,15 +1,4 @@
-"""The explorer: controls for all settings and a live picture, in a notebook or on a web page.
-
-==================== ====================================================================
-`controls`           the fields of the settings as descriptions of controls; settings as code
-`viewer`             one viewer: takes the page's messages, returns pictures and values
-`shown`              framebuffers as PNG, optimized for speed
-`custom_files`          the files of custom methods, which are loaded again when they change
-`widget`             the page in a notebook (anywidget)
-`server`             the page on 127.0.0.1 (tornado), for ``vkbloom explore``
-``page.js``, ``.css`` the page itself, the same for both
-==================== ====================================================================
-"""
+"""The explorer: controls for all settings and a live picture, in a notebook or on a web page."""
 
 from __future__ import annotations
 

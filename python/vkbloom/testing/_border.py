@@ -64,12 +64,6 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
     E(p) / E(c), where E(p) is the sum of the bloom of a square of 3 x 3 pixels from the pixel p on,
     less that of a black image, and c is the middle.
 
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-
     Returns
     -------
     dict of str to float

@@ -29,26 +29,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
     additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
     with a threshold, a clamp or a firefly filter is not linear.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width.
-    probe : Probe
-        The kind of test image, and the allowed errors.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(blur_strength=1.0)
-    >>> testing.assert_superposition(lambda image: reference.blur(image, settings))
-
-    A square is not linear:
-
-    >>> testing.assert_superposition(lambda image: image**2)  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-        ...
-    AssertionError: assert_superposition: ...
     """
     __tracebackhide__ = True
     # Otherwise the dtype would round halves and quarters of the values in the test images.

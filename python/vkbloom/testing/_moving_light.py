@@ -124,16 +124,6 @@ def stability(
     Stability
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
-
-    Examples
-    --------
-    A pyramid whose first reduction drops every second pixel loses a small light half of the time:
-
-    >>> from vkbloom import testing
-    >>> def dropping(image):
-    ...     return image[::2, ::2].repeat(2, axis=0).repeat(2, axis=1)
-    >>> testing.stability(dropping, texel=2).ripple > 1
-    True
     """
     __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)

@@ -44,7 +44,6 @@ class Mode:
     - `add`: Whether to write further references for failed checks, and keep the existing ones.
     - `allow_missing`: Whether a check without a reference passes.
     - `hashed`: Whether references are hashes, and every value must be equal.
-    - `expect_adapter`: A part of the name or driver of the adapter that frames must come from.
     - `parts`: Folder for the report's pictures of failed checks; None: no report.
     """
 
@@ -52,7 +51,6 @@ class Mode:
     add: bool = False
     allow_missing: bool = False
     hashed: bool = False
-    expect_adapter: str | None = None
     parts: Path | None = None
 
 
@@ -126,14 +124,6 @@ class FrameRegression:
         **limits
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
             decide.
-
-        Raises
-        ------
-        AssertionError
-            The frames differ, or there is no reference. The message names the position and the
-            remedy.
-        OSError
-            A file cannot be read or written.
         """
         __tracebackhide__ = True
         if exact:
@@ -146,7 +136,6 @@ class FrameRegression:
         given = _Given(
             self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
         )
-        self._check_adapter(given.origin)
         if self._mode.hashed:
             self._check_hashes(given)
             return
@@ -186,10 +175,6 @@ class FrameRegression:
         **limits
             As for `check`.
 
-        Raises
-        ------
-        AssertionError
-            The frames differ.
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)
@@ -214,16 +199,6 @@ class FrameRegression:
             )
         self._has_used_name = True
         return self._name
-
-    def _check_adapter(self, origin: Origin) -> None:
-        __tracebackhide__ = True
-        wanted = self._mode.expect_adapter
-        if wanted is None or origin.adapter is None:
-            return
-        if wanted.lower() not in f"{origin.adapter} {origin.driver or ''}".lower():
-            raise ValueError(
-                f"--bloom-expect-adapter={wanted}: the frames come from {origin.summary}"
-            )
 
     def _of_one_driver(self, references: list[Reference], given: _Given) -> list[Reference]:
         """Return the references that the driver of the given frames made.

@@ -74,17 +74,6 @@ def resolution_response(
     Returns
     -------
     ResolutionResponse
-
-    Examples
-    --------
-    The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
-
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable(blur_scale=4.0))
-    >>> found = testing.resolution_response(bloom, scales=(1, 2))
-    >>> bool(found.r90[1] < 0.7 * found.r90[0])
-    True
     """
     __tracebackhide__ = True
     check_number("light", light, math.ulp(0.0), 1.0)

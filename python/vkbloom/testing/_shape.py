@@ -40,12 +40,6 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     count as three. Contours that are nearer everywhere, or that leave the image, are not in the
     result.
 
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-
     Returns
     -------
     dict of float to float
