@@ -62,12 +62,6 @@ def bloom(
     -----
     The operator is ``torch.ops.vkbloom.bloom``, with a fake kernel, so `torch.compile` does not
     look into it.
-
-    Examples
-    --------
-    >>> image = torch.rand(2, 3, 16, 16)
-    >>> vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=2), channels_first=True).shape
-    torch.Size([2, 3, 16, 16])
     """
     settings = check_settings(settings, of_image=True)
     return _call(

@@ -15,7 +15,7 @@ EXCEPTIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "of a NaN in half floats, its rounding changes the next channel": (
             "test_values_that_are_not_finite[gpu-float16]",
         ),
-        "a forked child has no threads of the driver, and its first frame waits for them": (
+        "a forked child has no threads of the driver: its first frame waits for them or crashes": (
             *("test_a_forked_child_opens_its_own", "test_a_forked_process[close]"),
             *("test_a_forked_process[collect]", "test_a_forked_worker_opens_a_renderer_of_its_own"),
         ),

@@ -210,11 +210,6 @@ class Run:
             is_blended=is_blended,
         )
 
-    def _make_folder(self, target: str) -> None:
-        """Make the folder of one of several files."""
-        if target != self._out:
-            Path(target).parent.mkdir(exist_ok=True)
-
     def _write(
         self,
         pair: Pair,
@@ -225,8 +220,9 @@ class Run:
     ) -> None:
         target = pair[1]
         with self._of_file(pair):
-            self._make_folder(target)
             file = Path(target)
+            if target != self._out:
+                file.parent.mkdir(exist_ok=True)
             if is_stream(target):
                 suffix = Path(of_format(target, self._options.pipe_format)).suffix
                 file = self._folder / f"output{suffix}"

@@ -24,7 +24,7 @@ from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import detail_device, is_quiet, note, say
-from vkbloom._custom.method import CustomMethod, own_name
+from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._suggestions import did_you_mean
@@ -262,7 +262,7 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
         return against
     if os.path.isfile(against):
         # Another name, so that it does not replace a file of the same name.
-        kind = vkbloom.load_method(against, name=f"{own_name(Path(against).stem)}_against")
+        kind = vkbloom.load_method(against, name=f"{identifier_of(Path(against).stem)}_against")
         usual, other = type(settings)(), kind()
         changed = {
             field.name: getattr(settings, field.name)

@@ -26,58 +26,42 @@ def search_options(
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(command)
-        def run(
-            *,
-            vary: str | None,
-            as_json: bool,
-            **rest: Any,
-        ) -> Any:
-            search: dict[str, Any] = {
-                "loss": rest.pop("loss"),
-                "max_calls": rest.pop("max_calls"),
-                "progress": Console(stderr=True).is_terminal and not is_quiet(),
-            }
-            if vary is not None:
-                names = (name.strip().replace("-", "_") for name in vary.split(","))
-                search["vary"] = [name for name in names if name]
-            show_results = functools.partial(_show_results, as_json=as_json)
-            return command(search=search, show_results=show_results, **rest)
-
-        for option in reversed(_of_search(vary, loss, max_calls)):
-            run = option(run)
-        return run
-
-    return add
-
-
-def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, ...]:
-    """Return the options of what is searched and how, with these defaults."""
-    return (
-        click.option(
+        @click.option(
             "--vary",
             metavar="NAME,...",
             default=vary,
             help="The settings to find: numbers, switches and choices"
             + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
-        ),
-        click.option(
+        )
+        @click.option(
             "--loss",
             type=click.Choice(get_args(LossName)),
             default=loss,
             help="The figure to minimize. relative: norm of the difference divided by the norm of "
             "the target; l2: root mean square of the difference; log: the same for logarithms; "
             "flip: mean FLIP.",
-        ),
-        click.option(
+        )
+        @click.option(
             "--max-calls",
             metavar="N",
             type=click.IntRange(min=1),
             default=max_calls,
             help="Limit of the renders of each search.",
-        ),
-        click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
-    )
+        )
+        @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
+        @functools.wraps(command)
+        def run(*, vary: str | None, as_json: bool, **rest: Any) -> Any:
+            search = {name: rest.pop(name) for name in ("loss", "max_calls")}
+            search["progress"] = Console(stderr=True).is_terminal and not is_quiet()
+            if vary is not None:
+                names = (name.strip().replace("-", "_") for name in vary.split(","))
+                search["vary"] = [name for name in names if name]
+            show_results = functools.partial(_show_results, as_json=as_json)
+            return command(search=search, show_results=show_results, **rest)
+
+        return run
+
+    return add
 
 
 def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:

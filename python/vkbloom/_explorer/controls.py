@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom import psf
-from vkbloom._custom.method import CustomType, own_name
+from vkbloom._custom.method import CustomType, identifier_of
 from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.glare import Glare
 from vkbloom._settings.registry import METHODS, STAGES, glares, presets
@@ -201,7 +201,7 @@ def _maker(kind: Any) -> str:
         return str(kind.__name__)
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
-    name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'
+    name = "" if identifier_of(Path(path).stem) == kind.method else f', name="{kind.method}"'
     return f"vkbloom.load_method({source}{name})"
 
 

@@ -82,16 +82,6 @@ class Separable(Settings):
     Notes
     -----
     Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
-
-    Examples
-    --------
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(1.0), blur_strength=1.0)
-    >>> image = np.zeros((9, 9, 4), np.float32)
-    >>> image[4, 4] = 1
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     bloom = renderer.apply(image, settings)["bloom"]
-    >>> bloom[4, 1:8, 0].round(3)
-    array([0.002, 0.022, 0.097, 0.159, 0.097, 0.022, 0.002], dtype=float32)
     """
 
     method: ClassVar[str] = "separable"

@@ -16,25 +16,14 @@ from vkbloom._scene.textures import WHITE, Surface
 class Mesh:
     """Triangles with normals and colours, some of them with textures.
 
-    Parameters
-    ----------
-    vertices
-        ``(N, 9)`` float32, finite: position xyz, normal xyz and linear colour rgb of each vertex.
-        y points down.
-    indices
-        ``(M,)`` uint32, each less than N: the triangles. M is a positive multiple of 3.
-    emission
-        ``(N, 3)`` float32, finite: emitted radiance rgb of each vertex. The deferred system adds it
-        to `brightness`. The forward system draws it, and it glows, if the scene has no glow mesh.
-        None: nothing emits.
-    texcoords
-        ``(N, 4)`` float32, finite: the position of each vertex in the base texture, then in the
-        emission texture. (0, 0) is the top left corner of a texture, (1, 1) the bottom right one.
-        May be None if there are no surfaces.
-    surfaces
-        The textures of triangles at the end of `indices`. Each `Surface` covers `index_count`
-        entries, one surface after the other; the last one ends at the last entry. The triangles
-        before the first surface have no textures.
+    - `vertices`: (N, 9) float32: position xyz (y points down), normal xyz and linear colour rgb.
+    - `indices`: (M,) uint32: the triangles.
+    - `emission`: (N, 3) float32: emitted radiance rgb. The deferred system adds it to `brightness`.
+      The forward system draws it, and it glows, if the scene has no glow mesh. None: nothing emits.
+    - `texcoords`: (N, 4) float32: the position of each vertex in the base texture, then in the
+      emission texture; (0, 0) is the top left corner of a texture. May be None without surfaces.
+    - `surfaces`: The textures of triangles at the end of `indices`, one surface after the other.
+      The triangles before the first surface have no textures.
 
     Arrays are copied unless they are read-only, C-contiguous owners of their memory. The core
     checks them.

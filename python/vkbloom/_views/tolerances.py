@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from vkbloom._checks import check_number
-from vkbloom._views.comparison import Comparison, Metric
+from vkbloom._views.comparison import USUAL_METRICS, Comparison, Metric
 
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
 
@@ -92,12 +92,7 @@ class Tolerances:
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The metrics that have a limit, which `compare` must compute."""
-        limits: dict[Metric, float | None] = {
-            "ssim": self.ssim,
-            "psnr": self.psnr,
-            "flip": self.flip,
-        }
-        return tuple(name for name, limit in limits.items() if limit is not None)
+        return tuple(name for name in USUAL_METRICS if getattr(self, name) is not None)
 
 
 def failures(
@@ -117,12 +112,9 @@ def failures(
     hard, largest = tolerances.hard_fail, comparison.max_error or 0.0
     if hard is not None and largest > hard:
         failed.append(("tolerances", f"{worst(comparison)}, over {hard:.6g}, the most allowed"))
-    figures: tuple[tuple[Metric, Stage, float | None, float | None, bool], ...] = (
-        ("ssim", "SSIM", comparison.ssim, tolerances.ssim, False),
-        ("psnr", "PSNR", comparison.psnr, tolerances.psnr, False),
-        ("flip", "FLIP", comparison.flip, tolerances.flip, True),
-    )
-    for metric, name, value, limit, is_most in figures:
+    names: dict[Metric, Stage] = {"ssim": "SSIM", "psnr": "PSNR", "flip": "FLIP"}
+    for metric, name in names.items():
+        value, limit = getattr(comparison, metric), getattr(tolerances, metric)
         if metric not in metrics or limit is None:
             continue
         if value is None:
@@ -130,9 +122,9 @@ def failures(
             if not comparison.mismatches:
                 why = comparison.not_computed.get(metric, "no values to compare")
                 failed.append((name, f"{name} is not computed: {why}"))
-        elif is_most and value > limit:
+        elif metric == "flip" and value > limit:
             failed.append((name, f"{name} {value:.6g} is over {limit:.6g}"))
-        elif not is_most and value < limit:
+        elif metric != "flip" and value < limit:
             failed.append((name, f"{name} {value:.6g} is under {limit:.6g}"))
     return failed
 

@@ -188,7 +188,7 @@ class aperture(SampledPSF):
     pixel_pitch: float = number_field(default=4.0, range=(0, math.inf), unit="um", slider=(1, 20))
     wavelengths: tuple[float, ...] | None = value_field(None, unit="nm", read=_check_wavelengths)
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         return _pattern(self, _reach(self), _reach(self))
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:

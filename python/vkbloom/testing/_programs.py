@@ -80,30 +80,22 @@ class Program:
         if isinstance(argv, str) or not all(isinstance(word, str) for word in argv):
             raise TypeError(f"argv: {argv!r} is not a sequence of str; use shlex.split")
         self._argv = tuple(argv)
-        if missing := [
-            placeholder for placeholder in _PLACES if not any(placeholder in word for word in argv)
-        ]:
-            raise ValueError(f"argv: {' '.join(argv)!r} has no {missing[0]}")
+        for placeholder in _PLACES:
+            if not any(placeholder in word for word in argv):
+                raise ValueError(f"argv: {' '.join(argv)!r} has no {placeholder}")
         if not suffix.startswith("."):
             raise ValueError(f"suffix: {suffix!r} does not begin with a dot")
         check_number("timeout", timeout, 1e-3, 1e6)
         self._suffix, self._timeout = suffix, timeout
         self.bits: int | None = None
         # The laws ask for the keywords that a bloom takes.
-        kinds = dict.fromkeys(
-            (
-                key
-                for placeholder, key in _KEYWORDS.items()
-                if any(placeholder in word for word in argv)
-            ),
-            inspect.Parameter.KEYWORD_ONLY,
-        )
-        self.__signature__ = inspect.Signature(
-            [
-                inspect.Parameter(name, kind, default=None)
-                for name, kind in {"image": inspect.Parameter.POSITIONAL_ONLY, **kinds}.items()
-            ]
-        )
+        taken = [
+            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None)
+            for placeholder, key in _KEYWORDS.items()
+            if any(placeholder in word for word in argv)
+        ]
+        image = inspect.Parameter("image", inspect.Parameter.POSITIONAL_ONLY)
+        self.__signature__ = inspect.Signature([image, *taken])
 
     def __call__(
         self,
