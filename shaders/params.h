@@ -157,14 +157,17 @@
     VEC4S(B, shares, 2)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
-// weight of each for each channel. The threshold is for the first iteration.
+// weight of each for each channel. The threshold is for the first iteration. With `reads_next`,
+// `next` has the bits of next_texel() for each tap.
 #define STREAKS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
     INPUT(B, float, limit) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
     INPUT(B, int, count) \
-    VEC4S(B, weights, MAX_TAPS)
+    INPUT(B, int, reads_next) \
+    VEC4S(B, weights, MAX_TAPS) \
+    VEC4S(B, next, MAX_TAPS)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
 // ghosts.
@@ -192,7 +195,9 @@
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
     INPUT(B, float, rounding) \
-    VEC4S(B, factors, 1)
+    INPUT(B, int, reads_next) \
+    VEC4S(B, factors, 1) \
+    VEC4S(B, next, 1)
 
 // Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows
 // from its end at the left or right or at the bottom, or back from its other end. `distance` is
@@ -348,7 +353,8 @@
     COUNT(diagonal, 1, 0, 1) \
     COUNT(fast, 0, 0, 1) \
     COUNT(quarter, 0, 0, 1) \
-    COUNT(urp_12, 0, 0, 1)
+    COUNT(urp_12, 0, 0, 1) \
+    COUNT(blender_5_2, 0, 0, 1)
 
 // Real numbers. They are doubles, so that sizes are computed as in Python.
 #define REAL_ROWS(REAL) \
@@ -444,43 +450,35 @@
 #define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
-#define HALVE_LINEAR_COLUMNS           8
-#define HALVE_LINEAR_ROWS              32
-#define PREFILTER_COLUMNS(CHANNEL)     ((CHANNEL) == 2 ? 8 : 4)
-#define DOUBLE_LINEAR_COLUMNS(CHANNEL) ((CHANNEL) == 1 ? 16 : 8)
-#define DOUBLE_FINAL_COLUMNS(CHANNEL)  ((CHANNEL) == 4 ? 8 : 16)
-#define DOUBLE_LINEAR_ROWS             64
-#define TEXEL_COLUMNS(CHANNEL)         (16 / (CHANNEL))
-#define TEXEL_ROWS                     16
-#define WINDOW_COLUMNS(CHANNEL)        (8 / (CHANNEL))
-#define WINDOW_ROWS                    64
-#define SHRINK_ROWS                    32
-#define GATHER_COLUMNS                 4
-#define GATHER_ROWS                    16
-#define NINE_OUTPUTS                   8
-#define STREAK_COLUMNS                 8
-#define STREAK_ROWS                    32
-#define TILE_LOADED                    64
-#define TILE_ROWS                      32
-#define TILE_RUNS                      4
-#define TILE_RADIUS                    16
-// Tiles of levels of exactly twice the size, and of the transposes of both: their pixels, and the
-// invocations along a column. On an H100 with float32, the tile of four rows of the second
-// transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137. In a tile of 64 x 16,
-// 256 invocations composite 3840 x 2160 in 148 us, 128 in 160; the first transpose takes 139 in one
-// of 32 x 16, 151 in one of 64 x 16.
-#define DOUBLE_TILE_COLUMNS 64
-#define DOUBLE_TILE_ROWS    16
-#define DOUBLE_TILE_RUNS    4
-// Tiles of filters: their rows, and the invocations of a workgroup.
-#define FILTER_TILE_ROWS        16
-#define FILTER_TILE_INVOCATIONS 256
-#define ADJOINT_HALVE_COLUMNS   32
-#define ADJOINT_HALVE_ROWS      16
-#define ADJOINT_HALVE_RUNS      4
-#define ADJOINT_DOUBLE_COLUMNS  61
-#define ADJOINT_DOUBLE_ROWS     4
-#define FUSED_VEC4S             5
+#define HALVE_LINEAR_COLUMNS       8
+#define HALVE_LINEAR_ROWS          32
+#define PREFILTER_COLUMNS(CHANNEL) ((CHANNEL) == 2 ? 8 : 4)
+#define TEXEL_COLUMNS(CHANNEL)     (16 / (CHANNEL))
+#define TEXEL_ROWS                 16
+#define WINDOW_COLUMNS(CHANNEL)    (8 / (CHANNEL))
+#define WINDOW_ROWS                64
+#define SHRINK_ROWS                32
+#define GATHER_COLUMNS             4
+#define GATHER_ROWS                16
+#define NINE_OUTPUTS               8
+#define STREAK_COLUMNS             8
+#define STREAK_ROWS                32
+#define TILE_LOADED                64
+#define TILE_ROWS                  32
+#define TILE_RUNS                  4
+#define TILE_RADIUS                16
+// Tiles of filters: their rows, and those that an invocation adds up. Then those of the transposes
+// of levels of exactly half and twice the size. On an H100 with float32, the tile of four rows of
+// the second transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137; the first
+// transpose takes 139 in one of 32 x 16, 151 in one of 64 x 16.
+#define FILTER_TILE_ROWS       16
+#define FILTER_TILE_RUN        4
+#define ADJOINT_HALVE_COLUMNS  32
+#define ADJOINT_HALVE_ROWS     16
+#define ADJOINT_HALVE_RUNS     4
+#define ADJOINT_DOUBLE_COLUMNS 61
+#define ADJOINT_DOUBLE_ROWS    4
+#define FUSED_VEC4S            5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
@@ -532,17 +530,18 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
 // long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
 // source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl), and SOURCE_ROWS of their tiles. EXACT says that their images are in this
-// ratio, or for strips the widths of these. With FROM_IMAGE, a downsampling to half the size
-// reads the image itself and applies the threshold, and an adjoint pass writes the cotangents of
-// a source's image. BY is what these are of. With ENLARGED the target has more rows than the
-// source. STORED is the format of the target (STORED_*). FIRST marks an engine's first level.
-// LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling makes of its
-// taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH
-// x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage that is
-// PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1 to
-// RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
-// GROUP_WIDTH lines.
+// (lib/filter.glsl), and SOURCE_ROWS of their tiles. TAKEN_X and TAKEN_Y have a bit for each texel
+// of a window and each kernel that may have a weight; 0: all may. EXACT says that their images are
+// in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
+// With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
+// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
+// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
+// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
+// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
+// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
+// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
+// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
+// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -589,7 +588,10 @@
     CONSTANT(44, TAP_COUNT, taps) \
     CONSTANT(45, KERNELS, kernels) \
     CONSTANT(46, WINDOW, window) \
-    CONSTANT(47, SOURCE_ROWS, source_rows)
+    CONSTANT(47, SOURCE_ROWS, source_rows) \
+    CONSTANT(48, EXACT_ROWS, exact_rows) \
+    CONSTANT(49, TAKEN_X, taken_x) \
+    CONSTANT(50, TAKEN_Y, taken_y)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -42,7 +42,7 @@ def rows(file: Path) -> Iterator[tuple[str, ...]]:
     worst = max(report["groups"], key=lambda one: _share(one["largest_error"], one["allowed"]))
     figures = f"nearest to its limit: {worst['name']}, {worst['largest_error'] or 0:.2g} of "
     wrong = "; ".join(f"{one['group']}: {one['name']}" for one in report["wrong"])
-    found = f"{report['cases']} cases, {len(report['wrong'])} wrong"
+    found = f"{report['cases']} cases, {len(report['wrong'])} wrong, {report['seconds']:.0f} s"
     more = f"wrong: {wrong}" if wrong else f"{figures}{worst['allowed']:.2g}"
     yield device["name"], about, "drawn", found, more
 

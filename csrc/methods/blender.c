@@ -69,6 +69,43 @@ static double ray_gain(const struct vkb_glare_values *values, int iteration)
     return sum / 2.0;
 }
 
+// The bits of next_texel(): at the texels 0 and 2^k, whether Blender 5.2 reads the one after it
+// there. It finds both texels of a pixel by themselves, at u and at u + 1 in single floats. Where u
+// is just below such a texel by rounding only, u + 1 is rounded to the integer after the next one.
+// Pixels of `count` read `size` texels `offset` texels away, which is `share` of the side.
+static float next_bits(uint32_t size, uint32_t count, float share, double offset)
+{
+    uint32_t bits = 0;
+
+    for (uint32_t bit = 0; bit == 0 || 1u << (bit - 1) < size; ++bit) {
+        const uint32_t texel = bit ? 1u << (bit - 1) : 0;
+        const double pixel = floor((texel + 0.5 - offset) * count / size);
+        const float at = ((float)pixel + 0.5f) / (float)count + share;
+        const float scaled = at * (float)size;
+        const float place = scaled - 0.5f;
+        if (pixel >= 0.0 && pixel < count && floorf(place + 1.0f) > floorf(place) + 1.0f)
+            bits |= 1u << bit;
+    }
+    return (float)bits;
+}
+
+// Sets the bits of all taps of an iteration of a ray along `angle`, and returns whether there are
+// any.
+static bool set_next(struct vkb_size size, float angle, int iteration, float next[MAX_TAPS][4])
+{
+    const float step = (float)pow(4.0, iteration);
+    bool found = false;
+
+    for (int tap = 0; tap < 4; ++tap) {
+        const float x = (float)cos(angle) * step / (float)size.width * (float)tap;
+        const float y = (float)sin(angle) * step / (float)size.height * (float)tap;
+        next[tap][0] = next_bits(size.width, size.width, x, tap * step * cos(angle));
+        next[tap][1] = next_bits(size.height, size.height, y, tap * step * sin(angle));
+        found = found || next[tap][0] > 0.0f || next[tap][1] > 0.0f;
+    }
+    return found;
+}
+
 static bool add_streaks(struct glare *glare, uint32_t *light, struct vkb_error *error)
 {
     const struct vkb_values *values = &glare->settings->values;
@@ -84,14 +121,19 @@ static bool add_streaks(struct glare *glare, uint32_t *light, struct vkb_error *
         // Blender reads in the direction of the angle.
         const double angle =
             acos(-1.0) * (1.0 + values->streaks_angle / 180.0 + 2.0 * i / values->streaks);
+        float next[MAX_TAPS][4] = {{0.0f}};
         uint32_t from = glare->levels.downs[0];
         for (int iteration = 0; iteration < values->iterations; ++iteration, from = *light) {
             const bool last = iteration == values->iterations - 1;
+            const bool reads_next =
+                values->blender_5_2
+                && set_next(glare->levels.sizes[0], (float)(angle - acos(-1.0)), iteration, next);
             const double share = last ? 1.0 / (6 - values->iterations) : 1.0;
             struct vkb_ray ray = {
                 .values = &numbers,
                 .angle = angle,
                 .gain = share * ray_gain(&numbers, iteration),
+                .next = reads_next ? next : NULL,
                 .iteration = iteration,
                 .from = from,
                 .before = last ? before : VKB_NO_IMAGE,
@@ -330,6 +372,13 @@ static bool add_end(const struct glare *glare, uint32_t light, uint32_t *bloom,
         }},
     };
     VKB_SET_TARGET(&row, blender_end, &glare->levels.graph->images[*bloom]);
+    if (glare->settings->values.blender_5_2) {
+        const struct vkb_size from = glare->levels.sizes[0], to = glare->levels.source->buffers;
+        float *next = row.params.blender_end.next[0];
+        next[0] = next_bits(from.width, to.width, 0.0f, 0.0);
+        next[1] = next_bits(from.height, to.height, 0.0f, 0.0);
+        row.params.blender_end.reads_next = next[0] > 0.0f || next[1] > 0.0f;
+    }
     return vkb_graph_add_pass(glare->levels.graph, &row, error);
 }
 

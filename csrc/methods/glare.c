@@ -101,6 +101,9 @@ bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
     params->step_y = step_of(step * sin(ray->angle));
     params->threshold = ray->iteration == 0 ? values->threshold : 0.0f;
     params->limit = vkb_formats[levels->source->format].limit;
+    params->reads_next = ray->next != NULL;
+    if (ray->next)
+        memcpy(params->next, ray->next, sizeof params->next);
     return vkb_graph_add_pass(levels->graph, &row, error);
 }
 

@@ -58,10 +58,12 @@ bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_so
                   uint32_t *target, struct vkb_error *error);
 
 // Adds an iteration of a ray of streaks from `from`, with the numbers of a stage, into the image
-// `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights.
+// `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights. `next`, if
+// there is one, has the bits of next_texel() for each tap.
 struct vkb_ray {
     const struct vkb_glare_values *values;
     double angle, gain;
+    const float (*next)[4];
     int iteration;
     uint32_t from, before, to;
 };

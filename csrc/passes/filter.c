@@ -107,6 +107,34 @@ static double furthest(float (*taps)[4])
     return distance;
 }
 
+// The bits of two texels that a linear tap at this place has.
+static int32_t taken_at(int32_t window, float place)
+{
+    const int32_t at = window / 2 - 1 + (int32_t)floorf(place);
+
+    return 1 << at | (place != floorf(place) ? 2 << at : 0);
+}
+
+// TAKEN_* of an axis. Positions are between texels, at the centres of these, a quarter beside them,
+// or anywhere.
+static int32_t taken(float (*taps)[4], int32_t window, uint32_t source, uint32_t target)
+{
+    static const float half[] = {0.5f}, same[] = {0.0f}, twice[] = {0.25f, 0.75f},
+                       any[] = {0.0f, 0.99999994f};
+    const float *parts = source == 2 * target ? half
+                       : source == target     ? same
+                       : 2 * source == target ? twice
+                                              : any;
+    const int count = parts == half || parts == same ? 1 : 2;
+    int32_t bits = 0;
+
+    for (int tap = 0; tap < MAX_FILTER_TAPS; ++tap)
+        for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
+            for (int part = 0; taps[tap][kernel + 1] != 0.0f && part < count; ++part)
+                bits |= taken_at(window, parts[part] + taps[tap][0]) << MAX_WINDOW * kernel;
+    return bits;
+}
+
 bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
                     struct vkb_error *error)
 {
@@ -117,6 +145,12 @@ bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
     row->constants.window = row->constants.upsample == UPSAMPLE_CUBIC ? 4
                           : window <= MAX_WINDOW                      ? window
                                                                       : 0;
+    if (row->constants.upsample == UPSAMPLE_LINEAR && row->constants.window) {
+        const struct vkb_image_row *source = &levels->graph->images[row->reads[0]];
+        const struct vkb_image_row *target = &levels->graph->images[row->targets[0]];
+        row->constants.taken_x = taken(params->taps_x, window, source->width, target->width);
+        row->constants.taken_y = taken(params->taps_y, window, source->height, target->height);
+    }
     return vkb_graph_add_pass(levels->graph, row, error);
 }
 

@@ -35,13 +35,6 @@ bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t fr
 bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
                    struct vkb_error *error);
 
-// Whether a level of exactly twice the size is filtered with the pyramid's 13 taps, or the target
-// has exactly twice the size and four taps along each axis: EXACT_*; 0: neither.
-static inline enum vkb_mode vkb_filter_exact(const struct vkb_pass_row *pass)
-{
-    return (enum vkb_mode)pass->constants.exact;
-}
-
 static inline bool vkb_is_filter(const struct vkb_pass_row *pass)
 {
     return pass->block == VKB_BLOCK_filter;

@@ -1,4 +1,4 @@
-// Filters in strips, and the sum of several levels: along rows, then along columns.
+// Filters in strips and tiles, and the sum of several levels: along rows, then along columns.
 #include "variants/variant.h"
 
 #include "passes/filter.h"
@@ -8,6 +8,7 @@
 
 static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter);
+static const struct vkb_shader *const halved_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(filter_comp);
 static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter_final);
 static const struct vkb_shader *const mixed_shaders[VKB_FORMAT_COUNT] = {
@@ -91,17 +92,40 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// Whether the pass is a filter whose taps are in a window, and its images have one format.
+// Whether the pass is a filter whose taps are in a window.
+static bool has_window(const struct vkb_pass_row *pass)
+{
+    return vkb_is_filter(pass) && pass->constants.window > 0;
+}
+
+// The same, whose images have one format.
 static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
-        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
+    return has_window(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
         && (!pass->constants.add_own || vkb_has_format_of(graph, pass->reads[1], pass->targets[0]));
 }
 
-// Makes `row`, which has a filter's constants, the strips of the filter `pass`.
-static void make_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_pass_row *row, const struct vkb_shader *const *shaders)
+// Whether sides are in a simple ratio: EXACT_*; 0: they are not.
+static int32_t ratio_of(uint32_t source, uint32_t target)
+{
+    return source == 2 * target ? EXACT_HALF
+         : source == target     ? EXACT_SAME
+         : 2 * source == target ? EXACT_DOUBLE
+                                : 0;
+}
+
+// Whether the weights of a position depend on the ratio of sizes alone, not on how far away the
+// edges are.
+static bool has_phases(const struct vkb_pass_row *pass)
+{
+    const int32_t upsample = pass->constants.upsample;
+
+    return upsample == UPSAMPLE_LINEAR || upsample == UPSAMPLE_CUBIC;
+}
+
+// Gives `row` the constants of the filter `pass`.
+static void take_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_pass_row *row)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
@@ -111,11 +135,21 @@ static void make_strips(const struct vkb_variant_choice *choice, const struct vk
     row->constants.taps = pass->constants.taps;
     row->constants.kernels = pass->constants.kernels;
     row->constants.window = pass->constants.window;
+    row->constants.taken_x = pass->constants.taken_x;
+    row->constants.taken_y = pass->constants.taken_y;
+    row->constants.exact = ratio_of(source->width, target->width);
+    row->constants.exact_rows = has_phases(pass) ? ratio_of(source->height, target->height) : 0;
+}
+
+// Makes `row` the strips of the filter `pass`.
+static void make_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct vkb_pass_row *row, const struct vkb_shader *const *shaders)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+
+    take_filter(choice, pass, row);
     row->constants.enlarged = source->height <= target->height;
-    row->constants.exact = source->width == 2 * target->width ? EXACT_HALF
-                         : source->width == target->width     ? EXACT_SAME
-                         : 2 * source->width == target->width ? EXACT_DOUBLE
-                                                              : 0;
     vkb_make_linear(row, shaders[target->format],
                     WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
 }
@@ -130,6 +164,27 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
         return true;
     memcpy(&row, pass, sizeof row);
     make_strips(choice, pass, &row, strip_shaders);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && vkb_add_from_image(choice, pass, &row, error);
+}
+
+// On a GPU, strips are faster than tiles where the source has twice the size.
+bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                    bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = has_window(pass) && !pass->constants.add_own;
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    take_filter(choice, pass, &row);
+    *fits = row.constants.exact == EXACT_HALF && row.constants.exact_rows == EXACT_HALF;
+    if (!*fits)
+        return true;
+    vkb_make_dispatch(&row, halved_shaders[choice->plain.images[pass->reads[0]].format],
+                      HALVE_INVOCATIONS * HALVE_COLUMNS, HALVE_ROWS);
+    row.reading = VKB_READING_LOADED;
     return vkb_graph_add_pass(choice->graph, &row, error)
         && vkb_add_from_image(choice, pass, &row, error);
 }
@@ -160,25 +215,6 @@ static uint32_t tile_columns(const struct vkb_variant_choice *choice,
                   > (limit < FASTEST ? limit : FASTEST))
         columns /= 2;
     return columns < NARROWEST ? 0 : columns;
-}
-
-bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                          bool *fits, struct vkb_error *error)
-{
-    const bool filters =
-        vkb_is_filter(pass) && pass->constants.window > 0 && !vkb_filter_exact(pass)
-        && choice->device->limits.maxComputeWorkGroupInvocations >= FILTER_TILE_INVOCATIONS;
-    const uint32_t columns = filters ? tile_columns(choice, pass) : 0;
-    struct vkb_pass_row row;
-
-    *fits = columns > 0;
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
-    row.constants.group_width = (int32_t)columns;
-    vkb_make_dispatch(&row, &vkb_shader_filter_tile_comp, columns, FILTER_TILE_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
@@ -239,4 +275,50 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
     make_strips(choice, up, &row, pass->transposed ? mixed_shaders : final_shaders);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+// Makes `row` tiles of the filter `pass`. False: no tile fits.
+static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       struct vkb_pass_row *row, const struct vkb_shader *shader)
+{
+    const uint32_t columns = tile_columns(choice, pass);
+
+    if (!columns)
+        return false;
+    take_filter(choice, pass, row);
+    row->constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
+    row->constants.group_width = (int32_t)columns;
+    vkb_make_dispatch(row, shader, columns, FILTER_TILE_ROWS);
+    return true;
+}
+
+bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                          bool *fits, struct vkb_error *error)
+{
+    struct vkb_pass_row row;
+
+    *fits = has_window(pass);
+    if (!*fits)
+        return true;
+    memcpy(&row, pass, sizeof row);
+    *fits = make_tiles(choice, pass, &row, &vkb_shader_filter_tile_comp);
+    return !*fits || vkb_graph_add_pass(choice->graph, &row, error);
+}
+
+bool vkb_add_filter_tiles_final(const struct vkb_variant_choice *choice,
+                                const struct vkb_pass_row *pass, bool *fits,
+                                struct vkb_error *error)
+{
+    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
+
+    *fits = up && has_window(up);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
+    *fits = make_tiles(choice, up, &row,
+                       pass->transposed ? &vkb_shader_filter_tile_final_mixed_comp
+                                        : &vkb_shader_filter_tile_final_comp);
+    return !*fits
+        || (vkb_add_fullscreen(choice, pass, error)
+            && vkb_graph_add_pass(choice->graph, &row, error));
 }

@@ -12,7 +12,8 @@ bool vkb_add_streaks(const struct vkb_variant_choice *choice, const struct vkb_p
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     struct vkb_pass_row row;
 
-    *fits = vkb_computes(pass, VKB_BLOCK_streaks) && vkb_fits_linear(choice, pass)
+    *fits = vkb_computes(pass, VKB_BLOCK_streaks) && !pass->params.streaks.reads_next
+         && vkb_fits_linear(choice, pass)
          && vkb_has_format_of(choice->graph, pass->reads[0], pass->targets[0]);
     if (!*fits)
         return true;

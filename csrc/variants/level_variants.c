@@ -1,12 +1,10 @@
-// Variants of downsampling to exactly half the size and of upsampling to exactly twice the size.
+// Variants of downsampling, and of the first passes of published methods.
 #include "variants/variant.h"
 
 #include "passes/filter.h"
 
 #include <string.h>
 
-static const struct vkb_shader *const halve_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(halve_comp);
-static const struct vkb_shader *const halve_linear[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(halve);
 static const struct vkb_shader *const halve_taps_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(halve_taps);
 static const struct vkb_shader *const prefilter_linear[VKB_FORMAT_COUNT] =
@@ -17,73 +15,12 @@ static const struct vkb_shader *const rows_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(nine_rows);
 static const struct vkb_shader *const columns_linear[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(nine_columns);
-static const struct vkb_shader *const double_linear[VKB_FORMAT_COUNT] =
-    VKB_LINEAR_BY_FORMAT(double);
-static const struct vkb_shader *const double_final_linear[VKB_FORMAT_COUNT] =
-    VKB_LINEAR_BY_FORMAT(double_final);
-static const struct vkb_shader *const double_mixed_linear[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_double_final_mixed_linear_rgba32float};
-
-// Sets the shader, and the block of pixels that each invocation writes, for storage images or
-// linear texels.
-static void make_halving(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                         enum vkb_format format)
-{
-    if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_linear(row, halve_linear[format], HALVE_LINEAR_COLUMNS, HALVE_LINEAR_ROWS);
-    } else {
-        vkb_make_dispatch(row, halve_shaders[format], HALVE_INVOCATIONS * HALVE_COLUMNS,
-                          HALVE_ROWS);
-        row->reading = VKB_READING_LOADED;
-    }
-}
-
-// The same; a GPU does it in tiles.
-static void make_doubling(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                          const struct vkb_shader *tiles, const struct vkb_shader *const *linear,
-                          uint32_t columns, enum vkb_format format)
-{
-    if (choice->variants == VKB_VARIANTS_CPU) {
-        vkb_make_linear(row, linear[format], columns, DOUBLE_LINEAR_ROWS);
-    } else {
-        vkb_make_dispatch(row, tiles, DOUBLE_TILE_COLUMNS, DOUBLE_TILE_ROWS);
-    }
-}
-
-// Whether the device can run the pass as make_halving and make_doubling set it. Shaders for linear
-// texels are compiled for one format of all images.
+// Whether the pass can be one of linear texels, whose shaders are compiled for one format of all
+// images.
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    return choice->variants != VKB_VARIANTS_CPU
-        || (vkb_fits_linear(choice, pass)
-            && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]));
-}
-
-static bool loads_to_double(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass)
-{
-    const uint32_t invocations = DOUBLE_TILE_COLUMNS * DOUBLE_TILE_RUNS;
-
-    return choice->variants == VKB_VARIANTS_CPU
-             ? loads(choice, pass)
-             : choice->device->limits.maxComputeWorkGroupInvocations >= invocations;
-}
-
-bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
-{
-    const struct vkb_graph *plain = &choice->plain;
-    struct vkb_pass_row row;
-
-    *fits = vkb_filter_exact(pass) == EXACT_HALF && loads(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){.alpha = pass->constants.alpha};
-    vkb_drop_reads(&row, 1);
-    make_halving(choice, &row, plain->images[pass->reads[0]].format);
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_from_image(choice, pass, &row, error);
+    return vkb_fits_linear(choice, pass)
+        && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
 }
 
 // What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
@@ -220,46 +157,4 @@ bool vkb_add_nine(const struct vkb_variant_choice *choice, const struct vkb_pass
     return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS, error)
                 : add_linear(choice, &row, columns_linear[format],
                              4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
-}
-
-bool vkb_add_doubled(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                     bool *fits, struct vkb_error *error)
-{
-    const struct vkb_graph *plain = &choice->plain;
-    const enum vkb_format format = plain->images[pass->reads[0]].format;
-    struct vkb_pass_row row;
-
-    *fits = vkb_filter_exact(pass) == EXACT_DOUBLE && loads_to_double(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.constants = (struct vkb_constants){
-        .add_own = pass->constants.add_own,
-        .alpha = pass->constants.alpha,
-    };
-    make_doubling(choice, &row, &vkb_shader_double_tile_comp, double_linear,
-                  DOUBLE_LINEAR_COLUMNS(vkb_formats[format].channel_size), format);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-// Adds the composite, and after it a fused pass that also upsamples the last level.
-bool vkb_add_doubled_final(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           bool *fits, struct vkb_error *error)
-{
-    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
-    const bool mixed = pass->transposed;
-
-    *fits = up && vkb_filter_exact(up) == EXACT_DOUBLE && loads_to_double(choice, pass)
-         && (!mixed || choice->variants != VKB_VARIANTS_CPU || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
-    make_doubling(choice, &row,
-                  mixed ? &vkb_shader_double_tile_final_mixed_comp
-                        : &vkb_shader_double_tile_final_comp,
-                  mixed ? double_mixed_linear : double_final_linear,
-                  DOUBLE_FINAL_COLUMNS(vkb_formats[format].channel_size), format);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -385,8 +385,9 @@ static bool create_handle(struct vkb_device *device, uint32_t adapter, const cha
     if (!(device->workers = vkb_workers_create(error))
         || !(device->allocations = vkb_alloc(error, 1, sizeof *device->allocations))
         || !open_adapter(device, adapter, driver, validation, error)
-        || (device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
-            && !vkb_instance_require_room(device->instance, error))
+        || (device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
+            && !vkb_instance_require_room(
+                device->instance, device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE, error))
         || !vkb_require_room("a device", DEVICE_MIB, error) || !create_logical(device, error))
         return false;
     vkb_instance_load_device(device->instance, device->handle, &device->vk);

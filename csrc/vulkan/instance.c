@@ -22,14 +22,15 @@ enum { MAX_INSTANCES = 8 };
 // 400 MiB.
 enum { MIN_MIB = 448 };
 
-// Each thread of lavapipe takes up to 144 MiB for its stacks and allocations.
-static size_t lavapipe_mib(void)
+// Each thread of lavapipe takes up to 144 MiB for its stacks and allocations. Other drivers of CPUs
+// end the process where a thread of theirs has no room: SwiftShader's take up to 96 MiB.
+static size_t driver_mib(bool lavapipe)
 {
-    enum { THREAD = 144, MAX_THREADS = 32 };
-    const char *text = getenv("LP_NUM_THREADS");
-    const unsigned long threads = text ? strtoul(text, NULL, 10) : vkb_core_count();
+    const unsigned long cores = vkb_core_count(), most = lavapipe ? 32 : 16;
+    const char *text = lavapipe ? getenv("LP_NUM_THREADS") : NULL;
+    const unsigned long threads = text ? strtoul(text, NULL, 10) : cores;
 
-    return MIN_MIB + THREAD * (threads < MAX_THREADS ? threads : MAX_THREADS);
+    return MIN_MIB + (lavapipe ? 144 : 96) * (threads < most ? threads : most);
 }
 
 static struct vkb_lock lock;  // protects the instances and volk's globals
@@ -281,9 +282,9 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
         return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
                         sizeof instance->driver - 1);
     memcpy(instance->driver, driver, strlen(driver));
-    instance->has_room = vkb_has_room(lavapipe_mib());
+    instance->has_room = vkb_has_room(driver_mib(true));
     if ((instance->has_room || vkb_has_room(MIN_MIB)
-         || vkb_fail_room("a Vulkan driver", lavapipe_mib(), error))
+         || vkb_fail_room("a Vulkan driver", driver_mib(true), error))
         && open_source(instance, &entry, error)
         && create_handle(instance, entry, validation ? &messenger : NULL, error)) {
         load_functions(instance);
@@ -340,9 +341,10 @@ void vkb_instance_close(struct vkb_instance *instance)
     vkb_lock_release(&lock);
 }
 
-bool vkb_instance_require_room(const struct vkb_instance *instance, struct vkb_error *error)
+bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapipe,
+                               struct vkb_error *error)
 {
-    return instance->has_room || vkb_require_room("a Vulkan driver", lavapipe_mib(), error);
+    return instance->has_room || vkb_require_room("a Vulkan driver", driver_mib(lavapipe), error);
 }
 
 void vkb_instance_explain(struct vkb_error *error)

@@ -73,8 +73,10 @@ struct vkb_instance *vkb_instance_open(const char *driver, bool validation,
                                        struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
 
-// Checks that there is address space for lavapipe, which creates its threads with a device.
-bool vkb_instance_require_room(const struct vkb_instance *instance, struct vkb_error *error);
+// Checks that there is address space for the driver of a CPU, lavapipe or another, which creates
+// its threads with a device.
+bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapipe,
+                               struct vkb_error *error);
 
 // Adds probable causes and remedies to an error of opening something: too many renderers, or a fork
 // from a process with an instance.

@@ -7,7 +7,6 @@ imported only when a test requests a fixture.
 from __future__ import annotations
 
 import shutil
-from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,52 +22,30 @@ __all__ = ["bloom_renderer", "frame_regression"]
 
 _RECORDS = pytest.StashKey[list["Record"]]()
 _RUN = pytest.StashKey["_Run"]()
-# Attributes of a test's report, which carry its checks and its module's data from an xdist worker
-# to the controller.
+# Attribute of a test's report, which carries its checks from an xdist worker to the controller.
 _CHECKS = "vkbloom_checks"
-_MODULE = "vkbloom_module"
 _FOLDER = "bloom_references"
+# Options that are set or not.
+_FLAGS = {
+    "update": "replace the references of failed checks, and write missing ones",
+    "add": "write further references for failed checks, beside those of other machines",
+    "allow-missing": "let checks without a reference pass",
+    "hash": "references are hashes, for drivers that draw equal bits; every value must be equal",
+}
+# Options with a value: its name, its default, and the help.
+_VALUES = {
+    "adapter": ("NAME", "auto", 'adapter of bloom_renderer: "software", "hardware" or a name'),
+    "report": ("DIR", None, "write an HTML page with all checks, and pictures of the failed ones"),
+}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("vkbloom", "bloom and other rendered images")
-    group.addoption(
-        "--bloom-update",
-        action="store_true",
-        help="replace the references of failed checks, and write missing ones",
-    )
-    group.addoption(
-        "--bloom-add",
-        action="store_true",
-        help="write further references for failed checks, beside those of other machines",
-    )
-    group.addoption(
-        "--bloom-allow-missing",
-        action="store_true",
-        help="let checks without a reference pass",
-    )
-    group.addoption(
-        "--bloom-hash",
-        action="store_true",
-        help="references are hashes, for drivers that draw equal bits; every value must be equal",
-    )
-    group.addoption(
-        "--bloom-adapter",
-        metavar="NAME",
-        default="auto",
-        help='adapter of bloom_renderer: "software", "hardware" or a part of its name',
-    )
-    group.addoption(
-        "--bloom-expect-adapter",
-        metavar="NAME",
-        help="a part of the adapter's name or driver; another adapter is an error",
-    )
-    group.addoption(
-        "--bloom-report",
-        metavar="DIR",
-        help="write an HTML page with all checks, and pictures of the failed ones",
-    )
+    for name, text in _FLAGS.items():
+        group.addoption(f"--bloom-{name}", action="store_true", help=text)
+    for name, (metavar, default, text) in _VALUES.items():
+        group.addoption(f"--bloom-{name}", metavar=metavar, default=default, help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -83,8 +60,6 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(
             "--bloom-update and --bloom-add exclude each other; give one of them"
         )
-    if config.getoption("bloom_expect_adapter") == "":
-        raise pytest.UsageError("--bloom-expect-adapter: empty; give a part of the adapter's name")
     if config.getoption("bloom_report") == "":
         raise pytest.UsageError("--bloom-report: empty; give a folder")
     run = _Run(config)
@@ -114,25 +89,22 @@ def pytest_runtest_makereport(
             page = parts.parent / "index.html"
             item.user_properties.append(("bloom_report", str(page)))
             item.add_report_section("call", "stdout", f"[[ATTACHMENT|{page}]]\n")
-    setattr(report, _MODULE, item.config.stash[_RUN].describe(item))
     return report
 
 
 @pytest.fixture(scope="session")
 def bloom_renderer(pytestconfig: pytest.Config) -> Iterator[Renderer]:
-    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``.
+    """Provide one `vkbloom.Renderer` per process, on the adapter of ``--bloom-adapter``."""
+    from vkbloom import (  # noqa: PLC0415  costs start-up time, as all of vkbloom
+        AdapterNotFoundError,
+        Renderer,
+    )
 
-    It is an error if there is no such adapter, or another one than ``--bloom-expect-adapter``.
-    """
-    from vkbloom import Renderer  # noqa: PLC0415  costs start-up time, as all of vkbloom
-
-    with Renderer(pytestconfig.getoption("bloom_adapter")) as renderer:
-        wanted = pytestconfig.getoption("bloom_expect_adapter")
-        info = renderer.info
-        known = f"{info.name} {info.driver_info or info.driver}"
-        if wanted is not None and wanted.lower() not in known.lower():
-            text = f"--bloom-expect-adapter={wanted}: the adapter is {info.summary}"
-            pytest.fail(text, pytrace=False)
+    try:
+        renderer = Renderer(pytestconfig.getoption("bloom_adapter"))
+    except AdapterNotFoundError as error:
+        pytest.fail(str(error), pytrace=False)
+    with renderer:
         yield renderer
 
 
@@ -166,7 +138,6 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
             add=config.getoption("bloom_add"),
             allow_missing=config.getoption("bloom_allow_missing"),
             hashed=config.getoption("bloom_hash"),
-            expect_adapter=config.getoption("bloom_expect_adapter"),
             parts=config.stash[_RUN].parts,
         ),
         records=item.stash.setdefault(_RECORDS, []),
@@ -185,10 +156,6 @@ class _Run:
         self._config = config
         self._worker_input: dict[str, Any] | None = getattr(config, "workerinput", None)
         self._records: list[Record] = []
-        # By folder of references: the number of tests of its module, and the tests that passed.
-        self._totals: Counter[str] = Counter()
-        self._passed: dict[str, set[str]] = {}
-        self._partly: set[Path] = set()
         self._page: Path | None = None
         # Why the page could not be written.
         self._reason = ""
@@ -206,33 +173,9 @@ class _Run:
             except OSError as error:
                 raise pytest.UsageError(f"--bloom-report={wanted}: {error.strerror}") from error
 
-    def pytest_deselected(self, items: list[pytest.Item]) -> None:
-        """Note modules with deselected tests, whose references are not reported as unused."""
-        self._partly.update(item.path for item in items)
-
-    def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Count the tests by module."""
-        for argument in session.config.args:
-            path, _, test = argument.partition("::")
-            if test:
-                self._partly.add((session.config.invocation_params.dir / path).resolve())
-        self._totals.update(str(folder_of(item.path)) for item in session.items)
-
-    def describe(self, item: pytest.Item) -> tuple[str, int] | None:
-        """Return a test's folder of references and its number of tests; None if unknown."""
-        if item.path in self._partly:
-            return None
-        folder = str(folder_of(item.path))
-        return folder, self._totals[folder]
-
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Collect the records of a report from this process or a worker."""
         self._records += getattr(report, _CHECKS, [])
-        module = getattr(report, _MODULE, None)
-        if module is not None and report.when == "call" and report.passed:
-            folder, total = module
-            self._totals[folder] = total
-            self._passed.setdefault(folder, set()).add(report.nodeid)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Write the report; if that fails, the summary says so and the run goes on."""
@@ -247,7 +190,7 @@ class _Run:
             session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List written, missing and unused references, and the report's path."""
+        """List written and missing references, and the report's path."""
         suffix = ".hashes" if self._config.getoption("bloom_hash") else ".json"
         lines = [
             f"{record['outcome']}: "
@@ -255,7 +198,6 @@ class _Run:
             for record in self._records
             if record["outcome"] in ("written", "missing")
         ]
-        lines += [f"unused: {self._relative(file)}" for file in self._unused()]
         if self._page is not None:
             lines.append(f"report: {self._relative(self._page)}")
         if self._reason:
@@ -264,29 +206,6 @@ class _Run:
             terminalreporter.section("vkbloom")
             for line in lines:
                 terminalreporter.write_line(line)
-
-    def _unused(self) -> list[Path]:
-        """Find references that no test used, in modules whose tests all ran and passed."""
-        used = {
-            (record["folder"], record["name"]) for record in self._records if record["has_files"]
-        }
-        unused: list[Path] = []
-        for folder, tests in self._passed.items():
-            if len(tests) != self._totals[folder]:
-                continue
-            unused += (
-                file
-                for file in Path(folder).glob("*.json")
-                if (folder, file.name.removesuffix(".json")) not in used
-            )
-        for parent in {Path(folder).parent for folder in self._passed}:
-            if parent.is_dir():
-                unused += (
-                    folder
-                    for folder in parent.iterdir()
-                    if folder.is_dir() and not (parent.parent / f"{folder.name}.py").exists()
-                )
-        return sorted(unused)
 
     def _relative(self, path: Path) -> str:
         """Shorten a path for the terminal."""

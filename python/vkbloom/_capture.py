@@ -67,14 +67,6 @@ def capture(
     The names of `Renderer.plan` are the labels of passes and the names of images and buffers.
     Messages of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
     results are copied through staging memory.
-
-    Examples
-    --------
-    Run by ``renderdoccmd capture -w python program.py``:
-
-    >>> def program(scene):
-    ...     with vkbloom.Renderer() as renderer, vkbloom.capture("a.rdc", renderer=renderer):
-    ...         renderer.render(scene)
     """
     return _captured((renderer or default_renderer())._core.instance, path)
 

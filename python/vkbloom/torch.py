@@ -2,16 +2,6 @@
 
 Tensors of float64 are computed by `vkbloom.reference`, all others by a renderer. The bloom buffers
 are "rgba32float".
-
-Examples
---------
->>> import torch
->>> import vkbloom.torch
->>> image = torch.full((8, 8, 3), 0.5, requires_grad=True)
->>> final = vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=1, intensity=0.5))
->>> final.sum().backward()
->>> round(float(image.grad.mean()), 4)
-1.5
 """
 
 from __future__ import annotations
@@ -68,21 +58,10 @@ def bloom(
     RuntimeError
         From a backward pass: a second derivative was asked for.
 
-    See Also
-    --------
-    Bloom : The same as a module, which can learn fields of the settings.
-    vkbloom.vjp : The derivatives as arrays.
-
     Notes
     -----
     The operator is ``torch.ops.vkbloom.bloom``, with a fake kernel, so `torch.compile` does not
     look into it.
-
-    Examples
-    --------
-    >>> image = torch.rand(2, 3, 16, 16)
-    >>> vkbloom.torch.bloom(image, vkbloom.Pyramid(levels=2), channels_first=True).shape
-    torch.Size([2, 3, 16, 16])
     """
     settings = check_settings(settings, of_image=True)
     return _call(

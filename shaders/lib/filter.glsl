@@ -2,9 +2,10 @@
 // a weight for up to three kernels. A kernel is a sum along rows, then along columns; the kernels are
 // added up. UPSAMPLE is what a tap samples there. The taps and kernels are TAP_COUNT and KERNELS in number.
 //
-// All variants of a filter add the WINDOW texels around a position in the same order, those without a
-// weight, too, for each kernel by itself: one sum of all has a quarter more error. Include sampling.glsl before this file. The including shader has FILTER_ROWS in its block,
-// or defines FILTER_X(i) and FILTER_Y(i), the tap of number i along an axis: offset and weights.
+// All variants of a filter add the WINDOW texels around a position in the same order, for each kernel by
+// itself: one sum of all has a quarter more error. Texels without a weight at any position (has_weight) may be
+// left out, which changes no bits. Include sampling.glsl before this file. The including shader has FILTER_ROWS
+// in its block, or defines FILTER_X(i) and FILTER_Y(i), the tap of number i along an axis: offset and weights.
 
 #ifndef FILTER_X
 #define FILTER_X(i) params.taps_x[i]
@@ -53,6 +54,12 @@ struct Window {
     int first;
     vec3 weights[MAX_WINDOW + 2];
 };
+
+// Whether a texel of a window may have a weight in a kernel, by TAKEN_X or TAKEN_Y.
+bool has_weight(int taken, int at, int kernel)
+{
+    return taken == 0 || (taken >> (MAX_WINDOW * kernel + at) & 1) != 0;
+}
 
 // The weights of a cubic B-spline whose control points are the texels.
 vec4 cubic_weights(float part)

@@ -48,10 +48,12 @@ vec4 filtered(sampler2D image)
         [[unroll]] for (int j = 0; j < WINDOW; ++j) {
             vec4 texel = fetch_clamped(image, ivec2(x.first + j, y.first + i));
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-                rows[kernel] += x.weights[j][kernel] * texel;
+                if (has_weight(TAKEN_X, j, kernel))
+                    rows[kernel] += x.weights[j][kernel] * texel;
         }
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            sums[kernel] += y.weights[i][kernel] * rows[kernel];
+            if (has_weight(TAKEN_Y, i, kernel))
+                sums[kernel] += y.weights[i][kernel] * rows[kernel];
     }
     return sum_of(sums);
 }

@@ -31,6 +31,20 @@ Place place_in(sampler2D source, ivec2 pixel, ivec2 target_size)
 // The position of this pixel in the source, for a shader whose block has SAMPLING_ROWS.
 #define PLACE_IN(source) place_in(source, PIXEL, ivec2(params.target_width, params.target_height))
 
+// The step to the texel after the one at a place, which Blender 5.2 reads at some (vkb_next_bits):
+// for 0 by bit 0, for 2^k by bit k + 1. Rows are counted from the bottom.
+int next_step(int texel, float bits)
+{
+    bool has_bit = texel >= 0 && (texel & (texel - 1)) == 0;
+    return has_bit ? int(bits) >> (findMSB(texel) + 1) & 1 : 0;
+}
+
+ivec2 next_texel(sampler2D source, ivec2 texel, vec4 bits)
+{
+    int row = textureSize(source, 0).y - 1 - texel.y;
+    return texel + ivec2(next_step(texel.x, bits.x), -next_step(row, bits.y));
+}
+
 vec4 fetch_clamped(sampler2D source, ivec2 texel)
 {
     return TEXEL(texelFetch(source, clamp(texel, ivec2(0), textureSize(source, 0) - 1), 0));

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 // The end of Blender's glare: enlarged, with another saturation, tinted (formulas of the compositor of
-// Blender 5.0).
+// Blender 5.0 and 5.2).
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
@@ -28,6 +28,8 @@ vec3 saturated(vec3 value)
 vec4 shade()
 {
     Place place = PLACE_IN(source);
+    if (params.reads_next != 0)
+        place.texel = next_texel(source, place.texel, params.next[0]);
     vec4 value = fetch_bilinear(source, place.texel, place.part);
     return stored(vec4(saturated(value.rgb), value.a) * params.factors[0]);
 }

@@ -29,10 +29,13 @@ vec4 fetch_in_row(ivec2 texel, float part)
 
 // Steps along an axis, and many others, are of integer texels: then half of the fetches, or three of
 // four, would have no weight.
-vec4 sample_moved(vec2 offset)
+vec4 sample_moved(int tap)
 {
+    vec2 offset = float(tap) * vec2(params.step_x, params.step_y);
     vec2 integer = floor(offset), part = offset - integer;
     ivec2 texel = PIXEL + ivec2(integer);
+    if (params.reads_next != 0)
+        texel = next_texel(source, texel, params.next[tap]);
     vec4 value = fetch_in_row(texel, part.x);
     return part.y > 0.0 ? blended(value, fetch_in_row(texel + ivec2(0, 1), part.x), part.y) : value;
 }
@@ -40,9 +43,7 @@ vec4 sample_moved(vec2 offset)
 vec4 shade()
 {
     vec4 sum = ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) : vec4(0.0);
-    // The first tap is the pixel's own texel.
-    sum += params.weights[0] * fetch(PIXEL);
-    for (int tap = 1; tap < params.count; ++tap)
-        sum += params.weights[tap] * sample_moved(float(tap) * vec2(params.step_x, params.step_y));
+    for (int tap = 0; tap < params.count; ++tap)
+        sum += params.weights[tap] * sample_moved(tap);
     return stored(sum);
 }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-// The transpose of an upsampling to exactly twice the size (lib/doubling.glsl) in tiles, for GPUs. Along
+// The transpose of an upsampling to exactly twice the size in tiles, for GPUs. Along
 // each axis, eight pixels read a texel. An invocation adds up those of a column for the tile's rows; then
 // the sums of columns are added up from shared memory.
 #include "lib/block.glsl"

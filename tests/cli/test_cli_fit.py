@@ -58,10 +58,9 @@ def test_screenshots(tmp_path: Path) -> None:
     words = ["fit", *names, "--preset", "all", "--max-calls", "3"]
     done = CliRunner().invoke(program, words)
     assert done.exit_code == 0, done.output
-    begun = [
-        line.rpartition(" ")[2] for line in done.stdout.splitlines() if ", from the preset " in line
-    ]
-    assert sorted(begun) == sorted([*vkbloom.presets, "photo"])
+    methods = [line.split(":")[0] for line in done.stdout.splitlines() if " loss " in line]
+    searched = [preset.method for preset in vkbloom.presets.values()]
+    assert sorted(methods) == sorted([*searched, vkbloom.presets["photo"].method])
     words = ["fit", *names, "--preset", "unity_urp", "--json"]
     (found,) = json.loads(CliRunner().invoke(program, words).stdout)
     assert found["verdict"] == "good"

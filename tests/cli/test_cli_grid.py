@@ -111,6 +111,14 @@ def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
         assert list(dataset["preset"].values) == ["kino", "filament"]
 
 
+def test_presets_of_files_of_both_kinds(tmp_path: Path, image_file: Path) -> None:
+    """Integers and floats start from different presets, which an axis of presets replaces."""
+    png = vkbloom.write(tmp_path / "a.png", np.zeros((9, 12, 3), np.float32))
+    result = run(png, image_file, "--axis", "preset=kino", "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    assert len([*(tmp_path / "out").glob("*.png")]) == 2
+
+
 def test_a_grid_without_bloom_says_so(tmp_path: Path, image_file: Path) -> None:
     words = ("--method", "pyramid", "--axis", "intensity=0.5,1", "--threshold")
     result = run(image_file, *words, "1000", "-o", tmp_path / "a.zarr")

@@ -537,25 +537,6 @@ def test_gpus(monkeypatch: pytest.MonkeyPatch, accessible: bool, status: str, te
     )
 
 
-@pytest.mark.parametrize(
-    ("driver_info", "status"),
-    [
-        ("Mesa 22.3.6 (LLVM 15.0.6)", "ok"),
-        ("Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)", "ok"),
-        ("Mesa 22.3.60 (LLVM 15.0.6)", "note"),
-        ("Mesa 24.2.8-1ubuntu1 (LLVM 19.1.1)", "note"),
-        ("", "note"),
-        ("git-12af", "note"),
-    ],
-)
-def test_lavapipe_versions(driver_info: str, status: str) -> None:
-    adapter = {"type": "cpu", "driver_info": driver_info, "bundled": False, "name": "Swift"}
-    finding = doctor._software([adapter])
-    assert finding.status == status
-    assert "22.3.6 and 25.0.7" in finding.found
-    assert ("is Swift, not lavapipe" in finding.found) is ("Mesa" not in driver_info)
-
-
 def test_nan_is_found(frames: vkbloom.Frames) -> None:
     nan = tampered(frames, lambda _, array: np.full_like(array, np.nan, np.float32))
     assert len(nan) == len(frames)

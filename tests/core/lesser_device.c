@@ -2,20 +2,15 @@
 // taken, separated by commas. test_lesser_devices.py builds and uses it.
 #define _GNU_SOURCE
 #define VK_ENABLE_BETA_EXTENSIONS  // the portability subset
+#include "layer.h"
+
 #include <signal.h>
-#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
-// clang-format off: the second one leaves out what the first one has
-#include <vulkan/vulkan.h>
-#include <vulkan/vk_layer.h>
-// clang-format on
 
 #define INSTANCE_FUNCTIONS(FUNCTION) \
-    FUNCTION(vkCreateDevice) \
     FUNCTION(vkGetPhysicalDeviceProperties) \
     FUNCTION(vkGetPhysicalDeviceProperties2) \
     FUNCTION(vkGetPhysicalDeviceFeatures) \
@@ -35,6 +30,8 @@
     FUNCTION(vkGetImageMemoryRequirements) \
     FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
     FUNCTION(vkAllocateMemory) \
+    FUNCTION(vkMapMemory) \
+    FUNCTION(vkFreeMemory) \
     FUNCTION(vkCmdClearColorImage) \
     FUNCTION(vkCmdCopyBufferToImage) \
     FUNCTION(vkQueueSubmit) \
@@ -48,12 +45,8 @@
     FUNCTION(vkWaitSemaphoresKHR)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
-// by their handles. Messages go to the instance that was created last.
+// by their handles.
 static struct {
-    VkInstance instance;
-    PFN_vkSubmitDebugUtilsMessageEXT message;
-    PFN_vkGetInstanceProcAddr instance_proc;
-    PFN_vkGetDeviceProcAddr device_proc;
 #define MEMBER(name) PFN_##name name;
     INSTANCE_FUNCTIONS(MEMBER)
     DEVICE_FUNCTIONS(MEMBER)
@@ -400,6 +393,21 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_host_pointer(VkDevice handle,
     return result;
 }
 
+// Memory that is not coherent: the host sees a copy, which only a flush or an invalidation renews.
+static struct copied_memory {
+    VkDeviceMemory memory;
+    VkDeviceSize size;
+    char *real, *copy;
+} copied[1 << 10];
+
+static struct copied_memory *find_copied(VkDeviceMemory memory)
+{
+    for (int i = 0; i < 1 << 10; ++i)
+        if (copied[i].memory == memory)
+            return &copied[i];
+    return NULL;
+}
+
 static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAllocateInfo *info,
                                                const VkAllocationCallbacks *callbacks,
                                                VkDeviceMemory *memory)
@@ -408,7 +416,66 @@ static VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice handle, const VkMemoryAl
 
     if (lacks("memory"))
         changed.memoryTypeIndex = 0;
-    return below.vkAllocateMemory(handle, &changed, callbacks, memory);
+    const VkResult result = below.vkAllocateMemory(handle, &changed, callbacks, memory);
+    struct copied_memory *unused = find_copied(VK_NULL_HANDLE);
+    if (result == VK_SUCCESS && lacks("memory") && info->memoryTypeIndex == CACHED_TYPE && unused)
+        *unused = (struct copied_memory){.memory = *memory, .size = info->allocationSize};
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL map_memory(VkDevice handle, VkDeviceMemory memory,
+                                                 VkDeviceSize offset, VkDeviceSize size,
+                                                 VkMemoryMapFlags flags, void **data)
+{
+    const VkResult result = below.vkMapMemory(handle, memory, offset, size, flags, data);
+    struct copied_memory *found = find_copied(memory);
+
+    // (The core maps all of it.)
+    if (result != VK_SUCCESS || !found || offset > 0 || !(found->copy = malloc(found->size)))
+        return result;
+    found->real = *data;
+    *data = memcpy(found->copy, found->real, found->size);
+    return result;
+}
+
+static VkResult copy_ranges(uint32_t count, const VkMappedMemoryRange *ranges, bool to_host)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        const struct copied_memory *found = find_copied(ranges[i].memory);
+        if (!found || !found->copy)
+            continue;
+        const VkDeviceSize start = ranges[i].offset, rest = found->size - start;
+        const VkDeviceSize size = ranges[i].size < rest ? ranges[i].size : rest;
+        memcpy((to_host ? found->copy : found->real) + start,
+               (to_host ? found->real : found->copy) + start, size);
+    }
+    return VK_SUCCESS;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL flush(VkDevice handle, uint32_t count,
+                                            const VkMappedMemoryRange *ranges)
+{
+    (void)handle;
+    return copy_ranges(count, ranges, false);
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL invalidate(VkDevice handle, uint32_t count,
+                                                 const VkMappedMemoryRange *ranges)
+{
+    (void)handle;
+    return copy_ranges(count, ranges, true);
+}
+
+static VKAPI_ATTR void VKAPI_CALL free_memory(VkDevice handle, VkDeviceMemory memory,
+                                              const VkAllocationCallbacks *callbacks)
+{
+    struct copied_memory *found = memory ? find_copied(memory) : NULL;
+
+    if (found) {
+        free(found->copy);
+        *found = (struct copied_memory){0};
+    }
+    below.vkFreeMemory(handle, memory, callbacks);
 }
 
 // Without "texels", the 64 texels with which the core finds out how they are read are others.
@@ -421,16 +488,6 @@ static VKAPI_ATTR void VKAPI_CALL copy_to_image(VkCommandBuffer commands, VkBuff
         below.vkCmdClearColorImage(
             commands, image, layout, &(VkClearColorValue){.float32 = {0.3f, 0.3f, 0.3f, 0.3f}}, 1,
             &(VkImageSubresourceRange){VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1});
-}
-
-static void object(const char *text)
-{
-    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
-                  &(VkDebugUtilsMessengerCallbackDataEXT){
-                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
-                      .pMessage = text,
-                  });
 }
 
 // Semaphores that presentations wait for. Only a wait for the queue tells that they have waited: a
@@ -596,26 +653,12 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo
                                                       const VkAllocationCallbacks *callbacks,
                                                       VkInstance *created)
 {
-    VkLayerInstanceCreateInfo *link = (VkLayerInstanceCreateInfo *)info->pNext;
-
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerInstanceCreateInfo *)link->pNext;
-    below.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    PFN_vkCreateInstance create =
-        (PFN_vkCreateInstance)below.instance_proc(VK_NULL_HANDLE, "vkCreateInstance");
-    VkResult result = create(info, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)below.instance_proc(*created, #name);
-    if (result == VK_SUCCESS && !below.vkCreateDevice) {
+    const VkResult result = begin_instance(info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)chain.instance_proc(*created, #name);
+    if (result == VK_SUCCESS && !below.vkGetPhysicalDeviceProperties) {
         INSTANCE_FUNCTIONS(FETCH)
     }
 #undef FETCH
-    if (result == VK_SUCCESS) {
-        below.instance = *created;
-        below.message = (PFN_vkSubmitDebugUtilsMessageEXT)below.instance_proc(
-            *created, "vkSubmitDebugUtilsMessageEXT");
-    }
     return result;
 }
 
@@ -624,13 +667,6 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
                                                     const VkAllocationCallbacks *callbacks,
                                                     VkDevice *created)
 {
-    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)info->pNext;
-
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerDeviceCreateInfo *)link->pNext;
-    below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
     const char *kept[64];
     VkDeviceCreateInfo changed = *info;
     changed.ppEnabledExtensionNames = kept;
@@ -646,8 +682,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     // A device that has the extension must be created with it.
     if (lacks("portability") && changed.enabledExtensionCount == info->enabledExtensionCount)
         return VK_ERROR_INITIALIZATION_FAILED;
-    VkResult result = below.vkCreateDevice(physical, &changed, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
+    const VkResult result = begin_device(physical, &changed, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)chain.device_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkAllocateMemory) {
         DEVICE_FUNCTIONS(FETCH)
     }
@@ -655,15 +691,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
-
-static const struct entry {
-    const char *name;
-    PFN_vkVoidFunction function;
-    bool of_device;
-} entries[] = {
-#define ENTRY(name, function, of_device) {#name, (PFN_vkVoidFunction)function, of_device}
+static const struct entry entries[] = {
     ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
     ENTRY(vkCreateInstance, create_instance, false),
     ENTRY(vkCreateDevice, create_device, false),
@@ -691,6 +719,10 @@ static const struct entry {
     ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
     ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
     ENTRY(vkAllocateMemory, allocate, true),
+    ENTRY(vkMapMemory, map_memory, true),
+    ENTRY(vkFlushMappedMemoryRanges, flush, true),
+    ENTRY(vkInvalidateMappedMemoryRanges, invalidate, true),
+    ENTRY(vkFreeMemory, free_memory, true),
     ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
     ENTRY(vkQueueSubmit, submit, true),
     ENTRY(vkWaitForFences, wait, true),
@@ -702,34 +734,7 @@ static const struct entry {
     ENTRY(vkDestroySemaphore, destroy_semaphore, true),
 };
 
-static PFN_vkVoidFunction find(const char *name, bool of_device)
+static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {
-    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
-        if (strcmp(entries[i].name, name) == 0 && (entries[i].of_device || !of_device))
-            return entries[i].function;
-    return NULL;
-}
-
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, false);
-
-    return found || !handle ? found : below.instance_proc(handle, name);
-}
-
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, true);
-
-    return found ? found : below.device_proc(handle, name);
-}
-
-VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
-vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
-{
-    layer->loaderLayerInterfaceVersion = 2;
-    layer->pfnGetInstanceProcAddr = get_instance_proc;
-    layer->pfnGetDeviceProcAddr = get_device_proc;
-    layer->pfnGetPhysicalDeviceProcAddr = NULL;
-    return VK_SUCCESS;
+    return find_entry(entries, sizeof entries / sizeof entries[0], name, of_device);
 }

@@ -252,7 +252,7 @@ def test_an_interrupted_store_is_completed(
             store=tmp_path / "grid",
             chunks={"blur_strength": 2},
             reduce={"mean": stopper},
-            validation=True,
+            adapter="auto",
             progress=False,
         )
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.device.abilities import max_side
 from tests.exhaustive import some
 from tests.processes import output, python
-from vkbloom import Convolution, Renderer, psf
+from vkbloom import AdapterInfo, Convolution, Renderer, psf
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="the limit is of Linux"),
@@ -39,9 +40,12 @@ THREADS = {"LP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"}
 
 
 @pytest.mark.parametrize("room", some([60, 200, 330, 480, 620, 735], 3))
-def test_without_room_for_a_driver(room: int) -> None:
+def test_without_room_for_a_driver(software: AdapterInfo, room: int) -> None:
     """Drivers that find no memory crash, or are not found."""
     said = output("-c", PROGRAM, str(room), **THREADS)
+    if "llvmpipe" not in software.name and room > 200:
+        assert "OutOfMemoryError" in said or said == "done\n"
+        return
     assert said.startswith(
         "OutOfMemoryError memory is short: a Vulkan driver needs 736 MiB of address space"
     ), said
@@ -58,7 +62,7 @@ def test_without_room_for_the_frame(room: int) -> None:
         assert "bloom_scale" in said or "ulimit -v" in said
 
 
-def test_adapters_need_no_room_for_lavapipes_threads() -> None:
+def test_adapters_need_no_room_for_lavapipes_threads(software: AdapterInfo) -> None:
     """Only lavapipe has them, and only once it is opened."""
     program = PROGRAM.replace(
         'with vkbloom.Renderer("software")', "assert vkbloom.adapters()\n    with None"
@@ -66,7 +70,7 @@ def test_adapters_need_no_room_for_lavapipes_threads() -> None:
     done = python("-c", program, "600", LP_NUM_THREADS="32", OPENBLAS_NUM_THREADS="1")
     assert "'NoneType' object does not support the context manager" in done.stderr
     said = output("-c", PROGRAM, "600", LP_NUM_THREADS="32", OPENBLAS_NUM_THREADS="1")
-    assert "a Vulkan driver needs 5056 MiB" in said
+    assert ("a Vulkan driver needs 5056 MiB" in said) == ("llvmpipe" in software.name)
 
 
 def test_with_room() -> None:
@@ -83,11 +87,14 @@ def test_adapters_without_room() -> None:
 
 def test_convolutions_beyond_the_adapter() -> None:
     with Renderer("software") as renderer:
-        wide = np.zeros((64, 16384, 3), np.uint8)
+        side = max_side(renderer)
+        wide = np.zeros((64, side, 3), np.uint8)
         spread = Convolution(psf.gaussian(3), kernel_size=(41, 41))
         for settings in (Convolution(), spread):
             with pytest.raises(ValueError, match=r"out of this adapter's range.*or kernel_size"):
                 renderer.plan(wide, settings)
+        if side < 15000:
+            return
         large = np.zeros((8000, 8000, 3), np.uint8)
         with pytest.raises(
             vkbloom.OutOfMemoryError, match=r"memory is short: \d+ MiB.*bloom_scale"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.device.abilities import max_side
 from tests.framebuffers import assert_same
 from tests.screens import noise, screen
 from vkbloom import Camera, Frames, Renderer, Scene, Separable
@@ -26,7 +27,7 @@ def opened(new_renderer: Callable[[], Renderer], scene: Scene) -> Renderer:
     On a CPU, the passes of a direct blur sample images that others load: these are made once more.
     """
     renderer = new_renderer()
-    renderer.render(scene, Separable(direct=True, threshold=0.1), SIZE)
+    renderer.render(scene, Separable(direct=True, threshold=0.1), SIZE, time=0.5)
     assert list(renderer.render(scene, None, SIZE).timings) == ALL
     return renderer
 
@@ -197,7 +198,8 @@ def test_unrequested_framebuffers_keep_their_content(
 
 def test_unrequested_framebuffers_are_not_allocated(opened: Renderer, scene: Scene) -> None:
     # Bloom buffers beyond any memory are no trouble where nothing of them is wanted.
-    huge = Separable(bloom_size=(16384, 16384), format="rgba32float")
+    side = max_side(opened)
+    huge = Separable(bloom_size=(side, side), format="rgba32float")
     frames = opened.render(scene, huge, SIZE, framebuffers=["scene", "depth"])
     assert list(frames) == ["scene", "depth"]
     assert list(frames.timings) == []

@@ -165,7 +165,7 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
     assert set(found["reference"]) == {"half", "rows", "bloom", "final"}
     text = page.read_text()
     assert text.count("data:image/png") == 3
-    assert "encircled energy" in text
+    assert "point spread, logarithmic" in text
     wrong = tmp_path / "wrong.py"
     wrong.write_text("def doubled(image, settings):\n    return {'bloom': 2 * image}\n")
     done, found = checked(*words, "--reference", f"{wrong}:doubled", "--require", "reference")
@@ -453,7 +453,7 @@ def test_regions_and_frames_of_a_program(
     script = tmp_path / "views.py"
     script.write_text(VIEWS)
     argv = shlex.split(f"{sys.executable} {script} {{input}} {{output}} {{region}} {words}")
-    laws = ["views", *(["history"] if "frame" in words else [])]
+    laws = ["history" if "frame" in words else "views"]
     found = testing.report(testing.command(argv), size=(16, 16), laws=laws)
     assert found.untaken == untaken
     assert {row.name for row in found.rows if not row.held} == broken

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -88,6 +89,8 @@ def record(words: list[str]) -> None:
     """Make the requests on the only adapter; print the failures as JSON."""
     wrong: dict[str, str] = {}
     count = 0
+    if "short" in words:  # of address space, for lavapipe's threads alone
+        resource.setrlimit(resource.RLIMIT_AS, (5_000_000 << 10,) * 2)
     with Renderer("hardware", validation="validated" in words) as renderer:
         for name, call in requests(renderer, words):
             count += 1

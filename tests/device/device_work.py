@@ -21,6 +21,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.device.abilities import infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Convolution, Pyramid, Renderer, Separable
@@ -167,7 +168,7 @@ def sequences(renderer: Any) -> None:
 def layers(renderer: Any) -> None:
     """Batches of which each pass runs for many images, where the adapter is not a CPU."""
     images = np.stack([picture(9, 7, 3, "float16", seed=i) for i in range(10)])
-    images[2, 3, 3, 1], images[9, 0, 0, 0] = np.inf, np.nan
+    images[2, 3, 3, 1], images[9, 0, 0, 1] = infinities(renderer, "float16")[0], np.nan
     batch = OnDevice(images[:, ::-1])
     # In turns with single images: both have images of the same names.
     for settings, together in ((LOW, 10), (Separable(), 10), (Convolution(), 0), (LOW, 10)):

@@ -1,22 +1,14 @@
 // A Vulkan layer for tests: a driver without its hardware. The driver below makes shader modules,
 // layouts, pipelines and descriptors, and tells formats and limits. Memory is the host's, images
 // and buffers are their sizes, and commands do nothing. amd_families.py builds and uses it.
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
-#include <vulkan/vk_layer.h>
+#include "../core/layer.h"
 
-#define EXPORT    __attribute__((visibility("default")))
+#include <stdlib.h>
+
 #define CALL      VKAPI_ATTR VkResult VKAPI_CALL
 #define CALL_VOID VKAPI_ATTR void VKAPI_CALL
 
 enum { PAGE = 4096, TYPES = 3, TEXEL = 16 };
-
-static struct {
-    VkInstance instance;
-    PFN_vkGetInstanceProcAddr instance_proc;
-    PFN_vkGetDeviceProcAddr device_proc;
-} below;
 
 // A handle of any kind; `bytes` is what a buffer, an image or its row needs.
 struct object {
@@ -158,125 +150,55 @@ static CALL succeed(void)
     return VK_SUCCESS;
 }
 
-// Takes itself out of the chain that the loader made; returns the next function.
-static PFN_vkGetInstanceProcAddr next_of(const void *chain, VkStructureType type,
-                                         PFN_vkGetDeviceProcAddr *device_proc)
-{
-    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)chain;
-
-    while (link->sType != type || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerDeviceCreateInfo *)link->pNext;
-    const PFN_vkGetInstanceProcAddr next = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-    if (device_proc) {
-        *device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
-        link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-        return next;
-    }
-    VkLayerInstanceCreateInfo *of_instance = (VkLayerInstanceCreateInfo *)link;
-    of_instance->u.pLayerInfo = of_instance->u.pLayerInfo->pNext;
-    return next;
-}
-
-static CALL create_instance(const VkInstanceCreateInfo *info,
-                            const VkAllocationCallbacks *callbacks, VkInstance *instance)
-{
-    below.instance_proc = next_of(info->pNext, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO, NULL);
-    const PFN_vkCreateInstance function =
-        (PFN_vkCreateInstance)below.instance_proc(NULL, "vkCreateInstance");
-    const VkResult result = function(info, callbacks, instance);
-
-    below.instance = *instance;
-    return result;
-}
-
-static CALL create_device(VkPhysicalDevice physical, const VkDeviceCreateInfo *info,
-                          const VkAllocationCallbacks *callbacks, VkDevice *device)
-{
-    const PFN_vkGetInstanceProcAddr next =
-        next_of(info->pNext, VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO, &below.device_proc);
-
-    return ((PFN_vkCreateDevice)next(below.instance, "vkCreateDevice"))(physical, info, callbacks,
-                                                                        device);
-}
-
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
-
-#define ENTRY(name, function) {#name, (PFN_vkVoidFunction)function}
-#define PAIR(kind)            ENTRY(vkCreate##kind, create_any), ENTRY(vkDestroy##kind, destroy_any)
-static const struct entry {
-    const char *name;
-    PFN_vkVoidFunction function;
-} entries[] = {
-    ENTRY(vkGetInstanceProcAddr, get_instance_proc),
-    ENTRY(vkGetDeviceProcAddr, get_device_proc),
-    ENTRY(vkCreateInstance, create_instance),
-    ENTRY(vkCreateDevice, create_device),
-    ENTRY(vkGetPhysicalDeviceMemoryProperties, get_memory),
-    ENTRY(vkGetPhysicalDeviceMemoryProperties2, get_memory2),
-    ENTRY(vkGetPhysicalDeviceMemoryProperties2KHR, get_memory2),
-    ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer),
-    ENTRY(vkAllocateMemory, allocate),
-    ENTRY(vkFreeMemory, destroy_any),
-    ENTRY(vkMapMemory, map),
-    ENTRY(vkUnmapMemory, succeed),
-    ENTRY(vkFlushMappedMemoryRanges, succeed),
-    ENTRY(vkInvalidateMappedMemoryRanges, succeed),
-    ENTRY(vkCreateBuffer, create_buffer),
-    ENTRY(vkDestroyBuffer, destroy_any),
-    ENTRY(vkGetBufferMemoryRequirements, get_requirements),
-    ENTRY(vkBindBufferMemory, succeed),
-    ENTRY(vkCreateImage, create_image),
-    ENTRY(vkDestroyImage, destroy_any),
-    ENTRY(vkGetImageMemoryRequirements, get_requirements),
-    ENTRY(vkGetImageSubresourceLayout, get_layout),
-    ENTRY(vkBindImageMemory, succeed),
+#define OWN(name, function) ENTRY(name, function, true)
+#define PAIR(kind)          OWN(vkCreate##kind, create_any), OWN(vkDestroy##kind, destroy_any)
+static const struct entry entries[] = {
+    OWN(vkGetInstanceProcAddr, get_instance_proc),
+    OWN(vkGetDeviceProcAddr, get_device_proc),
+    OWN(vkCreateInstance, begin_instance),
+    OWN(vkCreateDevice, begin_device),
+    OWN(vkGetPhysicalDeviceMemoryProperties, get_memory),
+    OWN(vkGetPhysicalDeviceMemoryProperties2, get_memory2),
+    OWN(vkGetPhysicalDeviceMemoryProperties2KHR, get_memory2),
+    OWN(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer),
+    OWN(vkAllocateMemory, allocate),
+    OWN(vkFreeMemory, destroy_any),
+    OWN(vkMapMemory, map),
+    OWN(vkUnmapMemory, succeed),
+    OWN(vkFlushMappedMemoryRanges, succeed),
+    OWN(vkInvalidateMappedMemoryRanges, succeed),
+    OWN(vkCreateBuffer, create_buffer),
+    OWN(vkDestroyBuffer, destroy_any),
+    OWN(vkGetBufferMemoryRequirements, get_requirements),
+    OWN(vkBindBufferMemory, succeed),
+    OWN(vkCreateImage, create_image),
+    OWN(vkDestroyImage, destroy_any),
+    OWN(vkGetImageMemoryRequirements, get_requirements),
+    OWN(vkGetImageSubresourceLayout, get_layout),
+    OWN(vkBindImageMemory, succeed),
     PAIR(BufferView),
     PAIR(ImageView),
     PAIR(Framebuffer),
     PAIR(QueryPool),
     PAIR(Fence),
-    ENTRY(vkGetQueryPoolResults, get_queries),
-    ENTRY(vkResetFences, succeed),
-    ENTRY(vkGetFenceStatus, succeed),
-    ENTRY(vkWaitForFences, succeed),
-    ENTRY(vkQueueSubmit, succeed),
-    ENTRY(vkQueueWaitIdle, succeed),
-    ENTRY(vkUpdateDescriptorSets, succeed),
-    ENTRY(vkBeginCommandBuffer, succeed),
-    ENTRY(vkEndCommandBuffer, succeed),
-    ENTRY(vkResetCommandBuffer, succeed),
-    ENTRY(vkResetCommandPool, succeed),
-    ENTRY(vkSetDebugUtilsObjectNameEXT, succeed),
+    OWN(vkGetQueryPoolResults, get_queries),
+    OWN(vkResetFences, succeed),
+    OWN(vkGetFenceStatus, succeed),
+    OWN(vkWaitForFences, succeed),
+    OWN(vkQueueSubmit, succeed),
+    OWN(vkQueueWaitIdle, succeed),
+    OWN(vkUpdateDescriptorSets, succeed),
+    OWN(vkBeginCommandBuffer, succeed),
+    OWN(vkEndCommandBuffer, succeed),
+    OWN(vkResetCommandBuffer, succeed),
+    OWN(vkResetCommandPool, succeed),
+    OWN(vkSetDebugUtilsObjectNameEXT, succeed),
 };
 
-static PFN_vkVoidFunction find(const char *name)
+static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {
-    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
-        if (strcmp(entries[i].name, name) == 0)
-            return entries[i].function;
-    return strncmp(name, "vkCmd", 5) == 0 ? (PFN_vkVoidFunction)succeed : NULL;
-}
+    const size_t count = sizeof entries / sizeof entries[0];
+    const PFN_vkVoidFunction found = find_entry(entries, count, name, of_device);
 
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
-{
-    const PFN_vkVoidFunction found = find(name);
-
-    return found ? found : below.instance_proc(handle, name);
-}
-
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
-{
-    const PFN_vkVoidFunction found = find(name);
-
-    return found ? found : below.device_proc(handle, name);
-}
-
-EXPORT CALL vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
-{
-    layer->loaderLayerInterfaceVersion = 2;
-    layer->pfnGetInstanceProcAddr = get_instance_proc;
-    layer->pfnGetDeviceProcAddr = get_device_proc;
-    layer->pfnGetPhysicalDeviceProcAddr = NULL;
-    return VK_SUCCESS;
+    return found || strncmp(name, "vkCmd", 5) != 0 ? found : (PFN_vkVoidFunction)succeed;
 }

@@ -2,14 +2,10 @@
 // and which buffers are of the host's memory, and objects to acquires of
 // buffers from CUDA that nothing has released. test_watched_device.py uses it.
 #define _GNU_SOURCE
-#include <stdbool.h>
+#include "../core/layer.h"
+
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-// clang-format off: the second one leaves out what the first one has
-#include <vulkan/vulkan.h>
-#include <vulkan/vk_layer.h>
-// clang-format on
 
 #define DEVICE_FUNCTIONS(FUNCTION) \
     FUNCTION(vkCreateImage) \
@@ -24,10 +20,6 @@
 
 // Of the first device, and good for all.
 static struct {
-    VkInstance instance;
-    PFN_vkGetInstanceProcAddr instance_proc;
-    PFN_vkGetDeviceProcAddr device_proc;
-    PFN_vkSubmitDebugUtilsMessageEXT message;
     PFN_vkSetDebugUtilsObjectNameEXT set_name;
 #define MEMBER(name) PFN_##name name;
     DEVICE_FUNCTIONS(MEMBER)
@@ -184,16 +176,6 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_buffer(VkDevice device, const VkBuf
     return result;
 }
 
-static void object(const char *text)
-{
-    below.message(below.instance, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-                  VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT,
-                  &(VkDebugUtilsMessengerCallbackDataEXT){
-                      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT,
-                      .pMessage = text,
-                  });
-}
-
 // Commands run in the order in which they are recorded.
 static void change_owner(const VkBufferMemoryBarrier *barrier)
 {
@@ -228,23 +210,11 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo
                                                       const VkAllocationCallbacks *callbacks,
                                                       VkInstance *created)
 {
-    VkLayerInstanceCreateInfo *link = (VkLayerInstanceCreateInfo *)info->pNext;
+    const VkResult result = begin_instance(info, callbacks, created);
 
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerInstanceCreateInfo *)link->pNext;
-    below.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    PFN_vkCreateInstance create =
-        (PFN_vkCreateInstance)below.instance_proc(VK_NULL_HANDLE, "vkCreateInstance");
-    const VkResult result = create(info, callbacks, created);
-    if (result == VK_SUCCESS) {
-        below.instance = *created;
-        below.message = (PFN_vkSubmitDebugUtilsMessageEXT)below.instance_proc(
-            *created, "vkSubmitDebugUtilsMessageEXT");
-        below.set_name = (PFN_vkSetDebugUtilsObjectNameEXT)below.instance_proc(
+    if (result == VK_SUCCESS)
+        below.set_name = (PFN_vkSetDebugUtilsObjectNameEXT)chain.instance_proc(
             *created, "vkSetDebugUtilsObjectNameEXT");
-    }
     return result;
 }
 
@@ -253,17 +223,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
                                                     const VkAllocationCallbacks *callbacks,
                                                     VkDevice *created)
 {
-    VkLayerDeviceCreateInfo *link = (VkLayerDeviceCreateInfo *)info->pNext;
-
-    while (link->sType != VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO
-           || link->function != VK_LAYER_LINK_INFO)
-        link = (VkLayerDeviceCreateInfo *)link->pNext;
-    below.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
-    PFN_vkCreateDevice create =
-        (PFN_vkCreateDevice)below.instance_proc(below.instance, "vkCreateDevice");
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    const VkResult result = create(physical, info, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)below.device_proc(*created, #name);
+    const VkResult result = begin_device(physical, info, callbacks, created);
+#define FETCH(name) below.name = (PFN_##name)chain.device_proc(*created, #name);
     if (result == VK_SUCCESS) {
         DEVICE_FUNCTIONS(FETCH)
     }
@@ -271,15 +232,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name);
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name);
-
-static const struct entry {
-    const char *name;
-    PFN_vkVoidFunction function;
-    bool of_device;
-} entries[] = {
-#define ENTRY(name, function, of_device) {#name, (PFN_vkVoidFunction)function, of_device}
+static const struct entry entries[] = {
     ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
     ENTRY(vkCreateInstance, create_instance, false),
     ENTRY(vkCreateDevice, create_device, false),
@@ -296,34 +249,7 @@ static const struct entry {
     ENTRY(vkCreateBuffer, create_buffer, true),
 };
 
-static PFN_vkVoidFunction find(const char *name, bool of_device)
+static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {
-    for (size_t i = 0; i < sizeof entries / sizeof entries[0]; ++i)
-        if (strcmp(entries[i].name, name) == 0 && (entries[i].of_device || !of_device))
-            return entries[i].function;
-    return NULL;
-}
-
-static PFN_vkVoidFunction get_instance_proc(VkInstance handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, false);
-
-    return found || !handle ? found : below.instance_proc(handle, name);
-}
-
-static PFN_vkVoidFunction get_device_proc(VkDevice handle, const char *name)
-{
-    PFN_vkVoidFunction found = find(name, true);
-
-    return found ? found : below.device_proc(handle, name);
-}
-
-VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
-vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface *layer)
-{
-    layer->loaderLayerInterfaceVersion = 2;
-    layer->pfnGetInstanceProcAddr = get_instance_proc;
-    layer->pfnGetDeviceProcAddr = get_device_proc;
-    layer->pfnGetPhysicalDeviceProcAddr = NULL;
-    return VK_SUCCESS;
+    return find_entry(entries, sizeof entries / sizeof entries[0], name, of_device);
 }

@@ -302,43 +302,6 @@ class TestViewer:
         answer, _ = viewer.answer({"kind": "open", "name": "a.png"}, [photo])
         assert settings_from(answer["sides"]["a"]) == presets["photo"]
 
-    def test_a_mask_and_an_emission_are_opened(
-        self, viewer: Viewer, renderer: Renderer, tmp_path: Path
-    ) -> None:
-        random = np.random.default_rng(2)
-        pixels = random.integers(0, 256, (21, 34, 3), dtype=np.uint8)
-        file = vkbloom.write(tmp_path / "a.png", pixels).read_bytes()
-        glow = vkbloom.write(tmp_path / "glow.exr", random.random((21, 34, 4), np.float32))
-        levels = np.repeat(pixels[..., :1], 3, axis=2)
-        mask = vkbloom.write(tmp_path / "mask.png", levels).read_bytes()
-
-        def opened(kind: str, name: str = "", *files: bytes) -> dict[str, Any]:
-            answer, _ = viewer.answer({"kind": "open", "as": kind, "name": name}, files)
-            return answer
-
-        assert "the source is a scene" in opened("mask", "mask.png", mask)["error"]
-        assert opened("image", "a.png", file)["glows"] == {}
-        image = vkbloom.read(tmp_path / "a.png", expand=4)
-        given: dict[str, Any] = {"mask": levels[..., 0]}
-        assert opened("mask", "mask.png", mask)["glows"] == {"mask": "mask.png"}
-        for _ in range(2):
-            frame(viewer, Pyramid())
-            expected = renderer.apply(image, Pyramid(), framebuffers="final", **given)["final"]
-            assert np.array_equal(viewer.frames["a"]["final"], expected)
-            # Of another dtype, with an alpha.
-            answer = opened("emission", "glow.exr", glow.read_bytes())
-            assert answer["glows"] == {"mask": "mask.png", "emission": "glow.exr"}
-            given["emission"] = vkbloom.read(glow)[..., :3]
-        assert "a.png: a mask must be grey" in opened("mask", "a.png", file)["error"]
-        small = vkbloom.write(tmp_path / "small.png", pixels[:8, :8]).read_bytes()
-        assert "is not the image's" in opened("emission", "small.png", small)["error"]
-        assert opened("mask")["glows"] == {"emission": "glow.exr"}
-        frame(viewer, Pyramid())
-        del given["mask"]
-        expected = renderer.apply(image, Pyramid(), framebuffers="final", **given)["final"]
-        assert np.array_equal(viewer.frames["a"]["final"], expected)
-        assert opened("image", "a.png", file)["glows"] == {}
-
     def test_file_that_is_not_an_image_is_an_error(self, viewer: Viewer) -> None:
         for name in ("words.png", "no extension", "../../x.exr", "a." + "x" * 300):
             answer, _ = viewer.answer({"kind": "open", "name": name}, [b"words"])

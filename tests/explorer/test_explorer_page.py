@@ -524,13 +524,6 @@ def test_files(page: Page, tmp_path: Path) -> None:
     wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"]')
     page.locator(".vkb-status", has_text="highlights expanded up to 4").wait_for()
     assert page.get_by_label("shading").count() == 0
-    black = vkbloom.write(tmp_path / "mask.png", np.zeros((30, 50, 3), np.uint8))
-    with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Open mask").click()
-    chooser.value.set_files(black)
-    page.get_by_role("button", name="Remove mask").click()
-    page.get_by_role("button", name="Open mask").wait_for()
-    page.get_by_role("button", name="Open emission").wait_for()
     field(page, "bloom").uncheck()
     wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"].replace(bloom=False)')
     with page.expect_download() as download:

@@ -25,7 +25,6 @@ from tests.grid.stores import contents
 from tests.images import noise
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf
 from vkbloom._grid.filling import Filler
-from vkbloom._grid.identity import differences
 from vkbloom._grid.store import GridStore
 
 xr = pytest.importorskip("xarray")
@@ -77,7 +76,7 @@ def make(store: Any, **changes: Any) -> Any:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     store = tmp_path_factory.mktemp("grid") / "whole.zarr"
-    make(store, validation=True)
+    make(store)
     return store
 
 
@@ -168,11 +167,9 @@ class TestWhole:
     def test_fields_that_are_objects_are_axes(
         self, tmp_path: Path, settings: Any, axis: str, values: Any
     ) -> None:
-        validated: dict[str, Any] = {"validation": True}
         store = tmp_path / "a.zarr"
-        stored = vkbloom.grid(source(), settings, {axis: values}, store=store, **validated)
-        # The same one, which is kept.
-        renderer = vkbloom.Renderer("auto", **validated)
+        stored = vkbloom.grid(source(), settings, {axis: values}, store=store)
+        renderer = vkbloom.default_renderer()
         for place, value in enumerate(values):
             expected = renderer.apply(source(), settings.replace(**{axis: value}))["final"]
             np.testing.assert_array_equal(stored["final"][place], expected)
@@ -180,10 +177,10 @@ class TestWhole:
             source(), settings, {axis: values}, progress=False, renderer=renderer
         )
         assert list(in_memory[axis].values) == list(stored[axis].values)
-        again = vkbloom.grid(source(), settings, {axis: values}, store=store, **validated)
+        again = vkbloom.grid(source(), settings, {axis: values}, store=store)
         assert again.attrs["passes_run"] == 0
         with pytest.raises(ValueError, match=rf"axes\.{axis}"):
-            vkbloom.grid(source(), settings, {axis: values[:1]}, store=store, **validated)
+            vkbloom.grid(source(), settings, {axis: values[:1]}, store=store)
 
     def test_masks_and_emissions_belong_to_the_source(
         self, tmp_path: Path, renderer: Renderer
@@ -323,11 +320,6 @@ class TestResumed:
             make(copy, resume=False)
         assert contents(copy) == before
 
-    def test_verify_false_trusts_the_marks(self, copy: Path) -> None:
-        (copy / "mean" / "c.0.0.0").write_bytes(b"")
-        make(copy, verify=False)
-        assert (copy / "mean" / "c.0.0.0").read_bytes() == b""
-
     def test_default_chunks_are_those_of_the_store(self, copy: Path, undisturbed: Path) -> None:
         make(copy, chunks=None)
         assert contents(copy) == contents(undisturbed)
@@ -374,10 +366,6 @@ class TestRefused:
         for call in (make, check_grid):
             with pytest.raises(ValueError, match="its format version 99 is not 3"):
                 call(copy)
-        identity_changed(copy, format="x" * 100_000)
-        for call in (make, check_grid):
-            with pytest.raises(ValueError, match=r'its format version "x+ \.\.\. x+" is not 3'):
-                call(copy)
 
     def test_something_else(self, tmp_path: Path) -> None:
         (tmp_path / "a").mkdir()
@@ -419,11 +407,8 @@ DAMAGES: list[tuple[str, Callable[[bytes], bytes] | None, str]] = [
     ("channel/c.0", lambda _: of_zeros(100_000), r" is damaged \(.*"),
     ("mean/c.0.1.1", None, f" is missing, of {NAMED}"),
     ("bloom/zarr.json", None, " is missing, of all points"),
-    ("final/zarr.json", lambda content: content[:100], " is damaged, of all points"),
+    ("final/zarr.json", lambda content: content[:100], r" is damaged \(.*, of all points"),
     ("final/zarr.json", lambda _: NESTED, " is damaged.*"),
-    ("zarr.json", None, " is missing, which describes the grid"),
-    ("zarr.json", lambda _: b'{"attr', " is damaged, which describes the grid"),
-    ("zarr.json", lambda _: NESTED, " is damaged.*"),
     ("done/c.0.1.1", lambda _: b"x", f" is damaged .*, of {NAMED}"),
     ("exposure/c.0", None, " is missing, of all points"),
 ]
@@ -518,27 +503,6 @@ class TestHostile:
                 call(copy)
         assert contents(copy) == before
 
-    @pytest.mark.parametrize(
-        "chunk",
-        [[0, 1, 1], [-1, 1, 1], [10**9, 10**9, 10**9], [1.0, 1, 1], [True, 1, 1], "abc", 3, [[]]],
-        ids=str,
-    )
-    def test_wrong_chunk_in_the_identity_is_refused(self, copy: Path, chunk: Any) -> None:
-        identity_changed(copy, chunk=chunk)
-        before = contents(copy)
-        assert "which describes the grid" in check_grid(copy).problems[0]
-        with pytest.raises(ValueError, match="contains another grid; chunk: "):
-            make(copy, chunks=None)
-        assert contents(copy) == before
-
-    def test_chunk_of_other_arrays_is_refused(self, copy: Path) -> None:
-        # ImportedArray over, all that is there would be rendered again.
-        identity_changed(copy, chunk=[1, 1, 1])
-        before = contents(copy)
-        with pytest.raises(ValueError, match=r"contains another grid, and its zarr.json is"):
-            make(copy, chunks=None)
-        assert contents(copy) == before
-
     @pytest.mark.parametrize("identity", [3, [], "x", None], ids=str)
     @pytest.mark.parametrize("place", ["vkbloom_grid", "attributes"])
     def test_identity_of_a_wrong_type_is_refused(
@@ -553,77 +517,6 @@ class TestHostile:
             with pytest.raises(ValueError, match="its content is not a grid"):
                 call(copy)
         assert contents(copy) == before
-
-    @pytest.mark.parametrize(
-        "change",
-        [
-            {"axes": {}},
-            {"axes": {**AXES, "exposure": 3}},
-            {"order of axes": ["../../a", "b", "c"]},
-            {"order of axes": 3},
-            {"variables": {"../final": {"shape": [], "dtype": "float32"}}},
-            {"variables": {"final": {"shape": [10**30], "dtype": "float32"}}},
-            {"variables": {"final": {"shape": [1.5], "dtype": "float32"}}},
-            {"variables": {"final": {"shape": [], "dtype": "object"}}},
-            {"variables": {"final": 3}},
-            {"variables": []},
-        ],
-        ids=str,
-    )
-    def test_damaged_identity_is_reported_and_refused(
-        self, copy: Path, change: dict[str, Any]
-    ) -> None:
-        identity_changed(copy, **change)
-        before = contents(copy)
-        report = check_grid(copy)
-        assert (report.points, report.done, report.complete) == (0, 0, False)
-        assert report.problems == ("zarr.json is damaged, which describes the grid",)
-        with pytest.raises(ValueError, match="contains another grid"):
-            make(copy)
-        assert contents(copy) == before
-
-    def test_deeply_nested_values_are_named_in_differences(self) -> None:
-        deep: list[Any] = []
-        for _ in range(100_000):
-            deep = [deep]
-        message = ["a: nested lists in the store, 1 requested"]
-        assert differences({"a": deep}, {"a": 1}) == message
-
-    @pytest.mark.parametrize(
-        ("change", "name"),
-        by_turns(
-            [
-                {"shape": [10**9]},
-                {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [10**9]}}},
-                {"codecs": [{"name": "bytes"}]},
-                {"data_type": "int8"},
-                {"zarr_format": 3.0},
-                {"attributes": 3},
-                {"attributes": {"grid": {}}},
-                {"attributes": {"grid": [[]]}},
-                {"dimension_names": [3]},
-            ],
-            turns=["final", "done", "channel"],
-        ),
-        ids=str,
-    )
-    def test_changed_array_metadata_are_reported_and_mended(
-        self, copy: Path, undisturbed: Path, name: str, change: dict[str, Any]
-    ) -> None:
-        rewritten(copy / name / "zarr.json", lambda metadata: metadata.update(change))
-        tracemalloc.start()
-        try:
-            report = check_grid(copy)
-            make(copy)
-            _, most = tracemalloc.get_traced_memory()
-        finally:
-            tracemalloc.stop()
-        # Names and attributes decide nothing of what is read.
-        is_harmless = set(change) <= {"attributes", "dimension_names"}
-        assert report.complete is not bool(report.problems)
-        assert is_harmless or f"{name}/zarr.json is damaged, of all points" in report.problems
-        assert most < 64 << 20
-        assert contents(copy) == contents(undisturbed)
 
 
 class _Full(zarr.storage.LocalStore):  # type: ignore[misc, name-defined]

@@ -199,6 +199,8 @@ OTHERS: dict[str, Settings] = {
     "godot-linear": GodotBloom(bicubic=False, level_weights=(0.5,) * 7, format="rgba32float"),
     "blender-maximum": BlenderGlare(maximum=4.0),
     "blender-half": BlenderGlare(bloom_scale=0.5, maximum=3.0, format="rgba32float"),
+    # Of the sizes of the matrix, 97 has columns that Blender 5.2 reads beside their place.
+    "blender-5.2": BlenderGlare(type="streaks", version="5.2", threshold=0.3),
     "pygfx-karis": PygfxBloom(karis_average=True, bloom_scale=0.7),
     "pygfx-narrow": PygfxBloom(filter_radius=0.0, levels=4, format="rgba32float"),
     "pygfx-wide": PygfxBloom(filter_radius=0.2, levels=4, format="rgba32float"),

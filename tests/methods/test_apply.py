@@ -176,7 +176,12 @@ def assert_composite_without_bloom(renderer: Renderer, image: Image, settings: S
     largest = float(np.finfo(image.dtype).max)
     # The reference has no end in float32; the device's numbers do.
     expected = np.clip(reference.composite(image, None, settings), -largest, largest)
-    assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
+    limit = tolerance(image.dtype, expected)
+    if settings.encoding in ("gamma22", "pq"):
+        # Vulkan derives pow(x, y) from exp2(y log2(x)), whose logarithm of 0 need not be infinite:
+        # of a black picture, SwiftShader makes 4e-18 and, with PQ, 2e-10 too much.
+        limit = np.maximum(limit, 1e-9)
+    assert_close("final", frames["final"], expected, limit)
 
 
 @pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=["float16", "float32"]))

@@ -103,7 +103,7 @@ def test_lines_of_many_invocations(gpu: Renderer, boundary: Any) -> None:
 
 def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
     """They run stage by stage, which needs more images."""
-    image = np.zeros((1, 16000, 3), np.float32)
+    image = np.zeros((1, 8000, 3), np.float32)
     passes = gpu.plan(image, Convolution(kernel_of(3, 1))).passes
     assert "lines" not in [each.variant for each in passes]
 

@@ -67,6 +67,7 @@ def test_all_types_and_qualities_are_there() -> None:
     settings = [read(name).settings for name in CASES]
     found = {(one.type, one.quality) for one in settings if isinstance(one, BlenderGlare)}
     assert len(found) == 21
+    assert sum(name.startswith("blender-5.2") for name in CASES) == 16
     assert sum(name.startswith("pygfx") for name in CASES) == 8
 
 

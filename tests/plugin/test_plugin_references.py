@@ -1,4 +1,4 @@
-"""References of the pytest plugin: written, compared, unused."""
+"""References of the pytest plugin: written and compared."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shutil
 import OpenImageIO as oiio
 import pytest
 
-from tests.plugin.projects import ONE, PROJECT, edit, references, run, run_workers, write
+from tests.plugin.projects import ONE, PROJECT, edit, references, run, write
 from vkbloom.testing._references import cpu_vendor
 from vkbloom.testing._regression import name_of_test
 
@@ -237,46 +237,6 @@ def test_second_needs_a_name(frame_regression):
         assert all(len(name) <= 100 for name in names)
 
 
-class TestUnused:
-    TWO = PROJECT + (
-        "def test_frames(frame_regression): frame_regression.check(frames())\n"
-        "def test_other(frame_regression):\n"
-        "    if not os.environ.get('IDLE'): frame_regression.check(frames(), 'other')\n"
-    )
-    LINE = "unused: bloom_references/test_one/other.json"
-
-    @pytest.fixture(autouse=True)
-    def idle(self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-        write(project, self.TWO)
-        run(project, "--bloom-update").assert_outcomes(passed=2)
-        monkeypatch.setenv("IDLE", "1")
-
-    def test_is_listed(self, project: pytest.Pytester) -> None:
-        run(project).stdout.fnmatch_lines([self.LINE])
-
-    def test_is_listed_of_workers(self, project: pytest.Pytester) -> None:
-        result = run_workers(project)
-        result.assert_outcomes(passed=2)
-        result.stdout.fnmatch_lines([self.LINE])
-
-    @pytest.mark.parametrize("arguments", [("-k", "other"), ("test_one.py::test_other",)])
-    def test_not_where_tests_were_left_out(
-        self, project: pytest.Pytester, arguments: tuple[str, ...]
-    ) -> None:
-        run(project, *arguments).stdout.no_fnmatch_line("unused:*")
-
-    def test_not_where_a_test_failed_before(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setenv("SHIFT", "0.5")
-        run(project).stdout.no_fnmatch_line("unused:*")
-
-    def test_a_module_that_is_gone(self, project: pytest.Pytester) -> None:
-        folder = project.path / "bloom_references"
-        shutil.copytree(folder / "test_one", folder / "test_gone")
-        run(project).stdout.fnmatch_lines(["unused: bloom_references/test_gone"])
-
-
 class TestChecks:
     """What is compared, in which order."""
 
@@ -390,15 +350,6 @@ def test_more(frame_regression):
         result.assert_outcomes(passed=1, failed=2)
         result.stdout.fnmatch_lines(["*  bloom: FAILED (shape and dtype): it is missing"])
         result.stdout.fnmatch_lines(["*  extra: FAILED (shape and dtype): the reference does not*"])
-
-    def test_warns(self, project: pytest.Pytester) -> None:
-        write(project, self.text([("image + np.float16(0.01)", "atol=0.02, warn=0.005")]))
-        run(project, "--bloom-update", "-k", "right")
-        # Else the outer run's filter makes an error of it. The other warning is about the process.
-        filters = ("-W", "default", "-W", "ignore::pytest.PytestAssertRewriteWarning")
-        result = run(project, "-k", "changed", *filters)
-        result.assert_outcomes(passed=1, deselected=1, warnings=1)
-        result.stdout.fnmatch_lines(["*FrameDifferenceWarning: one-0: image: largest difference*"])
 
     def test_compares_what_a_test_has_made(self, project: pytest.Pytester) -> None:
         write(

@@ -317,7 +317,7 @@ def test_the_kernel_of_a_thin_frame_has_no_hidden_rows() -> None:
 
 def test_a_pattern_is_computed_as_far_as_it_is_wanted() -> None:
     pattern = psf.aperture(psf.iris(size=64), f_number=64)
-    whole = pattern.own_array()
+    whole = pattern.native_array()
     middle = len(whole) // 2
     part = whole[middle - 20 : middle + 21, middle - 4 : middle + 4]
     np.testing.assert_allclose(pattern.array((8, 41)), part, atol=1e-14)

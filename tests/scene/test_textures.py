@@ -13,12 +13,11 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.refusals import assert_refused, rows
-from tests.scene.deferred_frames import rgb
-from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
+from tests.screens import CAMERA, NOTHING, SQUARE, panel, rgb, screen
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
 from vkbloom._renderer.requests import new_arrays
 from vkbloom._scene import Mesh
-from vkbloom._scene.textures import WHITE, Surface, Texture, mip_levels
+from vkbloom._scene.textures import WHITE, Texture, mip_levels
 
 Array = NDArray[Any]
 
@@ -423,9 +422,6 @@ RAW_WHITE = (WHITE.levels, 0, 0, 1, 1, 1)
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "textures"))
 def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> None:
     names = {
-        "Surface": Surface,
-        "made": lambda **changes: Texture(**{"levels": (GOOD,), **changes}),
-        "remade": lambda **changes: dataclasses.replace(panel((4, 4)), **changes),
         "draw": lambda mesh, texture: draw_raw(renderer, 2**60, mesh, (texture,)),
     }
     assert_refused(call, error, globals() | names)

@@ -161,37 +161,14 @@ class TestHtml:
         assert "color-scheme:light dark" in page
         assert set(re.findall(r"[^-]color:([^;\"]+)", page)) == {"inherit"}
 
-    def test_pass_times_are_bars(self, frames: Frames) -> None:
+    def test_pass_times(self, frames: Frames) -> None:
         page = frames._repr_html_()
-        assert re.findall(r'<div style="width:([\d.]+)%;', page) == ["25.0", "100.0", "50.0"]
         assert re.findall(r"([\d.]+) ms", page) == ["1.000", "4.000", "2.000"]
 
     @pytest.mark.parametrize("timings", [{}, {"glow": 0.0}, {"glow": float("nan")}])
     def test_pass_times_that_tell_nothing(self, timings: dict[str, float]) -> None:
         page = make({"final": noise(1, 1, 3, dtype="uint8")}, timings=timings)._repr_html_()
-        assert ("Time of each pass" in page) == bool(timings)
-        assert "nan%" not in page
-
-    def test_bright_floats_are_shown_with_less_exposure(self, tmp_path: Path) -> None:
-        # Of 100 pixels one is at 1000, which is left out as the brightest in a hundred; of the
-        # others all are 3: log2(3) rounded up to half stops is 2, and 3 / 4 is shown as 225.
-        image = np.full((10, 10, 4), 3, np.float16)
-        image[5, 5] = 1000
-        frames = make({"bloom": image, "scene": image / 3, "normal": image})
-        page = frames._repr_html_()
-        captions = re.findall(r"<span[^>]*>([^<]*)</span>", page)
-        assert captions == [
-            "10 x 10, float16, 3 to 1000, shown at -2 stops",
-            "10 x 10, float16, 1 to 333.2",
-            "10 x 10, float16, 3 to 1000",
-        ]
-        shown = self.pictures(page, tmp_path)
-        assert [picture[0, 0, 0] for picture in shown] == [225, 255, 255]
-        assert shown[0][5, 5, 0] == 255
-        # What has passed a curve is shown as it is.
-        mapped = make({"final": image}, settings=Separable(encoding="srgb"))
-        assert "stops" not in mapped._repr_html_()
-        assert "stops" in make({"final": image})._repr_html_()
+        assert ("time on" in page) == bool(timings)
 
     def test_ranges_of_what_is_not_finite(self) -> None:
         image = np.full((2, 2, 3), np.nan, np.float32)

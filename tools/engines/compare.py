@@ -25,7 +25,11 @@ from vkbloom import reference
 FOLDER = Path(__file__).parent
 PAGE = Path("docs/evidence/engines.md")
 KEPT = Path("tests/methods/engine_frames.npz")
-TABLES = {"blender": cases.of_blender, "pygfx": cases.of_pygfx}
+TABLES = {
+    "blender": cases.of_blender,
+    "blender-5.2": cases.of_blender_5_2,
+    "pygfx": cases.of_pygfx,
+}
 #: Over the largest value of the engine's frame.
 LIMIT = 1e-3
 #: Of 8-bit frames the largest difference in levels of sRGB: lavapipe's conversions are off by one.
@@ -149,11 +153,11 @@ def keep(name: str, table: list[Any], arrays: Mapping[str, Any]) -> dict[str, An
     """Return the arrays of the cases that the tests compare, and their parameters."""
     found = {}
     for number, (picture, fields) in enumerate(table):
-        if picture not in cases.KEPT:
+        if not cases.is_kept(name, picture, fields):
             continue
         found[f"{name}/{number}/fields"] = np.array(json.dumps(fields))
         found[f"{name}/{number}/image"] = arrays.get(f"{number}/glow", cases.image(picture))
-        if name == "blender":
+        if name != "pygfx":
             found[f"{name}/{number}/image"] = cases.image(picture)
             if "kernel" in fields:
                 found[f"{name}/{number}/kernel"] = cases.kernel(*fields["kernel"])
@@ -182,7 +186,7 @@ def main() -> None:
             print(f"{versions[name]}: {len(table)} cases in {arrays['seconds']:.1f} s")
         adapter = f"{renderer.info.name}, {renderer.info.driver_info}"
     for row in rows:
-        print(f"{row.engine:<8} {row.what:<24} {row.of_reference:.1e} {row.of_device:.1e}")
+        print(f"{row.engine:<12} {row.what:<24} {row.of_reference:.1e} {row.of_device:.1e}")
     replace_in_page("table", table_of(rows, versions, adapter))
     if arguments.keep:
         np.savez_compressed(KEPT, **kept)

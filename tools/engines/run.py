@@ -15,7 +15,11 @@ from pathlib import Path
 import numpy as np
 from cases import image, kernel
 
-ENGINES = {"blender": ("blender", "Blender"), "pygfx": ("pygfx_bloom", "Pygfx")}
+ENGINES = {
+    "blender": ("blender", "Blender"),
+    "blender-5.2": ("blender", "Blender"),
+    "pygfx": ("pygfx_bloom", "Pygfx"),
+}
 
 
 def main() -> None:

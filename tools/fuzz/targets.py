@@ -17,9 +17,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import folders
 import numpy as np
 import OpenImageIO
-import stores
 
 import vkbloom
 from vkbloom._io import disk_cache
@@ -240,13 +240,8 @@ def _own_seeds() -> list[bytes]:
 
 
 @functools.cache
-def _stores() -> stores.Stores:
-    return stores.Stores(FOLDER)
-
-
-@functools.cache
-def _folders() -> stores.Folders:
-    return stores.Folders(FOLDER)
+def _folders() -> folders.Folders:
+    return folders.Folders(FOLDER)
 
 
 TARGETS = {
@@ -256,7 +251,6 @@ TARGETS = {
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
     "pipelines": Target(_pipelines, _pipeline_seeds),
     "own": Target(_own, _own_seeds),
-    "zarr": Target(lambda data: _stores().run(data), lambda: _stores().seeds()),
     "images": Target(lambda data: _folders().run(data), lambda: _folders().seeds()),
 }
 

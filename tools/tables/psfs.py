@@ -67,7 +67,7 @@ def of_presets(_: vkbloom.Renderer, quick: bool) -> str:
         size = (64, 64) if quick else PRESET_SIZE
         # Bevy's prefilter makes 0.0001 of black.
         black = vkbloom.reference.blur(np.zeros((*size, 3)), linear, format="rgba32float")
-        spread = psf.measured(linear, size).own_array() - black
+        spread = psf.measured(linear, size).native_array() - black
         # KinoBloom removes a single pixel as a firefly.
         if spread.max() > 0:
             one = psf.samples(spread)

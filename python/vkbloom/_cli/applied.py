@@ -20,15 +20,14 @@ import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.glow_options import accompanying, uploaded
-from vkbloom._cli.image_files import FileOptions, finished, read_picture
+from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import detail, hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
-from vkbloom._io.images import Picture
+from vkbloom._io.displayed import Saved
+from vkbloom._io.images import Colour, Picture, SavedColour
 from vkbloom._renderer.frame_files import settings_facts
-
-__all__ = ["Begun", "Options", "Pair", "Run", "of_format"]
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
@@ -44,15 +43,32 @@ _OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options(FileOptions):
+class Options:
     """The options of the command by their names."""
 
+    subimage: int
+    layer: str | None
+    input_colour: Colour | None
+    raw: bool
+    mask: str | None
+    emission: str | None
+    half: bool | None
+    output_colour: SavedColour | None
+    primaries: str
+    view: str | None
+    bits: int | None
+    quality: int | None
     pipe_format: str
     framebuffers: str
     overwrite: bool
     skip_existing: bool
     expand: float | None
     settings: Callable[[str], Begun]
+
+    @property
+    def saved(self) -> Saved:
+        """What the colours of a written file are to be."""
+        return Saved(self.output_colour, self.primaries, self.view)
 
     @property
     def names(self) -> str | list[str]:
@@ -194,11 +210,6 @@ class Run:
             is_blended=is_blended,
         )
 
-    def _make_folder(self, target: str) -> None:
-        """Make the folder of one of several files."""
-        if target != self._out:
-            Path(target).parent.mkdir(exist_ok=True)
-
     def _write(
         self,
         pair: Pair,
@@ -209,8 +220,9 @@ class Run:
     ) -> None:
         target = pair[1]
         with self._of_file(pair):
-            self._make_folder(target)
             file = Path(target)
+            if target != self._out:
+                file.parent.mkdir(exist_ok=True)
             if is_stream(target):
                 suffix = Path(of_format(target, self._options.pipe_format)).suffix
                 file = self._folder / f"output{suffix}"

@@ -50,17 +50,12 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     help="Quality of JPEG, WebP and JPEG XL [default 98 for JPEG]",
 )
 @click.option(
-    "--pipe-format",
-    metavar="EXTENSION",
-    default="png",
-    show_default=True,
-    help="Format of standard output.",
+    "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
 )
 @click.option(
     "--framebuffers",
     metavar="all|NAME,...",
     default="final",
-    show_default=True,
     help="The framebuffers to write. final is written to OUT; each other framebuffer is written "
     "beside it, as OUT's name with _NAME appended, its values not converted. A framebuffer that "
     "OUT's format cannot hold is written as .exr.",
@@ -76,7 +71,6 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "--primaries",
     type=click.Choice([*PRIMARIES]),
     default="rec709",
-    show_default=True,
     help="Primaries of the colours in OUT, which PNG and OpenEXR can name.",
 )
 @click.option(

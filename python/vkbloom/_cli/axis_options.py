@@ -25,15 +25,15 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     begun = [settings]
     for word in words:
         if word.startswith("preset="):
-            begun = [vkbloom.presets[one] for one in _values(word, _PRESETS, _MAX_VALUES)]
-    found: dict[str, Sequence[Any]] = {}
+            begun = [vkbloom.presets[value] for value in _values(word, _PRESETS, _MAX_VALUES)]
+    results: dict[str, Sequence[Any]] = {}
     for word in words:
         name = word.partition("=")[0].strip().replace("-", "_")
-        if name in found:
+        if name in results:
             raise click.UsageError(f"--axis: {name} is given twice; list all values in one")
-        room = _MAX_VALUES - sum(map(len, found.values()))
-        found[name] = _values(word, _type_of(name, begun), room)
-    return found
+        room = _MAX_VALUES - sum(map(len, results.values()))
+        results[name] = _values(word, _type_of(name, begun), room)
+    return results
 
 
 def _type_of(name: str, begun: Sequence[vkbloom.Settings]) -> Any:
@@ -70,4 +70,6 @@ def _range(parts: Sequence[str], room: int) -> list[float]:
         raise ValueError(f"{parts[3]!r} is not log")
     if parts[3:] and not (first > 0 and last > 0):
         raise ValueError("FIRST and LAST are not both above 0, as :log needs")
-    return [float(one) for one in (np.geomspace if parts[3:] else np.linspace)(first, last, count)]
+    return [
+        float(item) for item in (np.geomspace if parts[3:] else np.linspace)(first, last, count)
+    ]

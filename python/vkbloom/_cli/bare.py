@@ -25,9 +25,9 @@ def run(words: Sequence[str], missing: Sequence[str]) -> int:
         print(f"vkbloom {vkbloom.__version__}")
         return 0
     if first == "doctor" and (as_json or not options):
-        found = examined()
-        print(json.dumps(found, indent=2) if as_json else "\n".join(lines_of(found)))
-        return int(not found["can_render"])
+        report = examined()
+        print(json.dumps(report, indent=2) if as_json else "\n".join(lines_of(report)))
+        return int(not report["can_render"])
     if first == "adapters" and (as_json or not options):
         return list_adapters(as_json=as_json)
     print(f"vkbloom: the command line needs {' and '.join(missing)}; {INSTALL}", file=sys.stderr)
@@ -57,14 +57,14 @@ def examined() -> dict[str, Any]:
 
 
 def lines_of(
-    found: Mapping[str, Any], styled: Callable[[str, str], str] = lambda text, status: text
+    report: Mapping[str, Any], styled: Callable[[str, str], str] = lambda text, status: text
 ) -> Iterator[str]:
     """Yield the findings as lines; `styled` colours a text by a status."""
-    for finding in found["findings"]:
+    for finding in report["findings"]:
         status = styled(f"{finding['status']:9}", finding["status"])
         yield f"{status}{finding['topic']:30}  {finding['found']}"
         if finding["advice"]:
             yield f"{'':41}-> {finding['advice']}"
-    able = "can render" if found["can_render"] else "cannot render"
-    problems = sum(finding["status"] == "problem" for finding in found["findings"])
+    able = "can render" if report["can_render"] else "cannot render"
+    problems = sum(finding["status"] == "problem" for finding in report["findings"])
     yield f"\nThis machine {able}. Problems found: {problems}."

@@ -8,7 +8,7 @@ import os
 import runpy
 import shlex
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,14 +24,15 @@ from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import detail_device, is_quiet, note, say
-from vkbloom._custom.method import CustomMethod, own_name
+from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._suggestions import did_you_mean
 from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing import _showing as showing
-from vkbloom.testing._law_table import law_name
+from vkbloom.testing._law_report import law_report
+from vkbloom.testing._law_table import LAWS, law_name
 from vkbloom.testing._programs import Program
 
 
@@ -42,16 +43,16 @@ class CheckCommand(Command):
         """Load the file before the options are parsed, so that its parameters are options."""
         taking = {
             name
-            for one in self.get_params(ctx)
-            if isinstance(one, click.Option) and not one.is_flag
-            for name in one.opts
+            for param in self.get_params(ctx)
+            if isinstance(param, click.Option) and not param.is_flag
+            for name in param.opts
         }
         words = list(args)
-        for place, word in enumerate(words):
-            if word.startswith("-") or (place and words[place - 1] in taking):
+        for index, word in enumerate(words):
+            if word.startswith("-") or (index and words[index - 1] in taking):
                 continue
             if os.path.isfile(word):
-                words[place : place + 1] = ["--method", vkbloom.load_method(word).method]
+                words[index : index + 1] = ["--method", vkbloom.load_method(word).method]
                 break
         return super().parse_args(ctx, words)
 
@@ -71,14 +72,11 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     metavar="'PROGRAM {input} {output}'",
     help="Measure a program, which reads one image file and writes another.",
 )
-@click.option(
-    "--suffix", default=".exr", show_default=True, help="The type of the program's image files."
-)
+@click.option("--suffix", default=".exr", help="The type of the program's image files.")
 @click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     default=60.0,
-    show_default=True,
     help="Seconds that one run of the program may take.",
 )
 @click.option(
@@ -103,10 +101,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     "measured",
     type=SIZE,
     default="256x256",
-    show_default=True,
     help="Size of the test images; a wide bloom needs a large one.",
 )
-@click.option("--size", type=SIZE, default="1280x720", show_default=True, help="Size of the times.")
+@click.option("--size", type=SIZE, default="1280x720", help="Size of the times.")
 @click.option(
     "--require",
     metavar="LAW,...",
@@ -130,14 +127,12 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     "--fps",
     type=click.FloatRange(0, min_open=True),
     default=60.0,
-    show_default=True,
     help="Frames a second of --sequence.",
 )
 @click.option(
     "--degrees",
     type=click.FloatRange(0, 360, min_open=True),
     default=40.0,
-    show_default=True,
     help="Width of the picture of --sequence in the field of view.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
@@ -153,24 +148,16 @@ def command(
     *,
     file: str | None,
     program: str | None,
-    suffix: str,
-    timeout: float,
-    less_input: bool,
     reference: str | None,
-    gain: float | None,
-    measured: tuple[int, int],
-    size: tuple[int, int],
-    require: tuple[str, ...],
     against: str | None,
     sequence: str | None,
-    fps: float,
-    degrees: float,
     as_json: bool,
     page: str | None,
     markdown: str | None,
     adapter: str,
     validation: bool,
     settings: vkbloom.Settings,
+    **how: Any,
 ) -> int:
     """Measure what a bloom is worth.
 
@@ -186,9 +173,8 @@ def command(
     if sequence is not None:
         if file or program or against or given("preset") or given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
-        return judge(sequence, fps, degrees, as_json=as_json)
+        return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
     _check_choice(file, program, reference, against, page)
-    options = _Options(suffix, timeout, less_input, gain, measured, size, require)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
         detail_device(renderer)
@@ -200,78 +186,69 @@ def command(
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
             )
-        found = [_measured(renderer, *source, options, bar) for source in sources.items()]
-        # Some figures are rendered when they are read.
-        values = [showing.as_values(one) for one in found]
+        measured = [_measured(renderer, *source, how, bar) for source in sources.items()]
+        blooms, values = zip(*measured, strict=True)
         if page is not None:
-            safe_writing.write_file(Path(page), showing.as_page(found[0]).encode())
+            safe_writing.write_file(Path(page), showing.as_page(blooms[0]).encode())
             say(f"wrote {page}", err=as_json)
     if against is None:
-        failed = [row.name for row in showing.broken(found[0].report)]
-        text, table, written = showing.as_text(found[0]), showing.as_markdown(found[0]), values[0]
+        failed = [row.name for row in showing.broken(blooms[0].report)]
+        text, table, written = showing.as_text(blooms[0]), showing.as_markdown(blooms[0]), values[0]
     else:
         changes = comparing.changes(values[1], values[0])
-        failed, names = comparing.newly_broken(changes, require), (found[1].name, found[0].name)
+        failed = comparing.newly_broken(changes, how["require"])
+        names = (blooms[1].name, blooms[0].name)
         text = comparing.as_text(changes, names)
-        table = comparing.as_markdown(changes, names, found[0].device)
+        table = comparing.as_markdown(changes, names, blooms[0].device)
         written = comparing.as_values(changes, values[1], values[0], failed)
     click.echo(json.dumps(written, indent=2) if as_json else text)
     if markdown is not None:
         safe_writing.write_file(Path(markdown), table.encode())
         say(f"wrote {markdown}", err=as_json)
-    held = {row.name: row.words for row in found[0].report.rows}
+    held = {row.name: row.words for row in blooms[0].report.rows}
     for name in failed:
         note(
-            f"{found[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
+            f"{blooms[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
         )
     return int(bool(failed))
-
-
-@dataclasses.dataclass(frozen=True)
-class _Options:
-    """How blooms are measured, as the options of the command say."""
-
-    suffix: str
-    timeout: float
-    less_input: bool
-    gain: float | None
-    measured: tuple[int, int]
-    size: tuple[int, int]
-    require: tuple[str, ...]
 
 
 def _measured(
     renderer: vkbloom.Renderer,
     name: str,
     source: str | vkbloom.Settings,
-    options: _Options,
+    how: Mapping[str, Any],
     bar: Status,
-) -> measuring.Measured:
-    """Measure the bloom of settings, or of a command."""
+) -> tuple[measuring.Measured, dict[str, Any]]:
+    """Measure the bloom of settings, or of a command, as the options say; return all figures."""
+    size = how["size"]
     if isinstance(source, str):
         with as_wrong_use():
-            run = Program(shlex.split(source), options.suffix, options.timeout)
+            run = Program(shlex.split(source), how["suffix"], how["timeout"])
         with _notes():
             subject = measuring.of_program(
-                run, options.measured, options.gain, less_input=options.less_input
+                run, how["measured"], how["gain"], less_input=how["less_input"]
             )
-        passes, device = measuring.run_time(run, options.size), "this machine"
+        passes, device = measuring.run_time(run, size), "this machine"
     else:
-        subject = measuring.of_settings(renderer, source, options.measured, options.gain)
-        passes = measuring.pass_times(renderer, source, options.size)
-        device = renderer.info.summary
+        subject = measuring.of_settings(renderer, source, how["measured"], how["gain"])
+        passes, device = measuring.pass_times(renderer, source, size), renderer.info.summary
     try:
-        return measuring.measured(
-            subject,
-            renderer,
+        measured = measuring.Measured(
             name=name,
             device=device,
             settings=None if isinstance(source, str) else measuring.exact(source),
+            size=size,
             passes=passes,
-            frame=options.size,
-            required=options.require,
-            progress=lambda text: bar.update(f"{name}: {text}"),
+            subject=subject,
+            report=law_report(
+                subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}")
+            ),
+            renderer=renderer,
         )
+        bar.update(f"{name}: presets")
+        # Some figures are measured when they are read.
+        return measured, showing.as_values(measured)
     except AssertionError as error:
         raise click.ClickException(f"{name}: {error}") from error
 
@@ -285,13 +262,13 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
         return against
     if os.path.isfile(against):
         # Another name, so that it does not replace a file of the same name.
-        kind = vkbloom.load_method(against, name=f"{own_name(Path(against).stem)}_against")
+        kind = vkbloom.load_method(against, name=f"{identifier_of(Path(against).stem)}_against")
         usual, other = type(settings)(), kind()
         changed = {
-            one.name: getattr(settings, one.name)
-            for one in dataclasses.fields(settings)
-            if hasattr(other, one.name)
-            and getattr(settings, one.name) != getattr(usual, one.name, None)
+            field.name: getattr(settings, field.name)
+            for field in dataclasses.fields(settings)
+            if hasattr(other, field.name)
+            and getattr(settings, field.name) != getattr(usual, field.name, None)
         }
         return other.replace(**changed) if isinstance(settings, CustomMethod) else other
     if against not in vkbloom.presets:
@@ -332,13 +309,13 @@ def _notes() -> Iterator[None]:
         note(str(warning.message).partition("; ")[0])
 
 
-def _add_reference(settings: vkbloom.Settings, place: str) -> None:
+def _add_reference(settings: vkbloom.Settings, where: str) -> None:
     """Give a custom method its reference, FILE.py:FUNCTION."""
-    path, _, function = place.rpartition(":")
+    path, _, function = where.rpartition(":")
     if not isinstance(settings, CustomMethod):
         raise click.UsageError("--reference needs FILE; presets have the package's own reference")
     if not path or not os.path.isfile(path):
-        raise click.UsageError(f"--reference: {place!r} is not FILE.py:FUNCTION of a file")
+        raise click.UsageError(f"--reference: {where!r} is not FILE.py:FUNCTION of a file")
     reference: Callable[..., Any] | None = runpy.run_path(path).get(function)
     if not callable(reference):
         raise click.UsageError(f"--reference: {path} has no function {function!r}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Iterator
 from typing import Any
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom import testing
 from vkbloom._cli.sequences import expanded
-
-__all__ = ["judge"]
+from vkbloom._views.plain_values import plain
 
 
 def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
@@ -29,21 +27,8 @@ def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
     seen = testing.flicker(frames(), fps)
     strongest = int(seen.contrast.argmax())
     if as_json:
-        click.echo(
-            json.dumps(
-                {
-                    "frames": len(files),
-                    "fps": fps,
-                    "flash": dataclasses.asdict(flashes),
-                    "flicker": {
-                        "jod": seen.jod,
-                        "frequencies": seen.frequencies.tolist(),
-                        "contrast": seen.contrast.tolist(),
-                    },
-                },
-                indent=2,
-            )
-        )
+        values = {"frames": len(files), "fps": fps, "flash": flashes, "flicker": seen}
+        click.echo(json.dumps(plain(values), indent=2))
     else:
         click.echo(f"{len(files)} frames at {fps:g} a second, {degrees:g} degrees wide")
         click.echo(str(flashes))

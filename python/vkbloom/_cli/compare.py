@@ -20,6 +20,7 @@ from vkbloom._io import image_writing
 from vkbloom._io.images import Picture, StoredImage
 from vkbloom._views.comparison import ALL_METRICS, USUAL_METRICS, Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
+from vkbloom._views.plain_values import plain
 from vkbloom._views.tolerances import Tolerances, failures
 
 
@@ -135,7 +136,7 @@ def command(
     check_part_is_given(second, b)
     # FLIP of a large picture of floats takes half a minute.
     with as_wrong_use(), Console(stderr=True, quiet=is_quiet()).status("Comparing"):
-        found = compare(
+        result = compare(
             a.pixels,
             b.pixels,
             threshold=tolerances.atol or 0.0,
@@ -145,35 +146,35 @@ def command(
             pixels_per_degree=pixels_per_degree,
         )
         cause = diagnose(a.pixels, b.pixels)
-    found = _with_windows(found, a, b)
-    failed = tuple(reason for _, reason in failures(found, tolerances, tolerances.metrics))
+    result = _with_windows(result, a, b)
+    failed = tuple(reason for _, reason in failures(result, tolerances, tolerances.metrics))
     scale = None
-    if diff is not None and found.max_error is None:
+    if diff is not None and result.max_error is None:
         note(f"{diff} is not written: the images have no values to compare")
     elif diff is not None:
         scale = _write_difference(a, b, diff)
     if as_json:
-        shown = _object((first, second), found, failed, scale, cause)
+        shown = _object((first, second), result, failed, scale, cause)
         click.echo(json.dumps(shown, indent=2))
     else:
-        for line in _lines((first, second), a, found, failed, cause):
+        for line in _lines((first, second), a, result, failed, cause):
             click.echo(line)
         if scale is not None:
             say(f"wrote {diff}, differences times {scale:.6g}")
     return 1 if failed else 0
 
 
-def _with_windows(found: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
+def _with_windows(comparison: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
     """Add a mismatch if images of one size have different data or display windows."""
     windows = [(*image.origin, *image.display) for image in (a, b)]
     if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
-        return found
+        return comparison
     places = " against ".join(
         f"data at {x},{y} and display {width} x {height} at {left},{top}"
         for x, y, left, top, width, height in windows
     )
     reason = f"the windows differ, {places}"
-    return dataclasses.replace(found, mismatches=(*found.mismatches, reason))
+    return dataclasses.replace(comparison, mismatches=(*comparison.mismatches, reason))
 
 
 def _write_difference(a: StoredImage, b: StoredImage, path: str) -> float:
@@ -186,24 +187,20 @@ def _write_difference(a: StoredImage, b: StoredImage, path: str) -> float:
 
 def _object(
     files: tuple[str, str],
-    found: Comparison,
+    comparison: Comparison,
     failed: tuple[str, ...],
     scale: float | None,
     cause: Diagnosis,
 ) -> dict[str, Any]:
     """Return the object that --json prints. JSON has no infinity, so it becomes None."""
-    figures = {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in dataclasses.asdict(found).items()
-    }
     return {
         "a": files[0],
         "b": files[1],
         "passed": not failed,
         "failures": failed,
-        "identical": found.identical,
-        "diagnosis": dataclasses.asdict(cause),
-        **figures,
+        "identical": comparison.identical,
+        "diagnosis": plain(cause),
+        **plain(comparison),
         "diff_scale": scale,
     }
 
@@ -211,7 +208,7 @@ def _object(
 def _lines(
     files: tuple[str, str],
     a: StoredImage,
-    found: Comparison,
+    comparison: Comparison,
     failed: tuple[str, ...],
     cause: Diagnosis,
 ) -> list[str]:
@@ -219,34 +216,34 @@ def _lines(
     height, width = a.pixels.shape[:2]
     lines = [" and ".join(files)]
     lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
-    if found.percent_over is not None:
-        lines += _figures(found, a.channels)
+    if comparison.percent_over is not None:
+        lines += _figures(comparison, a.channels)
     lines.append(f"  cause      {cause.summary}")
     for reason in failed:
         lines.append(f"FAILED: {reason}")
     if not failed:
-        lines.append("identical" if found.identical else "passed")
+        lines.append("identical" if comparison.identical else "passed")
     return lines
 
 
-def _figures(found: Comparison, channels: tuple[str, ...]) -> list[str]:
-    largest = _shown(found.max_error)
-    if found.max_error_at is not None and found.max_error_values is not None:
-        x, y, channel = found.max_error_at
-        values = " against ".join(f"{value:.6g}" for value in found.max_error_values)
+def _figures(comparison: Comparison, channels: tuple[str, ...]) -> list[str]:
+    largest = _shown(comparison.max_error)
+    if comparison.max_error_at is not None and comparison.max_error_values is not None:
+        x, y, channel = comparison.max_error_at
+        values = " against ".join(f"{value:.6g}" for value in comparison.max_error_values)
         largest += f" at x {x}, y {y}, channel {channels[channel]}: {values}"
-    over = f" by more than {found.threshold:g}" if found.threshold else ""
+    over = f" by more than {comparison.threshold:g}" if comparison.threshold else ""
     rows = {
         "max error": largest,
-        "mean error": _shown(found.mean_error),
-        "pixels": f"{_shown(found.percent_over)} % differ{over}",
-        "PSNR": f"{_shown(found.psnr)} dB" if found.psnr is not None else "",
-        "SSIM": _shown(found.ssim),
-        "FLIP": _shown(found.flip),
+        "mean error": _shown(comparison.mean_error),
+        "pixels": f"{_shown(comparison.percent_over)} % differ{over}",
+        "PSNR": f"{_shown(comparison.psnr)} dB" if comparison.psnr is not None else "",
+        "SSIM": _shown(comparison.ssim),
+        "FLIP": _shown(comparison.flip),
     }
-    if found.cvvdp is not None:
-        rows["CVVDP"] = f"{_shown(found.cvvdp)} JOD"
-    for name, reason in found.not_computed.items():
+    if comparison.cvvdp is not None:
+        rows["CVVDP"] = f"{_shown(comparison.cvvdp)} JOD"
+    for name, reason in comparison.not_computed.items():
         rows[name.upper()] = f"not computed: {reason}"
     return [f"  {label:<11}{text}" for label, text in rows.items()]
 

@@ -9,10 +9,7 @@ import click
 
 #: ``--adapter``, the argument of `vkbloom.Renderer`.
 adapter_option = click.option(
-    "--adapter",
-    default="auto",
-    show_default=True,
-    help="auto, software, hardware, or a part of an adapter's name.",
+    "--adapter", default="auto", help="auto, software, hardware, or a part of an adapter's name."
 )
 
 

@@ -46,48 +46,48 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     With --self-test, it renders with every method, format and kind of derivative on one adapter.
     The exit status is 1 if a value is farther from the reference than the documentation allows.
     """
-    found = _compared(adapter) if compares else bare.examined()
-    text = json.dumps(found, indent=2)
+    result = _compared(adapter) if compares else bare.examined()
+    text = json.dumps(result, indent=2)
     if as_json == "-":
         click.echo(text)
     else:
-        (_show_groups if compares else _show_findings)(found)
+        (_show_groups if compares else _show_findings)(result)
     if as_json not in (None, "-"):
         Path(as_json).write_text(f"{text}\n", encoding="utf-8")
         say(f"wrote {as_json}")
-    return 0 if found["passed" if compares else "can_render"] else 1
+    return 0 if result["passed" if compares else "can_render"] else 1
 
 
-def _show_findings(found: dict[str, Any]) -> None:
-    for line in bare.lines_of(found, lambda text, status: click.style(text, _COLOURS[status])):
+def _show_findings(report: dict[str, Any]) -> None:
+    for line in bare.lines_of(report, lambda text, status: click.style(text, _COLOURS[status])):
         click.echo(line)
 
 
 def _compared(adapter: str) -> dict[str, Any]:
     start, results = time.perf_counter(), []
     with tqdm(unit="case", leave=False, disable=hides_progress()) as bar:
-        for one in self_test.run(adapter):
-            results.append(one)
-            bar.total = one.get("count", bar.total)
-            bar.update("group" in one)
+        for item in self_test.run(adapter):
+            results.append(item)
+            bar.total = item.get("count", bar.total)
+            bar.update("group" in item)
     return self_test.report(adapter, results, time.perf_counter() - start)
 
 
-def _show_groups(found: dict[str, Any]) -> None:
-    if found["device"]:
-        click.echo(vkbloom.AdapterInfo(**found["device"]).summary)
+def _show_groups(report: dict[str, Any]) -> None:
+    if report["device"]:
+        click.echo(vkbloom.AdapterInfo(**report["device"]).summary)
     click.echo(f"\n{'group':18}{'cases':>6}{'wrong':>6}{'error':>10}{'allowed':>10}{'seconds':>9}")
-    for group in found["groups"]:
+    for group in report["groups"]:
         error, allowed = (
             "" if group[name] is None else f"{group[name]:.2g}"
             for name in ("largest_error", "allowed")
         )
         line = f"{group['name']:18}{group['cases']:6}{group['wrong']:6}{error:>10}{allowed:>10}"
         click.secho(f"{line}{group['seconds']:9.1f}", fg="red" if group["wrong"] else None)
-    for one in found["wrong"]:
-        click.echo(f"\nwrong: {one['group']}: {one['name']}\n       {one['wrong']}")
-    for line in found["unknown"]:
+    for item in report["wrong"]:
+        click.echo(f"\nwrong: {item['group']}: {item['name']}\n       {item['wrong']}")
+    for line in report["unknown"]:
         click.echo(f"\nnot known: {line}")
     click.echo(
-        f"\n{found['cases']} cases in {found['seconds']:.0f} s, wrong: {len(found['wrong'])}."
+        f"\n{report['cases']} cases in {report['seconds']:.0f} s, wrong: {len(report['wrong'])}."
     )

@@ -41,10 +41,9 @@ _LARGEST_PORT: Final = 65535
     "--size",
     type=SIZE,
     default="1280x720",
-    show_default=True,
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
-@click.option("--shading", type=click.Choice(SHADINGS), default="deferred", show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
 @glow_options
 @live_options(image_has_size=False)
 def command(

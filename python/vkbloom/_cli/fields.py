@@ -118,22 +118,22 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
     """Parse names of glares and stages with fields, as streaks:directions=4,angle=45+halo."""
     if word.lower() in ("", "none"):
         return ()
-    found: list[Glare] = []
-    for one in word.split("+"):
-        name, sign, rest = one.partition(":")
+    results: list[Glare] = []
+    for item in word.split("+"):
+        name, sign, rest = item.partition(":")
         name = name.lower()
         if name in glares:
             if sign:
                 raise ValueError(f"{name} is a published glare, which takes no fields")
-            found += glares[name]
+            results += glares[name]
             continue
         if name not in STAGES:
             known = [*STAGES, *glares]
             raise ValueError(
                 f"{name!r} is not one of {', '.join(known)}{did_you_mean(name, known)}"
             )
-        found.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
-    return tuple(found)
+        results.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
+    return tuple(results)
 
 
 _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
@@ -197,7 +197,7 @@ class FieldOption(click.Option):
         first = next(iter(infos.values()))
         kinds = {(info.kind, info.choices) for info in infos.values()}
         if len(kinds) > 1:
-            raise TypeError(f"{first.name} is {' as well as '.join(one for one, _ in kinds)}")
+            raise TypeError(f"{first.name} is {' as well as '.join(item for item, _ in kinds)}")
         # The option accepts none if one of the classes does.
         widest = next((info for info in infos.values() if info.optional), first)
         option = f"{prefix}{first.option}".replace("_", "-")
@@ -267,8 +267,8 @@ class FieldOptions(click.Option):
                     if name in inherited or info.kind == "object":
                         continue
                     if METHODS.is_added(label) and any(
-                        (one.kind, one.choices) != (info.kind, info.choices)
-                        for one in fields.get(info.option, {}).values()
+                        (item.kind, item.choices) != (info.kind, info.choices)
+                        for item in fields.get(info.option, {}).values()
                     ):
                         # A custom method was loaded for this call: its field has the option.
                         del fields[info.option]
@@ -289,16 +289,16 @@ class Command(click.Command):
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the parameters, with the options of fields in the place of each `FieldOptions`."""
-        found: list[click.Parameter] = []
-        for one in super().get_params(ctx):
-            found += one.options() if isinstance(one, FieldOptions) else [one]
-        return found
+        results: list[click.Parameter] = []
+        for param in super().get_params(ctx):
+            results += param.options() if isinstance(param, FieldOptions) else [param]
+        return results
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Begin with no values of fields."""
         ctx.meta[_METHOD] = _method_of(args)
-        places = (one for one in self.params if isinstance(one, FieldOptions))
-        ctx.params.update({place.into: {} for place in places})
+        options = (param for param in self.params if isinstance(param, FieldOptions))
+        ctx.params.update({option.into: {} for option in options})
         return super().parse_args(ctx, args)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -317,15 +317,15 @@ class Command(click.Command):
         """
         general: list[click.Option] = []
         shared: list[click.Option] = []
-        for one in self.get_params(ctx):
-            if isinstance(one, FieldOption) and one.labels is not None:
-                shared += [] if one.labels else [one]
-            elif isinstance(one, click.Option):
-                general.append(one)
+        for param in self.get_params(ctx):
+            if isinstance(param, FieldOption) and param.labels is not None:
+                shared += [] if param.labels else [param]
+            elif isinstance(param, click.Option):
+                general.append(param)
         method = ctx.meta.get(_METHOD)
         if method:
             with formatter.section(f"Options ({ctx.command_path} --help describes them)"):
-                formatter.write_text(" ".join(max(one.opts, key=len) for one in general))
+                formatter.write_text(" ".join(max(item.opts, key=len) for item in general))
             with formatter.section(f"Settings of the method {method}"):
                 formatter.write_dl(_records(ctx, _options_of(method)), col_max=_NARROW)
             return
@@ -334,7 +334,7 @@ class Command(click.Command):
         if shared:
             with formatter.section("Settings of every method"):
                 formatter.write_dl(_records(ctx, shared))
-        if any(one.type.name == "method" for one in general):
+        if any(item.type.name == "method" for item in general):
             call = f"{ctx.command_path} --method NAME --help"
             with formatter.section(f"{call} lists the settings of"):
                 formatter.write_text(", ".join(METHODS))
@@ -362,7 +362,7 @@ def _options_of(method: str) -> list[click.Option]:
 
 
 def _records(ctx: click.Context, options: Iterable[click.Option]) -> list[tuple[str, str]]:
-    return [record for one in options if (record := one.get_help_record(ctx)) is not None]
+    return [record for option in options if (record := option.get_help_record(ctx)) is not None]
 
 
 def options(
@@ -389,7 +389,7 @@ class NameOf(_ParamType):
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the name as it was published."""
-        names = {one.lower(): one for names in self._known for one in names}
+        names = {name.lower(): name for names in self._known for name in names}
         if value.lower() not in names:
             self.fail(unknown(f"unknown {self.name}", value, names.values()), param, ctx)
         return names[value.lower()]
@@ -399,8 +399,8 @@ class NameOf(_ParamType):
     ) -> list[CompletionItem]:
         """Return the names that begin with some letters."""
         return [
-            CompletionItem(one)
+            CompletionItem(name)
             for names in self._known
-            for one in names
-            if one.startswith(incomplete.lower())
+            for name in names
+            if name.startswith(incomplete.lower())
         ]

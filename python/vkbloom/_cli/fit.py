@@ -51,7 +51,6 @@ from vkbloom._settings.registry import METHODS
     "--framebuffer",
     metavar="NAME",
     default="final",
-    show_default=True,
     help="The framebuffer that TARGET shows: final is the picture with its bloom, bloom the bloom "
     "alone.",
 )
@@ -93,14 +92,14 @@ def command(
         note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
-        found = [
-            one
+        results = [
+            item
             for image_of, begun in searches
-            for one in vkbloom.fit(
+            for item in vkbloom.fit(
                 image_of, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
             )
         ]
-    show_results(sorted(found, key=lambda one: one.loss))
+    show_results(sorted(results, key=lambda item: item.loss))
 
 
 def _searches(

@@ -16,8 +16,8 @@ def entries() -> Iterator[Entry]:
     for name, kind in STAGES.items():
         what = (inspect.getdoc(kind) or "").partition(".")[0]
         yield _entry(name, what[:1].lower() + what[1:], "a stage with its defaults", (kind(),))
-    for name, one in GLARES.items():
-        yield _entry(name, one.what, one.whose, one.stages)
+    for name, item in GLARES.items():
+        yield _entry(name, item.what, item.whose, item.stages)
 
 
 def _entry(name: str, what: str, whose: str, stages: Sequence[Glare]) -> Entry:

@@ -15,14 +15,6 @@ from vkbloom._io.array_files import premultiplied
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour
 
-__all__ = [
-    "accompanying",
-    "glow_options",
-    "note_step",
-    "refuse_glow_of_scene",
-    "uploaded",
-]
-
 Array = NDArray[Any]
 
 

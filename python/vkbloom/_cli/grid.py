@@ -17,7 +17,7 @@ from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
-from vkbloom._grid import filling, identity, layout, order, parts, progress, sources
+from vkbloom._grid import filling, identity, layout, order, progress, sources
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
@@ -31,10 +31,10 @@ from vkbloom._settings.settings import SHADINGS
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
 @click.option("--time", default=0.0, help="Time of a scene's animation; its period is 1.")
-@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
-@click.option("--framebuffers", metavar="all|NAME,...", default="final", show_default=True)
-@click.option("--image-format", metavar="EXTENSION", default="png", show_default=True)
-@click.option("--resume/--no-resume", default=True, help="Continue a grid that is there [default]")
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
+@click.option("--framebuffers", metavar="all|NAME,...", default="final")
+@click.option("--image-format", metavar="EXTENSION", default="png")
+@click.option("--resume/--no-resume", default=True, help="Continue a grid that is there")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
 @click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
@@ -63,7 +63,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")
-        part = parts.read_part(given["part"])
+        part = order.read_part(given["part"])
     if not is_store and Path(out).suffix and not Path(out).is_dir():
         hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
         raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
@@ -110,12 +110,12 @@ def _source(
         return [], given["scene"](), {}
     colour, reading = given["input_colour"], {n: given[n] for n in ("subimage", "layer", "raw")}
     reading["expand"] = expand
-    pictures = [image_files.read_picture(one, colour=colour, **reading) for one in images]
+    pictures = [image_files.read_picture(image, colour=colour, **reading) for image in images]
     glow_options.note_step(settings, given["mask"], given["emission"])
     glow = glow_options.accompanying(given["mask"], given["emission"], colour, raw=given["raw"])
     # Labels are the file names, or numbers if a file is given twice.
     labels = images if len(set(images)) == len(images) else range(len(images))
-    named = {str(label): one.pixels for label, one in zip(labels, pictures, strict=True)}
+    named = {str(label): item.pixels for label, item in zip(labels, pictures, strict=True)}
     return pictures, named if len(images) > 1 else pictures[0].pixels, glow(pictures[0].pixels)
 
 
@@ -131,22 +131,22 @@ def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")
 
 
-def prepare(folder: Path, own: Mapping[str, Any], *, resume: bool) -> None:
+def prepare(folder: Path, wanted: Mapping[str, Any], *, resume: bool) -> None:
     """Create a folder for the images of a grid with this identity, or examine an existing one."""
     folder.mkdir(parents=True, exist_ok=True)
     index = folder / "grid.json"
     if all(safe_writing.is_temporary(path) for path in folder.iterdir()):
-        safe_writing.write_file(index, json.dumps(own, indent=1).encode())
+        safe_writing.write_file(index, json.dumps(wanted, indent=1).encode())
     elif not index.exists():
         raise ValueError(f"{folder}: the folder is not empty, and its content is not a grid")
     elif not resume:
         raise FileExistsError(f"{folder}: already has a grid; resume it, or name another folder")
     try:
-        found = identity.differences(json.loads(index.read_bytes()), own)
+        result = identity.differences(json.loads(index.read_bytes()), wanted)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{index}: damaged, {error}") from error
-    if found:
-        raise ValueError(f"{folder}: contains another grid; {'; '.join(found)}")
+    if result:
+        raise ValueError(f"{folder}: contains another grid; {'; '.join(result)}")
 
 
 def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **how: Any) -> int:
@@ -158,7 +158,7 @@ def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **
     out, suffix, pictures = Path(target), how["suffix"], how["pictures"]
     prepare(out, identity.identity(grid, laid, ()) | {"suffix": suffix}, resume=how["resume"])
     single = (1,) * len(grid.shape)
-    points = [one.start for one in order.blocks(grid.shape, single, laid.ranking, how["part"])]
+    points = [block.start for block in order.blocks(grid.shape, single, laid.ranking, how["part"])]
     digits = [max(3, len(str(count - 1))) for count in grid.shape]
     stems = {index: "".join(map("{:0{}}_".format, index, digits)) for index in points}
     there = {path.stem for path in out.iterdir()}

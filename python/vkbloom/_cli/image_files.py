@@ -20,9 +20,8 @@ from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes
 from vkbloom._io.array_files import has_straight
 from vkbloom._io.colour import check_space
-from vkbloom._io.displayed import Saved
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.images import Colour, Picture, SavedColour, StoredImage
+from vkbloom._io.images import Colour, Picture, StoredImage
 from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
@@ -31,35 +30,11 @@ COLOURS: Final = ("linear", "srgb")
 _STANDARD_ERROR = 2
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class FileOptions:
-    """How image files are read and written: options of commands by their names."""
-
-    subimage: int = 0
-    layer: str | None = None
-    input_colour: Colour | None = None
-    raw: bool = False
-    mask: str | None = None
-    emission: str | None = None
-    half: bool | None = None
-    output_colour: SavedColour | None = None
-    primaries: str = "rec709"
-    view: str | None = None
-    bits: int | None = None
-    quality: int | None = None
-
-    @property
-    def saved(self) -> Saved:
-        """What the colours of a written file are to be."""
-        return Saved(self.output_colour, self.primaries, self.view)
-
-
 subimage_option: Final = click.option(
     "--subimage",
     metavar="N",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Index of the part to read from a file with several parts.",
 )
 layer_option: Final = click.option(
@@ -121,11 +96,13 @@ def read_picture(
     stored = read(source, subimage, layer)
     source = shown(source)
     if raw and stored.pixels.dtype != np.uint8:
-        raise not_of_bytes(source, stored.numbers[0])
+        raise click.UsageError(
+            f"--raw: {source} has {stored.numbers[0]}, not 8-bit integers; leave out --raw"
+        )
     picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
-    counts = (int(found(picture.values).sum()) for found in (np.isnan, np.isinf))
+    counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
     height, width = picture.pixels.shape[:2]
@@ -149,11 +126,6 @@ def is_photograph(source: str) -> bool:
     ):
         return image_reading.is_photograph(reader)
     return False
-
-
-def not_of_bytes(source: str, numbers: str) -> click.UsageError:
-    """Return the error for --raw with a file that does not have 8-bit integers."""
-    return click.UsageError(f"--raw: {source} has {numbers}, not 8-bit integers; leave out --raw")
 
 
 def part_notes(stored: StoredImage, layer: str | None) -> list[str]:

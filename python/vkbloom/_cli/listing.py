@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Final
 
 import click
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from vkbloom._cli.terminal import show
-
-__all__ = ["Entry", "listing_command"]
+# Console width for output to a file or another program, where lines must not be wrapped.
+_UNBROKEN: Final = 4096
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +51,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
             ]
             click.echo(json.dumps(objects, indent=2))
         else:
-            show(_table(listed))
+            _show(_table(listed))
 
     return command
 
@@ -59,7 +59,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
 def _table(entries: Iterable[Entry]) -> Table:
     """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
     listed = list(entries)
-    is_grouped = any("engine" in one.values for one in listed)
+    is_grouped = any("engine" in item.values for item in listed)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title in ("name", "composite", "needs HDR", *["confirmed by"] * is_grouped):
         table.add_column(title, no_wrap=True)
@@ -67,12 +67,26 @@ def _table(entries: Iterable[Entry]) -> Table:
     table.add_column("what")
     table.add_column("whose")
     engine = ""
-    for one in listed:
-        if one.values.get("engine", "") != engine:
-            engine = one.values["engine"]
+    for item in listed:
+        if item.values.get("engine", "") != engine:
+            engine = item.values["engine"]
             table.add_row(Text(f"{engine}:", style="bold"))
-        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (one.what, one.whose))
-        confirmed = [one.values["confirmed"]] if is_grouped else []
-        hdr = "yes" if one.needs_hdr else "no"
-        table.add_row(one.name, one.composite, hdr, *confirmed, *texts)
+        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (item.what, item.whose))
+        confirmed = [item.values["confirmed"]] if is_grouped else []
+        hdr = "yes" if item.needs_hdr else "no"
+        table.add_row(item.name, item.composite, hdr, *confirmed, *texts)
     return table
+
+
+def _show(table: Table) -> None:
+    """Print a table: wrapped to the terminal's width, or unwrapped without a terminal."""
+    console = Console(markup=False, highlight=False, emoji=False)
+    if console.is_terminal:
+        console.print(table)
+        return
+    console.width = _UNBROKEN
+    with console.capture() as captured:
+        console.print(table)
+    # rich pads every cell to the width of its column; strip the padding of the last column.
+    for line in captured.get().splitlines():
+        click.echo(line.rstrip())

@@ -1,27 +1,22 @@
-"""The state of a window with live controls, and how keys and the mouse change it."""
+"""The state of a window with live controls, and how keys change it."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import vkbloom
-from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, Shading
-
-__all__ = ["HELP", "Live"]
 
 HELP: Final = """\
 B              bloom on, off
 Up, Down       scale of the blur, 0.1 to 2
 Left, Right    strength
 1 ... 9        the framebuffer that is shown
-M, P           the next method, the next preset
+P              the next preset
 Space          pauses the animation
-drag, wheel    turn the scene, zoom
 S              writes all framebuffers to files
 Q, Escape      close\
 """
@@ -31,14 +26,6 @@ _SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", 
 _STRENGTHS: Final = ("blur_strength", "intensity")
 _STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0
-_DEGREES: Final = 0.4  # rotation per pixel of mouse movement
-_ZOOM: Final = 0.9  # factor of the distance per step of the wheel
-
-
-def _after(value: object, values: Mapping[str, Any]) -> Any:
-    """Return the value after another one; the first one if there is none."""
-    found = list(values.values())
-    return found[(found.index(value) + 1) % len(found) if value in found else 0]
 
 
 @dataclasses.dataclass
@@ -62,7 +49,7 @@ class Live:
 
     def press(self, key: str, names: list[str]) -> None:
         """Do what a key stands for; `names` are the framebuffers that there are."""
-        if key in "bmp":
+        if key in "bp":
             # The next settings may lack the framebuffer.
             self.framebuffer = "final"
         if key == "b":
@@ -73,11 +60,10 @@ class Live:
             self._step(_STRENGTHS, _STEP if key == "right" else -_STEP, 0.0, math.inf)
         elif key in "123456789" and int(key) <= len(names):
             self.framebuffer = names[int(key) - 1]
-        elif key == "m":
-            shown = {name: getattr(self.settings, name) for name in ("tonemap", "encoding")}
-            self.settings = _after(type(self.settings), METHODS)(**shown)
         elif key == "p":
-            self.settings = _after(self.settings, vkbloom.presets)
+            known = list(vkbloom.presets.values())
+            shown = known.index(self.settings) if self.settings in known else -1
+            self.settings = known[(shown + 1) % len(known)]
         elif key == "space":
             self.paused = not self.paused
         elif key == "s":
@@ -95,20 +81,6 @@ class Live:
 
     def _of(self, names: tuple[str, ...]) -> list[str]:
         return [name for name in names if hasattr(self.settings, name)][:1]
-
-    def drag(self, x: float, y: float) -> None:
-        """Turn the scene by pixels of the mouse."""
-        about_x, about_y, about_z = self.source.camera.rotation
-        self._see(rotation=(about_x - y * _DEGREES, about_y + x * _DEGREES, about_z))
-
-    def scroll(self, steps: float) -> None:
-        """Move the camera towards the scene, or away from it."""
-        x, y, z = self.source.camera.position
-        self._see(position=(x, y, z * _ZOOM**steps))
-
-    def _see(self, **changes: Any) -> None:
-        camera = dataclasses.replace(self.source.camera, **changes)
-        self.source = dataclasses.replace(self.source, camera=camera)
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""

@@ -15,8 +15,6 @@ from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.streams import is_stream
 
-__all__ = ["live_options"]
-
 #: Options of a scene, by the names of their parameters.
 _OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
 

@@ -16,18 +16,7 @@ _DARKER = 0.985
 # No pixel of an image whose values are below it is a highlight.
 _BLACK = 1e-6
 # The smallest alpha and the smallest light that 8 bits can hold.
-_LEAST = 1 / 255
-
-__all__ = [
-    "brightest_of",
-    "darkening",
-    "hidden",
-    "is_without",
-    "notes",
-    "only",
-    "reason",
-    "with_bloom",
-]
+_MIN_VISIBLE = 1 / 255
 
 
 def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:
@@ -73,7 +62,7 @@ def darkening(pixels: NDArray[Any], frames: Frames) -> str:
     before, after = (
         np.clip(np.nan_to_num(image[:, :, :3].astype(np.float32)) / scale, 0, 1).max(axis=2)
         for image, scale in (
-            (one, 255 if one.dtype == np.uint8 else 1) for one in (pixels, frames["final"])
+            (item, 255 if item.dtype == np.uint8 else 1) for item in (pixels, frames["final"])
         )
     )
     brightest = float(before.max(initial=0))
@@ -93,7 +82,7 @@ def hidden(final: NDArray[Any], settings: Settings) -> str:
     """Return a text if light lies on transparent pixels of a file with straight alpha; else ""."""
     if not settings.bloom or settings.alpha != "keep" or final.shape[2] != 4:
         return ""
-    least = _LEAST * (255 if final.dtype == np.uint8 else 1)
+    least = _MIN_VISIBLE * (255 if final.dtype == np.uint8 else 1)
     is_clear = final[:, :, 3] < least
     if not (final[:, :, :3].max(axis=2, where=is_clear[:, :, None], initial=0) >= least).any():
         return ""

@@ -15,13 +15,13 @@ def entries() -> Iterator[Entry]:
         name: (engine, confirmed) for engine, confirmed, names in ENGINES for name in names.split()
     }
     for name, (engine, confirmed) in places.items():
-        one = PRESETS[name]
-        settings = one.make()
+        item = PRESETS[name]
+        settings = item.make()
         # The command line expands the highlights of a photograph for the preset photo.
         needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
         values = {"intensity": settings.intensity, "settings": settings.to_dict()}
         values |= {"engine": engine, "confirmed": confirmed}
-        yield Entry(name, one.what, one.whose, settings.composite, needs_hdr, values)
+        yield Entry(name, item.what, item.whose, settings.composite, needs_hdr, values)
 
 
 command = listing_command(

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.util import find_spec
 from typing import Any, Final, NoReturn
 
 import click
@@ -23,24 +22,24 @@ from vkbloom._free_memory import ADVICE, memory_left
 from vkbloom._settings.registry import METHODS
 from vkbloom._suggestions import did_you_mean
 
-#: Names of the modules of this package that have a click command called `command`.
-COMMANDS: Final = (
-    "render",
-    "apply",
-    "view",
-    "explore",
-    "grid",
-    "fit",
-    "translate",
-    "check",
-    "compare",
-    "presets",
-    "glares",
-    "psfs",
-    "adapters",
-    "doctor",
-    "warm",
-)
+#: What the commands do, by the modules of this package that have a click command `command`.
+COMMANDS: Final = {
+    "render": "Render a scene or its animation to image files",
+    "apply": "Add bloom to an image file",
+    "view": "Show the bloom of a scene or an image in a window",
+    "explore": "Explore the bloom of an image or a scene in a browser",
+    "grid": "Render all combinations of axis values to a Zarr store or image files",
+    "fit": "Find the settings whose bloom matches a picture",
+    "translate": "Find another method's parameters whose bloom comes closest to settings",
+    "check": "Measure a bloom by every law",
+    "compare": "Measure the differences of two image files",
+    "presets": "List the presets",
+    "glares": "List the stages and published names of glare",
+    "psfs": "List the point-spread functions",
+    "adapters": "List the Vulkan adapters that vkbloom can use",
+    "doctor": "Check whether this machine can render, and explain what prevents it",
+    "warm": "Fill the caches of pipelines and kernels before the first call needs them",
+}
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -84,17 +83,17 @@ class Program(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what the commands do, without an import of them."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(name)) for name in COMMANDS])
+            formatter.write_dl([*COMMANDS.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the commands that begin with some letters, without an import of them."""
-        found = [
-            CompletionItem(name, help=_summary(name))
-            for name in COMMANDS
+        results = [
+            CompletionItem(name, help=summary)
+            for name, summary in COMMANDS.items()
             if name.startswith(incomplete)
         ]
         # Not the group's own: it would list the commands again.
-        return [*found, *click.Command.shell_complete(self, ctx, incomplete)]
+        return [*results, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
@@ -140,7 +139,7 @@ class Program(click.Group):
             if _is_from_interrupt(error):
                 _exit(INTERRUPTED, "interrupted")
             no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
-            if any(one in str(error) for one in no_memory):
+            if any(item in str(error) for item in no_memory):
                 _exit(1, described(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
                 _exit(1, described(error))
@@ -149,33 +148,23 @@ class Program(click.Group):
         sys.exit(status)
 
 
-def _summary(name: str) -> str:
-    """Return what a command does: the first line of its module."""
-    spec = find_spec(f"vkbloom._cli.{name}")
-    # A loader of source files has the text; others leave the summary out.
-    read = getattr(spec and spec.loader, "get_source", None)
-    first = ((read and read(f"vkbloom._cli.{name}")) or "").partition("\n")[0]
-    text = first.partition("``: ")[2].rstrip('".')
-    return text[:1].upper() + text[1:]
-
-
 def with_methods(words: Sequence[str]) -> list[str]:
     """Load the files of custom methods after --method or --to; put the names there."""
     changed = list(words)
-    for place, word in enumerate(changed):
+    for index, word in enumerate(changed):
         option, _, value = word.partition("=")
         if option not in ("--method", "--to"):
             continue
         joined = bool(value)
-        if not joined and place + 1 < len(changed):
-            value = changed[place + 1]
+        if not joined and index + 1 < len(changed):
+            value = changed[index + 1]
         if value in METHODS or not os.path.isfile(value):
             continue
         name = vkbloom.load_method(value).method
         if joined:
-            changed[place] = f"{option}={name}"
+            changed[index] = f"{option}={name}"
         else:
-            changed[place + 1] = name
+            changed[index + 1] = name
     return changed
 
 
@@ -229,7 +218,7 @@ def given(name: str, context: click.Context | None = None) -> bool:
     cls=Program,
     # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     params=[*terminal.PRINTING_OPTIONS],
 )
 @click.version_option(

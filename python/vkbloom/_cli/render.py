@@ -30,12 +30,8 @@ from vkbloom._settings.settings import SHADINGS, Shading
     "formats have a file for each framebuffer. A name without extension is a folder of PNG files. "
     "A framebuffer that the format cannot hold is written as .exr.",
 )
-@click.option(
-    "--size", type=SIZE, default="1280x720", show_default=True, help="Size of the frame, in pixels."
-)
-@click.option(
-    "--time", default=0.0, show_default=True, help="Time of the animation; its period is 1."
-)
+@click.option("--size", type=SIZE, default="1280x720", help="Size of the frame, in pixels.")
+@click.option("--time", default=0.0, help="Time of the animation; its period is 1.")
 @click.option(
     "--frames",
     "count",
@@ -43,7 +39,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
     type=click.IntRange(min=1),
     help="Render N frames of one period of the animation, starting at --time, to numbered files.",
 )
-@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0], show_default=True)
+@click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
 @click.option(
     "--framebuffers",
     metavar="all|NAME,...",

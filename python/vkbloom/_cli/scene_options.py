@@ -32,7 +32,7 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "base",
         default=_BUILT_IN,
         metavar="ufo|PATH",
-        help=f"The lit mesh: a glTF file, or the built-in saucer [default {_BUILT_IN}]",
+        help="The lit mesh: a glTF file, or the built-in saucer",
     )
     @click.option(
         "--glow",
@@ -51,7 +51,6 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--glow-intensity",
         type=float,
         default=1.0,
-        show_default=True,
         help="Factor of the glow mesh's colour in deferred shading, 0 or more.",
     )
     @fields.options({"": Camera}, "camera", prefix="camera-")

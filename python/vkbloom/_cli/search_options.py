@@ -15,8 +15,6 @@ from vkbloom._cli.terminal import is_quiet
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
 
-__all__ = ["search_options"]
-
 
 def search_options(
     *, vary: str | None, loss: LossName, max_calls: int
@@ -28,98 +26,69 @@ def search_options(
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @click.option(
+            "--vary",
+            metavar="NAME,...",
+            default=vary,
+            help="The settings to find: numbers, switches and choices"
+            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
+        )
+        @click.option(
+            "--loss",
+            type=click.Choice(get_args(LossName)),
+            default=loss,
+            help="The figure to minimize. relative: norm of the difference divided by the norm of "
+            "the target; l2: root mean square of the difference; log: the same for logarithms; "
+            "flip: mean FLIP.",
+        )
+        @click.option(
+            "--max-calls",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=max_calls,
+            help="Limit of the renders of each search.",
+        )
+        @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
         @functools.wraps(command)
-        def run(
-            *,
-            vary: str | None,
-            as_json: bool,
-            **rest: Any,
-        ) -> Any:
-            search: dict[str, Any] = {
-                "loss": rest.pop("loss"),
-                "max_calls": rest.pop("max_calls"),
-                "progress": Console(stderr=True).is_terminal and not is_quiet(),
-            }
+        def run(*, vary: str | None, as_json: bool, **rest: Any) -> Any:
+            search = {name: rest.pop(name) for name in ("loss", "max_calls")}
+            search["progress"] = Console(stderr=True).is_terminal and not is_quiet()
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
             show_results = functools.partial(_show_results, as_json=as_json)
             return command(search=search, show_results=show_results, **rest)
 
-        for option in reversed(_of_search(vary, loss, max_calls)):
-            run = option(run)
         return run
 
     return add
 
 
-def _of_search(vary: str | None, loss: LossName, max_calls: int) -> tuple[Any, ...]:
-    """Return the options of what is searched and how, with these defaults."""
-    return (
-        click.option(
-            "--vary",
-            metavar="NAME,...",
-            default=vary,
-            show_default=True,
-            help="The settings to find: numbers, switches and choices"
-            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
-        ),
-        click.option(
-            "--loss",
-            type=click.Choice(get_args(LossName)),
-            default=loss,
-            show_default=True,
-            help="The figure to minimize. relative: norm of the difference divided by the norm of "
-            "the target; l2: root mean square of the difference; log: the same for logarithms; "
-            "flip: mean FLIP.",
-        ),
-        click.option(
-            "--max-calls",
-            metavar="N",
-            type=click.IntRange(min=1),
-            default=max_calls,
-            show_default=True,
-            help="Limit of the renders of each search.",
-        ),
-        click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss."),
-    )
-
-
-def _show_results(found: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
+def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
     """Print results, the best one first."""
     if as_json:
-        click.echo(json.dumps([_object(one) for one in found], indent=2))
+        click.echo(json.dumps([_object(item) for item in fits], indent=2))
     else:
-        for one in found:
+        for item in fits:
             click.echo(
-                f"{one.settings.method}: {one.loss_name} loss {one.loss:.4g}, from "
-                f"{one.start_loss:.4g}; {one.calls} renders in {one.seconds:.1f} s{_begun(one)}"
+                f"{item.settings.method}: {item.loss_name} loss {item.loss:.4g}, from "
+                f"{item.start_loss:.4g}; {item.calls} renders in {item.seconds:.1f} s"
             )
-            click.echo(f"  {as_code(one.settings)}")
-            click.echo(f"  {one.words}")
+            click.echo(f"  {as_code(item.settings)}")
+            click.echo(f"  {item.words}")
 
 
-def _begun(found: vkbloom.FitResult) -> str:
-    """Return the preset that a search started from, as words; "" if none has the other fields."""
-    for name, preset in vkbloom.presets.items():
-        if preset.method == found.settings.method:
-            values = {field: getattr(preset, field) for field in found.vary}
-            if found.settings.replace(**values) == preset:
-                return f", from the preset {name}"
-    return ""
-
-
-def _object(found: vkbloom.FitResult) -> dict[str, Any]:
+def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
     """Return the object of one result that --json prints."""
     return {
-        "settings": found.settings.to_dict(),
-        "varied": {name: getattr(found.settings, name) for name in found.vary},
-        "loss": found.loss,
-        "start_loss": found.start_loss,
-        "loss_name": found.loss_name,
-        "explained": found.explained,
-        "verdict": found.verdict,
-        "cause": found.cause,
-        "calls": found.calls,
-        "seconds": found.seconds,
+        "settings": fit.settings.to_dict(),
+        "varied": {name: getattr(fit.settings, name) for name in fit.vary},
+        "loss": fit.loss,
+        "start_loss": fit.start_loss,
+        "loss_name": fit.loss_name,
+        "explained": fit.explained,
+        "verdict": fit.verdict,
+        "cause": fit.cause,
+        "calls": fit.calls,
+        "seconds": fit.seconds,
     }

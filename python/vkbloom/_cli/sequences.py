@@ -17,8 +17,6 @@ from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import note
 from vkbloom._io.image_reading import readable_extensions
 
-__all__ = ["check_targets", "is_terminal", "pairs"]
-
 #: The most names in a note.
 _MAX_NAMES: Final = 5
 
@@ -30,30 +28,30 @@ _HASHES: Final = re.compile(r"#{2,}|(?<=[._])#(?=\.)")
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
     target = _with_number(target)
-    found = [pair for source in sources for pair in expanded(source)]
+    results = [pair for source in sources for pair in expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
     is_pattern = _NUMBER.search(os.path.basename(target)) is not None
-    is_single = len(sources) == 1 and found == [(sources[0], None)]
+    is_single = len(sources) == 1 and results == [(sources[0], None)]
     if is_folder or (not is_single and not is_pattern and not Path(target).suffix):
-        written = [os.path.join(target, os.path.basename(name)) for name, _ in found]
+        written = [os.path.join(target, os.path.basename(name)) for name, _ in results]
     elif is_pattern:
-        numbers = [number for _, number in found]
-        counted = range(len(found)) if None in numbers else numbers
+        numbers = [number for _, number in results]
+        counted = range(len(results)) if None in numbers else numbers
         written = [os.path.join(os.path.dirname(target), _filled(target, n)) for n in counted]
-    elif len(found) == 1:
+    elif len(results) == 1:
         written = [target]
     else:
         raise click.UsageError(
-            f"{target}: one file cannot hold {len(found)} images; name a folder or a pattern such "
-            "as f.%04d.png"
+            f"{target}: one file cannot hold {len(results)} images; name a folder or a pattern "
+            "such as f.%04d.png"
         )
-    if PIPE in (name for name, _ in found) and written != [target]:
+    if PIPE in (name for name, _ in results) and written != [target]:
         raise click.UsageError("standard input needs one file, or standard output, as OUT")
-    if is_stream(target) and len(found) > 1:
-        raise click.UsageError(f"{target}: one pipe cannot hold {len(found)} images")
+    if is_stream(target) and len(results) > 1:
+        raise click.UsageError(f"{target}: one pipe cannot hold {len(results)} images")
     if len(set(written)) < len(written):
         raise click.UsageError(f"{target}: two images have the same name; use a pattern")
-    return [(name, file) for (name, _), file in zip(found, written, strict=True)]
+    return [(name, file) for (name, _), file in zip(results, written, strict=True)]
 
 
 def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
@@ -106,9 +104,9 @@ def expanded(source: str) -> list[tuple[str, int | None]]:
         return [(source, None)]
     source = _with_number(source)
     folder, name = os.path.split(source)
-    found: list[tuple[str, int | None]] = []
+    results: list[tuple[str, int | None]] = []
     if os.path.isdir(source):
-        found = [(path, None) for path in _images_of(source)]
+        results = [(path, None) for path in _images_of(source)]
     elif (number := _NUMBER.search(name)) is not None:
         digits = rf"(\d{{{number[2] or 1},}})"
         form = re.compile(
@@ -119,14 +117,16 @@ def expanded(source: str) -> list[tuple[str, int | None]]:
             for entry in os.scandir(folder or ".")
             if (fits := form.fullmatch(entry.name)) is not None
         ]
-        found = [(os.path.join(folder, os.path.basename(path)), n) for n, path in sorted(numbered)]
+        results = [
+            (os.path.join(folder, os.path.basename(path)), n) for n, path in sorted(numbered)
+        ]
     elif glob.has_magic(source):
-        found = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
+        results = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
     else:
         return [(source, None)]
-    if not found:
+    if not results:
         raise FileNotFoundError(f"{source}: no file was found")
-    return found
+    return results
 
 
 def _images_of(folder: str) -> list[str]:

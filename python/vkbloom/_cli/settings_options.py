@@ -60,7 +60,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
     )
     @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
-    @fields.options(METHODS, "own", base=vkbloom.Settings)
+    @fields.options(METHODS, "of_method", base=vkbloom.Settings)
     @click.option(
         "--settings",
         "stored",
@@ -78,7 +78,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         stored: str | None,
         added: tuple[vkbloom.Glare, ...],
         shared: dict[str, Any],
-        own: dict[str, Any],
+        of_method: dict[str, Any],
         **rest: object,
     ) -> object:
         if stored is not None and preset is not None:
@@ -88,7 +88,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             method=method,
             stored=None if stored is None else read_settings(stored),
             added=added,
-            changes={**shared, **own},
+            changes={**shared, **of_method},
             expands="expand" in rest and not rest.get("raw"),
             expand=rest.get("expand"),  # type: ignore[arg-type]
         )
@@ -96,7 +96,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             return command(settings=start.of, **rest)
         images = _images_of(rest)
         # An axis of presets gives every image the same settings.
-        axes: Any = rest.get("axis_words", ())
+        axes: Any = rest.get("words", ())
         has_presets = any(str(word).startswith("preset=") for word in axes)
         settings, expand = start.of_all(images[:1] if has_presets else images)
         if "expand" in rest:
@@ -134,13 +134,13 @@ class Start:
 
     def of_all(self, images: Sequence[str]) -> tuple[vkbloom.Settings, float | None]:
         """Return the settings for image files that have the same, and the value for --expand."""
-        found = list(dict.fromkeys(self.of(image) for image in images or ("",)))
-        if len(found) > 1:
+        results = list(dict.fromkeys(self.of(image) for image in images or ("",)))
+        if len(results) > 1:
             raise click.UsageError(
                 f"files of integers start from the preset {PRESET_OF_PHOTOS}, files of floats from "
                 f"{PRESET_OF_IMAGES}, and here are both; give --preset NAME for all"
             )
-        return found[0]
+        return results[0]
 
     def _begun(self, image: str) -> tuple[vkbloom.Settings, float | None]:
         if self.stored is not None:

@@ -16,8 +16,6 @@ import click
 
 from vkbloom._io import safe_writing
 
-__all__ = ["PIPE", "as_file", "is_stream", "shown"]
-
 #: Stands for standard input and standard output.
 PIPE: Final = "-"
 
@@ -61,11 +59,11 @@ def _copy_of(name: str) -> str:
     if _FOLDER not in context.meta:
         context.meta[_FOLDER] = context.with_resource(tempfile.TemporaryDirectory())
     # The name is kept, because some formats are known by it.
-    place = os.path.join(context.meta[_FOLDER], name.replace("%", "%25").replace(os.sep, "%2F"))
-    if not os.path.exists(place):
-        with _opened(name) as stream, open(place, "wb") as copy:
+    file = os.path.join(context.meta[_FOLDER], name.replace("%", "%25").replace(os.sep, "%2F"))
+    if not os.path.exists(file):
+        with _opened(name) as stream, open(file, "wb") as copy:
             shutil.copyfileobj(stream, copy)
-    return place
+    return file
 
 
 @contextmanager

@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     import vkbloom
-
-# Console width for output to a file or another program, where lines must not be wrapped.
-_UNBROKEN: Final = 4096
 
 _QUIET, _USUAL, _VERBOSE = range(3)
 
@@ -100,19 +95,3 @@ def detail_device(renderer: vkbloom.Renderer) -> None:
     info = renderer.info
     driver = " ".join(filter(None, (info.driver, info.driver_info)))
     detail(f"adapter: {info.name} ({info.type}), {driver}, Vulkan {info.api_version}")
-
-
-def show(renderable: RenderableType) -> None:
-    """Print a rich renderable: wrapped to the terminal's width, or unwrapped without a terminal."""
-    from rich.console import Console  # noqa: PLC0415  costs start-up time
-
-    console = Console(markup=False, highlight=False, emoji=False)
-    if console.is_terminal:
-        console.print(renderable)
-        return
-    console.width = _UNBROKEN
-    with console.capture() as captured:
-        console.print(renderable)
-    # rich pads every cell to the width of its column; strip the padding of the last column.
-    for line in captured.get().splitlines():
-        click.echo(line.rstrip())

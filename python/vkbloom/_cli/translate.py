@@ -30,7 +30,6 @@ from vkbloom._settings.registry import METHODS
     "--size",
     type=SIZE,
     default="640x360",
-    show_default=True,
     help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
     "of the frame at every size but this.",
 )
@@ -60,5 +59,5 @@ def command(
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
         detail_device(renderer)
-        found = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
-    show_results([found])
+        result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
+    show_results([result])

@@ -23,14 +23,13 @@ from vkbloom._settings.settings import SHADINGS, Shading
 _LARGEST: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
 _WAIT_SECONDS: Final = 0.1  # while the window is hidden
-_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BMPSQ", *"123456789")
+_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BPSQ", *"123456789")
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
 @click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
-@click.option("--shading", type=click.Choice(SHADINGS), default="forward", show_default=True)
-@click.option("--mailbox", is_flag=True, help="Each refresh shows the newest frame, not the next.")
-@click.option("-o", "--out", default="view", show_default=True, help="Folder of screenshots.")
+@click.option("--shading", type=click.Choice(SHADINGS), default="forward")
+@click.option("-o", "--out", default="view", help="Folder of screenshots.")
 @live_options(image_has_size=True)
 def command(
     *,
@@ -38,7 +37,6 @@ def command(
     origin: dict[str, Any],
     size: tuple[int, int] | None,
     shading: Shading,
-    mailbox: bool,
     out: str,
     adapter: str,
     validation: bool,
@@ -52,7 +50,7 @@ def command(
     with (
         _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
         vkbloom.Renderer(adapter, validation=validation) as renderer,
-        Surface(renderer, window, mailbox=mailbox) as surface,
+        Surface(renderer, window) as surface,
     ):
         detail_device(renderer)
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
@@ -100,9 +98,8 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
 
 
 def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
-    """Connect keys and the mouse to the state."""
+    """Connect keys to the state."""
     keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
-    last = [0.0, 0.0]
 
     def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
         if action != glfw.RELEASE and key in keys:
@@ -110,12 +107,4 @@ def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> N
             colours = [name for name, (shape, _) in outputs.items() if len(shape) == 3]
             live.press(keys[key], colours)
 
-    def on_move(_: Any, x: float, y: float) -> None:
-        if glfw.get_mouse_button(window, glfw.MOUSE_BUTTON_LEFT) == glfw.PRESS:
-            live.drag(x - last[0], y - last[1])
-        last[:] = x, y
-
     glfw.set_key_callback(window, on_key)
-    if isinstance(live.source, vkbloom.Scene):
-        glfw.set_cursor_pos_callback(window, on_move)
-        glfw.set_scroll_callback(window, lambda _, x, y: live.scroll(y))

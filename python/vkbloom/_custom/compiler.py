@@ -25,6 +25,9 @@ from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.spirv import without_contraction
 from vkbloom._io.disk_cache import DiskCache
 
+if sys.platform == "linux":
+    import resource
+
 #: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result.
 MAX_PROCESSOR_SECONDS: Final = 20
 MAX_SECONDS: Final = 60.0
@@ -131,8 +134,6 @@ def limit(process: int) -> None:
     """Set the limits of a process, where the system can."""
     if sys.platform != "linux":
         return
-    import resource  # noqa: PLC0415  only on Unix
-
     for which, most in (
         (resource.RLIMIT_CPU, MAX_PROCESSOR_SECONDS),
         (resource.RLIMIT_AS, MAX_MEMORY),

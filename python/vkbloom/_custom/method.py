@@ -203,14 +203,14 @@ def load_method(
     """
     read = read_source(source)
     if name is None:
-        name = own_name(Path(read.name).stem if read.name != "<text>" else "own")
+        name = identifier_of(Path(read.name).stem if read.name != "<text>" else "own")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
     known = class_of(name, read, reference)
     return known if known.numpy_reference is reference else registered(name, read, reference)
 
 
-def own_name(stem: str) -> str:
+def identifier_of(stem: str) -> str:
     """Return an identifier for a file's stem."""
     name = re.sub(r"\W", "_", stem)
     return name if name.isidentifier() and not keyword.iskeyword(name) else f"_{name}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import re
 from pathlib import Path
 from typing import Final
 
@@ -12,23 +11,6 @@ from typing import Final
 LARGEST_FILE: Final = 1 << 26
 #: Of a line that a message quotes.
 QUOTED_CHARACTERS: Final = 160
-
-#: What the files of other programs contain, and what to change in them.
-OTHER_SYNTAXES: Final = (
-    (
-        re.compile(r"\bvoid\s+mainImage\s*\("),
-        "this is Shadertoy's syntax: begin with lines '//!HOOK MAIN' and '//!BIND HOOKED', replace "
-        "'void mainImage(out vec4 fragColor, in vec2 fragCoord)' by 'vec4 hook()' that returns the "
-        "colour, 'fragCoord / iResolution.xy' by 'HOOKED_pos' and 'texture(iChannel0, p)' by "
-        "'HOOKED_tex(p)'",
-    ),
-    (
-        re.compile(r'^\s*(?:technique\d*\s+\w|#include\s+"ReShade)|\bSV_Target', re.MULTILINE),
-        "this is ReShade's syntax: write each 'pass' of the technique as a block that begins with "
-        "lines '//!HOOK MAIN' and '//!BIND HOOKED' and defines 'vec4 hook()' in GLSL, a render "
-        "target as '//!SAVE NAME', and an annotated uniform as a block '//!PARAM name'",
-    ),
-)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,11 +61,7 @@ def read_source(source: str | Path) -> Source:
 
 
 def checked(source: Source) -> Source:
-    """Return the source; raise ValueError if it is in the syntax of another program."""
+    """Return the source; raise ValueError if it has a null character."""
     if (place := source.text.find("\0")) >= 0:
         raise source.fault(source.text.count("\n", 0, place) + 1, "the line has a null character")
-    for pattern, advice in OTHER_SYNTAXES:
-        found = pattern.search(source.text)
-        if found and "//!HOOK" not in source.text:
-            raise source.fault(source.text.count("\n", 0, found.start()) + 1, advice)
     return source

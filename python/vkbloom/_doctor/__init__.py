@@ -10,13 +10,10 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 from vkbloom._doctor import child, drivers, installation
 from vkbloom._doctor.finding import Finding, Report
-
-#: Versions of Mesa whose lavapipe the package is tested with.
-TESTED_MESA: Final = ("22.3.6", "25.0.7")
 
 
 def examine() -> Report:
@@ -37,14 +34,13 @@ def examine() -> Report:
     loading = [_loader(listed), *drivers.examine(listed.messages)]
     if any(adapter["bundled"] for adapter in adapters):
         # The bundled driver needs neither loader nor manifest.
-        loading = [one._replace(status=one.status.replace("problem", "note")) for one in loading]
+        loading = [item._replace(status=item.status.replace("problem", "note")) for item in loading]
     findings = [
         installation.package(),
         *installation.memory(),
         *loading,
         *installation.environment(),
         _adapters(listed, any(finding.status == "problem" for finding in loading)),
-        *([_software(adapters)] if adapters else []),
         *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
         *([_chosen(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
@@ -80,35 +76,6 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
     return Finding("adapters", "problem", f"none: {reason}{said}", advice)
 
 
-def _software(adapters: list[Mapping[str, Any]]) -> Finding:
-    topic, advice = "lavapipe", "Check the test render below."
-    found = [adapter for adapter in adapters if adapter["type"] == "cpu"]
-    # As the choice of "software" has it.
-    found.sort(key=lambda adapter: not adapter["bundled"])
-    if not found:
-        advice = f"To use it: {installation.install_wheel('vkbloom-lavapipe')}, or install Mesa's."
-        return Finding(topic, "note", 'there is none; adapter="software" fails', advice)
-    described = found[0]["driver_info"]
-    tested = " and ".join(TESTED_MESA)
-    if "Mesa" not in described:
-        return Finding(
-            topic,
-            "note",
-            f"the software adapter is {found[0]['name']}, not lavapipe, whose versions {tested} "
-            "are tested; it should work",
-            "Check the test render below.",
-        )
-    # As in "Mesa 22.3.6 (LLVM 15.0.6)"; a distribution may append its own revision.
-    version = re.match(r"Mesa ([\d.]+)", described)
-    if version and version[1] in TESTED_MESA:
-        return Finding(topic, "ok", f"{described}, one of the tested versions ({tested})")
-    text = f"{described} is not one of the tested versions ({tested}), but should work"
-    if "Mesa" not in described:
-        name = f"the software adapter is {found[0]['name']}, not lavapipe"
-        text = f"{name}, whose versions {tested} are tested; it should work"
-    return Finding(topic, "note", text, advice)
-
-
 def _chosen(chosen: child.Answer) -> Finding:
     topic, wanted = "chosen adapter", os.environ.get("VKBLOOM_ADAPTER")
     reason = (
@@ -130,8 +97,8 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
         advice = installation.memory_advice() or advice
         return Finding(topic, "problem", f"{name} fails: {answer.failure}", advice)
     if answer.value["differences"]:
-        found = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
-        return Finding(topic, "problem", found, f"{advice} Do not trust its framebuffers.")
+        text = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
+        return Finding(topic, "problem", text, f"{advice} Do not trust its framebuffers.")
     return Finding(topic, "ok", f"{name} renders the expected values in all framebuffers")
 
 
@@ -145,9 +112,9 @@ def _validation(adapter: str) -> Finding:
         "is not installed": "it is not installed",
         "needs the system's": "there is no loader",
     }
-    for said, found in missing.items():
+    for said, text in missing.items():
         if said in answer.failure:
             advice = "To use validation=True: apt install libvulkan1 vulkan-validationlayers."
-            return Finding(topic, "note", found, advice)
+            return Finding(topic, "note", text, advice)
     advice = "Install the layer again, in the loader's version, or do not use validation=True."
     return Finding(topic, "problem", f"the test render fails with it: {answer.failure}", advice)

@@ -29,7 +29,10 @@ _REPLACING: Final = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
 
 def names(adapters: Iterable[Mapping[str, Any]]) -> str:
     """Return the names and types of adapters."""
-    kinds = ((one["name"], f"{one['type']}{', bundled' * one['bundled']}") for one in adapters)
+    kinds = (
+        (adapter["name"], f"{adapter['type']}{', bundled' * adapter['bundled']}")
+        for adapter in adapters
+    )
     return ", ".join(f"{name} ({kind})" for name, kind in kinds)
 
 
@@ -50,15 +53,15 @@ def examine(log: Sequence[str]) -> list[Finding]:
     files = [path for path in paths if path.endswith(".json")]
     if files:
         folders = dict.fromkeys(str(Path(file).parent) for file in files)
-        found = f"{len(files)} manifests in {', '.join(folders)}"
-        return [Finding("drivers", "ok", found), *map(manifest, files)]
+        text = f"{len(files)} manifests in {', '.join(folders)}"
+        return [Finding("drivers", "ok", text), *map(manifest, files)]
     replacing = [name for name in _REPLACING if name in os.environ]
     if not paths and not replacing:
         return [Finding("drivers", "note", "the loader's log does not tell where it searches")]
     where = ", ".join([*paths, *(f"{name}={os.environ[name]}" for name in replacing)])
     advice = f"Unset {' and '.join(replacing)}, or name a driver's manifest by its full path."
-    found = f"no manifest of a Vulkan driver was found in {where}"
-    return [Finding("drivers", "problem", found, advice if replacing else INSTALL_DRIVER)]
+    text = f"no manifest of a Vulkan driver was found in {where}"
+    return [Finding("drivers", "problem", text, advice if replacing else INSTALL_DRIVER)]
 
 
 def manifest(file: str) -> Finding:
@@ -70,8 +73,8 @@ def manifest(file: str) -> Finding:
         return Finding(topic, "problem", f"{file} cannot be read: {error.strerror}", advice)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         # Some loaders then find no driver at all and report VK_ERROR_OUT_OF_HOST_MEMORY.
-        found = f"{file} is damaged: {type(error).__name__}: {error}"
-        return Finding(topic, "problem", found, advice)
+        text = f"{file} is damaged: {type(error).__name__}: {error}"
+        return Finding(topic, "problem", text, advice)
     answer = child.ask("adapters", "system", environment=LOG | dict.fromkeys(_REPLACING, file))
     if answer.value is not None:
         return Finding(topic, "ok", f"{file}: {names(answer.value['adapters']) or 'no device'}")
@@ -81,5 +84,5 @@ def manifest(file: str) -> Finding:
     if not said and answer.failure.startswith("no Vulkan adapter"):
         return Finding(topic, "note", f"{file}: of another architecture, or without a device here")
     advice = installation.memory_advice() or advice
-    found = "; ".join([f"{file}: {answer.failure}", *dict.fromkeys(said)])
-    return Finding(topic, "problem", found, advice)
+    text = "; ".join([f"{file}: {answer.failure}", *dict.fromkeys(said)])
+    return Finding(topic, "problem", text, advice)

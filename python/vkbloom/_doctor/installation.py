@@ -27,17 +27,17 @@ _VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|E
 
 def package() -> Finding:
     """Return the versions of vkbloom, Python, NumPy and the platform."""
-    found = f"version {metadata.version('vkbloom')}, Python {platform.python_version()}, NumPy "
-    return Finding("vkbloom", "ok", f"{found}{np.__version__}, {platform.platform()}")
+    text = f"version {metadata.version('vkbloom')}, Python {platform.python_version()}, NumPy "
+    return Finding("vkbloom", "ok", f"{text}{np.__version__}, {platform.platform()}")
 
 
 def core() -> list[Finding]:
     """Report a core that cannot be loaded, as in the wheel for all systems."""
     if not (reason := getattr(_core, "absence", "")):
         return []
-    found = f"it cannot be loaded: {reason}; laws and the reference work, and nothing renders"
+    text = f"it cannot be loaded: {reason}; laws and the reference work, and nothing renders"
     advice = "Install the wheel for this system (Linux), or build vkbloom from its source."
-    return [Finding("core", "problem", found, advice)]
+    return [Finding("core", "problem", text, advice)]
 
 
 def memory() -> list[Finding]:
@@ -45,9 +45,9 @@ def memory() -> list[Finding]:
     left = address_space_left()
     if left is None or left >= _AMPLE:
         return []
-    found = f"memory is short: a limit leaves {left >> 20} MiB of address space to each process"
-    found += f"; a driver and a test render need up to {_AMPLE >> 20} MiB, and may crash with less"
-    return [Finding("memory", "problem", found, f"To render: {ADVICE}.")]
+    text = f"memory is short: a limit leaves {left >> 20} MiB of address space to each process"
+    text += f"; a driver and a test render need up to {_AMPLE >> 20} MiB, and may crash with less"
+    return [Finding("memory", "problem", text, f"To render: {ADVICE}.")]
 
 
 def memory_advice() -> str:
@@ -59,8 +59,8 @@ def environment() -> list[Finding]:
     """Report the set environment variables that change the rendering or choose the device."""
     variables = sorted(name for name in os.environ if _VARIABLES.fullmatch(name))
     listed = ", ".join(f"{name}={os.environ[name]}" for name in variables)
-    found = f"these variables change the rendering or choose the device: {listed}"
-    return [Finding("environment", "note", found)] if variables else []
+    text = f"these variables change the rendering or choose the device: {listed}"
+    return [Finding("environment", "note", text)] if variables else []
 
 
 def extras() -> list[Finding]:
@@ -75,7 +75,11 @@ def extras() -> list[Finding]:
 
 
 def _extra(name: str, distributions: list[str]) -> Finding:
-    missing = [one for one in distributions if not any(metadata.distributions(name=one))]
+    missing = [
+        distribution
+        for distribution in distributions
+        if not any(metadata.distributions(name=distribution))
+    ]
     if missing:
         advice = f"To use it: pip install 'vkbloom[{name}]'"
         if missing[0] in _UNPUBLISHED:
@@ -95,20 +99,20 @@ def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
     nodes = sorted([*Path("/dev/dri").glob("renderD*"), *Path("/dev").glob("nvidia[0-9]*")])
     if not nodes or has_gpu_adapter:
         return []
-    found = f"{', '.join(map(str, nodes))}, but no Vulkan adapter that uses it"
+    text = f"{', '.join(map(str, nodes))}, but no Vulkan adapter that uses it"
     advice = "Install the Vulkan driver of the GPU's vendor. In a container, mount the driver."
     if all(os.access(node, os.R_OK | os.W_OK) for node in nodes):
-        return [Finding("GPU", "note", found, advice)]
+        return [Finding("GPU", "note", text, advice)]
     advice = 'Add this user to the group that owns it, often "render" or "video".'
-    return [Finding("GPU", "problem", f"{found}: this user cannot open it", advice)]
+    return [Finding("GPU", "problem", f"{text}: this user cannot open it", advice)]
 
 
 def caches() -> list[Finding]:
     """Examine whether the caches of vkbloom and of the drivers can be written."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     drivers = ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
-    found = [_cache("VKBLOOM_CACHE_DIR", disk_cache.folder())]
-    return found + [_cache(name, os.environ.get(name) or home) for name in drivers]
+    results = [_cache("VKBLOOM_CACHE_DIR", disk_cache.folder())]
+    return results + [_cache(name, os.environ.get(name) or home) for name in drivers]
 
 
 def _cache(variable: str, folder: str | Path | None) -> Finding:
@@ -121,6 +125,6 @@ def _cache(variable: str, folder: str | Path | None) -> Finding:
         with tempfile.TemporaryDirectory(dir=existing):
             return Finding(topic, "ok", f"{folder}, writable")
     except OSError as error:
-        found = f"{folder} is not writable ({existing}: {error.strerror or error})"
+        text = f"{folder} is not writable ({existing}: {error.strerror or error})"
         advice = f"Set {variable} to a writable folder, or each process compiles again."
-        return Finding(topic, "note", found, advice)
+        return Finding(topic, "note", text, advice)

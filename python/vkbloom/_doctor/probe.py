@@ -30,10 +30,10 @@ _TOLERANCE: Final = 3.0
 def differences(frames: vkbloom.Frames) -> list[str]:
     """Compare the framebuffers of `IMAGE` with those of `vkbloom.reference`."""
     expected = reference.apply(IMAGE, SETTINGS)
-    found = {name: np.abs(frames[name] - 255.0 * array).max() for name, array in expected.items()}
+    results = {name: np.abs(frames[name] - 255.0 * array).max() for name, array in expected.items()}
     return [
         f"{name} differs by up to {difference:.3g}; {_TOLERANCE:g} is allowed"
-        for name, difference in found.items()
+        for name, difference in results.items()
         # Written this way, NaN counts as a difference.
         if not difference <= _TOLERANCE
     ]
@@ -41,22 +41,22 @@ def differences(frames: vkbloom.Frames) -> list[str]:
 
 def adapters(which: str) -> dict[str, Any]:
     """Return the adapters of the system's loader, and unless `which` is "system" the bundled."""
-    found: list[dict[str, Any]] = []
+    results: list[dict[str, Any]] = []
     reasons: list[str] = []
     for driver in ("",) if which == "system" else dict.fromkeys(("", bundled_driver())):
         try:
-            found += map(dataclasses.asdict, map(from_core, _core.adapters(driver)))
+            results += map(dataclasses.asdict, map(from_core, _core.adapters(driver)))
         except vkbloom.AdapterNotFoundError as error:
             reasons.append(_one_line(error))
     reason = "; ".join(reasons)
-    return {"adapters": found, "reason": reason} if found or not reason else {"failure": reason}
+    return {"adapters": results, "reason": reason} if results or not reason else {"failure": reason}
 
 
 def render(adapter: str, validation: str) -> dict[str, Any]:
     """Make the test render, with the validation layer if `validation` is "validated"."""
     with vkbloom.Renderer(adapter, validation=validation == "validated") as renderer:
-        info, found = renderer.info, differences(renderer.apply(IMAGE, SETTINGS))
-        return {"name": info.name, "summary": info.summary, "differences": found}
+        info, results = renderer.info, differences(renderer.apply(IMAGE, SETTINGS))
+        return {"name": info.name, "summary": info.summary, "differences": results}
 
 
 def _one_line(error: Exception) -> str:

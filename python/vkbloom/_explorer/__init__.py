@@ -1,21 +1,11 @@
-"""The explorer: controls for all settings and a live picture, in a notebook or on a web page.
-
-==================== ====================================================================
-`controls`           the fields of the settings as descriptions of controls; settings as code
-`viewer`             one viewer: takes the page's messages, returns pictures and values
-`shown`              framebuffers as PNG, optimized for speed
-`custom_files`          the files of custom methods, which are loaded again when they change
-`widget`             the page in a notebook (anywidget)
-`server`             the page on 127.0.0.1 (tornado), for ``vkbloom explore``
-``page.js``, ``.css`` the page itself, the same for both
-==================== ====================================================================
-"""
+"""The explorer: controls for all settings and a live picture, in a notebook or on a web page."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._checks import import_extra
+from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,8 +14,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.renderer import Renderer
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
-
-__all__ = ["explore"]
 
 
 def explore(
@@ -84,7 +72,6 @@ def explore(
     texels looks wider in a reduced frame.
     """
     import_extra("anywidget", "notebook", "explore")
-    from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  needs the renderer's module
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(

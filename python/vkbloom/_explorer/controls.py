@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom import psf
-from vkbloom._custom.method import CustomType, own_name
+from vkbloom._custom.method import CustomType, identifier_of
 from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.glare import Glare
 from vkbloom._settings.registry import METHODS, STAGES, glares, presets
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import PSF, functions
-
-__all__ = ["as_code", "as_fields", "code_with_image", "controls", "described", "settings_from"]
 
 # Fields of everyday use: these, in this order, with the numbers that only this method has between
 # them.
@@ -46,30 +44,28 @@ _STEPS: Final = 200
 
 
 def controls() -> dict[str, Any]:
-    """Describe methods, point-spread functions, stages and presets.
+    """Describe methods, point-spread functions, stages of glare and presets.
 
-    Returns: "methods": for each method its "defaults", and for each field with a control its
-    "name", "kind" ("bool", "number", "choice"), "help", whether it comes "first", and whether it is
-    "optional" (may be None). Numbers have "from", "to" and "step" of their slider, the accepted
-    range from "low" to "high", and "integer"; choices have "choices", and may have a name for
-    "none" of them. "functions": the same for the point-spread functions of a convolution; the name
-    of a field of the mask begins with "mask.". "glare": "stages", the same for the stages of glare,
-    and "presets", for each name of `glares` its stages. "presets": settings by name, as from
-    `Settings.to_dict`. "look": the fields that keep their values when another preset or method is
-    selected.
+    Of each field with a control: its "name", "kind" ("bool", "number", "choice"), "help", whether
+    it comes "first" and may be None ("optional"). Numbers have "from", "to" and "step" of their
+    slider, and the accepted range "low" to "high". "look": the fields that keep their values when
+    another preset or method is selected.
     """
     return {
         "methods": {name: described(kind) for name, kind in METHODS.items()},
         "functions": {
-            type(one).__name__: {"defaults": one.to_dict(), "fields": _fields_of_function(one)}
-            for one in _functions()
+            type(function).__name__: {
+                "defaults": function.to_dict(),
+                "fields": _fields_of_function(function),
+            }
+            for function in _functions()
         },
         "glare": {
             "stages": {
                 name: {"defaults": kind().to_dict(), "fields": _controls(kind)}
                 for name, kind in STAGES.items()
             },
-            "presets": {name: [one.to_dict() for one in some] for name, some in glares.items()},
+            "presets": {name: [item.to_dict() for item in some] for name, some in glares.items()},
         },
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
         "look": _LOOK,
@@ -100,8 +96,8 @@ def _functions() -> list[PSF]:
 
 def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
     shared = fields_of(Settings)
-    found = _controls(kind)
-    for control in found:
+    result = _controls(kind)
+    for control in result:
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
         is_own = control["name"] not in shared and control["name"] not in _RARE
@@ -113,24 +109,24 @@ def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
             return 0, _FIRST.index(name)
         return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
 
-    return sorted(found, key=place)
+    return sorted(result, key=place)
 
 
-def _fields_of_function(one: PSF) -> list[dict[str, Any]]:
-    found = _controls(type(one))
-    mask = getattr(one, "mask", None)
+def _fields_of_function(function: PSF) -> list[dict[str, Any]]:
+    result = _controls(type(function))
+    mask = getattr(function, "mask", None)
     if dataclasses.is_dataclass(mask):
-        found += [
+        result += [
             control | {"name": f"mask.{control['name']}"} for control in _controls(type(mask))
         ]
-    return found
+    return result
 
 
 def _controls(kind: type[Any]) -> list[dict[str, Any]]:
-    found = ((info, _control(info)) for info in fields_of(kind).values())
+    result = ((info, _control(info)) for info in fields_of(kind).values())
     return [
         {"name": info.name, "help": info.help, "optional": info.optional} | control
-        for info, control in found
+        for info, control in result
         if control is not None
     ]
 
@@ -205,7 +201,7 @@ def _maker(kind: Any) -> str:
         return str(kind.__name__)
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
-    name = "" if own_name(Path(path).stem) == kind.method else f', name="{kind.method}"'
+    name = "" if identifier_of(Path(path).stem) == kind.method else f', name="{kind.method}"'
     return f"vkbloom.load_method({source}{name})"
 
 
@@ -219,8 +215,8 @@ def _arguments(settings: Settings, begun: Settings) -> str:
 
 
 def _literal(value: object) -> str:
-    if isinstance(value, tuple) and value and all(isinstance(one, Glare) for one in value):
-        return f"({', '.join(f'vkbloom.{one!r}' for one in value)},)"
+    if isinstance(value, tuple) and value and all(isinstance(item, Glare) for item in value):
+        return f"({', '.join(f'vkbloom.{item!r}' for item in value)},)"
     if isinstance(value, PSF):
         return f"vkbloom.psf.{value!r}"
     # Names of choices need no escapes.

@@ -14,8 +14,6 @@ from vkbloom._settings.registry import METHODS
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-__all__ = ["CustomFiles", "current"]
-
 
 class CustomFiles:
     """The custom methods that a page knows, and the errors of their files."""
@@ -47,8 +45,8 @@ class CustomFiles:
         if not isinstance(kind, CustomType) or kind.file.source.name == "<text>":
             return
         try:
-            found = os.stat(kind.file.source.name)
-            stamp = (found.st_mtime_ns, found.st_size)
+            result = os.stat(kind.file.source.name)
+            stamp = (result.st_mtime_ns, result.st_size)
             if self._read.get(name) == stamp:
                 return
             self._read[name] = stamp

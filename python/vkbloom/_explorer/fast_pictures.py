@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._views import pictures
 
-__all__ = ["picture_of", "texts_of"]
-
 # Compression level of zlib. The pictures go to a browser on this machine or through a notebook
 # server, where compressing takes longer than sending a larger file.
 _LEVEL: Final = 1

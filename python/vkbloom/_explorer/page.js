@@ -192,33 +192,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     copying.textContent = "Copied";
     setTimeout(() => (copying.textContent = "Copy as code"), 1500);
   });
-  const pickerOf = (label, take) => {
-    const picker = make("input", { type: "file", hidden: true, ariaLabel: label });
-    picker.addEventListener("change", () => {
-      if (picker.files.length) take(picker.files[0]);
-      picker.value = "";
-    });
-    return picker;
-  };
-  const picker = pickerOf("image or settings", openFile);
-  // What of an image glows: a button opens a file, or removes the one that is there.
-  const glowButtons = Object.entries({
-    mask: "A grey image of the same size: white glows, black does not",
-    emission: "An image of the same size that glows in place of the image",
-  }).map(([name, title]) => {
-    const file = pickerOf(name, (chosen) => openFile(chosen, name));
-    const toggle = button(name, () =>
-      name in setup.glows ? send({ kind: "open", view, as: name, name: "" }, []) : file.click(),
-    );
-    const show = () => {
-      toggle.hidden = !setup?.glows;
-      if (toggle.hidden) return;
-      const given = name in setup.glows;
-      toggle.textContent = given ? `Remove ${name}` : `Open ${name} …`;
-      toggle.title = given ? setup.glows[name] : title;
-    };
-    show();
-    return { show, parts: [toggle, file] };
+  const picker = make("input", { type: "file", hidden: true, ariaLabel: "image or settings" });
+  picker.addEventListener("change", () => {
+    if (picker.files.length) openFile(picker.files[0]);
+    picker.value = "";
   });
   const files = make(
     "div",
@@ -232,7 +209,6 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       download(new Blob([text], { type: "application/json" }), "settings.json");
     }),
     button("Reset", reset, { title: "Settings and view as they were at first" }),
-    ...glowButtons.flatMap(({ parts }) => parts),
     picker,
   );
   const foot = make(
@@ -614,12 +590,12 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   // --- files ----------------------------------------------------------------------------------
 
-  async function openFile(file, as = "image") {
+  async function openFile(file) {
     complaint.textContent = "";
     try {
-      if (as === "image" && /\.json$/i.test(file.name)) return use(await readSettings(file));
+      if (/\.json$/i.test(file.name)) return use(await readSettings(file));
       const content = new Uint8Array(await file.arrayBuffer());
-      send({ kind: "open", view, as, name: file.name }, [content]);
+      send({ kind: "open", view, name: file.name }, [content]);
     } catch (error) {
       complaint.textContent = `${file.name}: ${error.message}`;
     }
@@ -635,14 +611,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   // The source is another one. A scene's settings are not kept for an image.
   function opened(source) {
-    if (source.as !== "image") {
-      setup.glows = source.glows;
-      showGlows();
-      request(...SIDES);
-      return;
-    }
     Object.assign(setup, source);
-    showGlows();
     for (const side of SIDES) settings[side] = setup.sides[side];
     pause();
     pointer = null;
@@ -687,10 +656,6 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       request(...SIDES.filter((side) => settings[side].method === name));
     }
     watchFiles();
-  }
-
-  function showGlows() {
-    for (const one of glowButtons) one.show();
   }
 
   function savePicture() {
@@ -829,7 +794,6 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   function build(message) {
     setup = message;
-    showGlows();
     restore(store?.read());
     store?.watch(restore);
     measure();

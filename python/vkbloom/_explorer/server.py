@@ -26,8 +26,6 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from vkbloom._explorer.viewer import Viewer
 
-__all__ = ["Server"]
-
 _ADDRESS: Final = "127.0.0.1"
 _FILES: Final = resources.files("vkbloom._explorer")
 _TYPES: Final = {

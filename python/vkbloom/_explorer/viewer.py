@@ -13,9 +13,7 @@ frame    sides: settings of "a", "b" or both;          of each side: a picture (
                                                        code, the values under the pointer; or an
                                                        error
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
-open     name; the content of a file as a buffer;      source, and the settings to begin with
-         as: "image", "mask" or "emission"; without a
-         file the mask or the emission is removed
+open     name; the content of a file as a buffer       source, and the settings to begin with
 save     settings; all else as of frame                a picture of the source's own size
 methods                                                the custom methods whose files changed, as in
                                                        setup, and the errors of their files
@@ -48,10 +46,8 @@ from vkbloom._explorer.controls import (
 )
 from vkbloom._explorer.custom_files import CustomFiles, current
 from vkbloom._explorer.fast_pictures import picture_of, texts_of
-from vkbloom._io import image_reading
 from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.glows import alike, grey_mask
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import image_source, scene_source
@@ -65,7 +61,6 @@ if TYPE_CHECKING:
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
 
-__all__ = ["GLOW", "SIDES", "Viewer"]
 
 SIDES: Final = ("a", "b")
 #: The glow's intensity in the default scene: bright enough to show the differences between the
@@ -79,8 +74,6 @@ _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
 _LARGEST_GLOW: Final = 1e4
 # A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
-
-_GLOWS: Final = ("mask", "emission")
 
 Answer = tuple[dict[str, Any], list[bytes]]
 
@@ -170,7 +163,6 @@ class Viewer:
         if mask is not None:
             # With a channel axis, as `reduced` requires.
             given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
-        self._glows = {name: "" for name in given if name != "image"}
         self._scene, self._image = None, given
         self._own_size = (image.shape[1], image.shape[0])
         self._reduced = (self._own_size, self._image)
@@ -220,7 +212,7 @@ class Viewer:
         """Return a description of the source, and the initial settings."""
         scene = self._scene
         return {
-            "sides": {side: as_fields(current(one)) for side, one in self.settings.items()},
+            "sides": {side: as_fields(current(item)) for side, item in self.settings.items()},
             "name": self._name,
             "note": self._note,
             "animated": scene is not None,
@@ -228,17 +220,12 @@ class Viewer:
             "shadings": [] if scene is None else list(SHADINGS),
             "shading": self._shading,
             "glow": None if scene is None or scene.glow is None else scene.glow_intensity,
-            "glows": None if scene is not None else self._glows,
         }
 
     def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
-        """Replace the source by an image file, or its mask or its emission."""
+        """Replace the source by an image file."""
         name = PurePath(str(message.get("name", ""))).name
-        kind = message.get("as", "image")
-        if kind in _GLOWS:
-            self._open_glow(kind, name, files)
-            return {"as": kind, **self._source()}, []
-        image, is_photo = _read(name, files, expand=PHOTO_EXPANSION)
+        image, is_photo = _read(name, files)
         was_scene = self._scene is not None
         self._show_image(image)
         self._named(name, PHOTO_EXPANSION if is_photo else None)
@@ -246,26 +233,7 @@ class Viewer:
         # With a scene's settings a photograph would be white.
         if was_scene or self.settings["a"] == self._default:
             self._begin(None, is_photo=is_photo)
-        return {"as": "image", **self._source()}, []
-
-    def _open_glow(self, kind: str, name: str, files: Sequence[bytes]) -> None:
-        """Give the image a mask or an emission, or take it away."""
-        if self._scene is not None:
-            raise ValueError(f"{kind}: the source is a scene; open an image first")
-        image = self._image["image"]
-        given = {one: array for one, array in self._image.items() if one != kind}
-        glows = {one: text for one, text in self._glows.items() if one != kind}
-        if files:
-            glows[kind] = name
-            given[kind] = (
-                check_emission(alike(_read(name, files)[0], image), image)
-                if kind == "emission"
-                else check_mask(_read(name, files, is_mask=True)[0], image.shape[:2])[
-                    ..., np.newaxis
-                ]
-            )
-        self._image, self._glows = given, glows
-        self._reduced = (self._own_size, given)
+        return self._source(), []
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
@@ -315,7 +283,7 @@ class Viewer:
                 "dtype": str(frames[shown].dtype),
                 "note": _note_of(settings, shown),
                 "code": code_with_image(settings, self._file, self._expand),
-                "plan": [one._asdict() for one in plan],
+                "plan": [item._asdict() for item in plan],
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
             }
@@ -394,10 +362,8 @@ class Viewer:
         return arrays
 
 
-def _read(
-    name: str, files: Sequence[bytes], *, is_mask: bool = False, expand: float | None = None
-) -> tuple[NDArray[Any], bool]:
-    """Return the image of a file's content, and whether it has integers; errors name the file."""
+def _read(name: str, files: Sequence[bytes]) -> tuple[NDArray[Any], bool]:
+    """Return the image of a file, its highlights expanded, and whether it has integers."""
     if len(files) != 1:
         raise ValueError("open: the message does not have the content of one file")
     with tempfile.TemporaryDirectory() as folder:
@@ -405,10 +371,7 @@ def _read(
         path = Path(folder, f"image{PurePath(name).suffix[:8]}")
         path.write_bytes(files[0])
         try:
-            if is_mask:
-                picture = image_reading.decode(image_reading.load(path), "linear")
-                return grey_mask(picture.pixels, name), True
-            image, facts = read(path, expand=expand, metadata=True)
+            image, facts = read(path, expand=PHOTO_EXPANSION, metadata=True)
             return image, facts["numbers"].startswith("uint")
         except (OSError, ValueError) as error:
             text = str(error).replace(str(path), name)

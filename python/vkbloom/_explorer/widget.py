@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
     from vkbloom._settings.settings import Settings
 
-__all__ = ["Explorer"]
 
 _FILES: Final = resources.files("vkbloom._explorer")
 # Traits of the sides' settings.
@@ -36,7 +35,7 @@ def _settings_trait(side: str) -> Any:
         except (TypeError, ValueError):
             return widget._viewer.settings[side]
 
-    return traitlets.Any().tag(sync=True, to_json=lambda one, _: as_fields(one), from_json=read)
+    return traitlets.Any().tag(sync=True, to_json=lambda item, _: as_fields(item), from_json=read)
 
 
 class Explorer(anywidget.AnyWidget):
@@ -72,10 +71,10 @@ class Explorer(anywidget.AnyWidget):
         is_text = isinstance(message, Mapping) and bool(message.get("text"))
         files = [bytes(buffer) for buffer in buffers]
         if is_text:
-            files = [base64.b64decode(one) for one in message.get("files", ())]
+            files = [base64.b64decode(item) for item in message.get("files", ())]
         header, pictures = self._viewer.answer(message, files)
         if is_text:
-            header["pictures"] = [base64.b64encode(one).decode() for one in pictures]
+            header["pictures"] = [base64.b64encode(picture).decode() for picture in pictures]
             pictures = []
         header["count"] = len(pictures)
         for name, side in _TRAITS.items():

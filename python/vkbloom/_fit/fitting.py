@@ -138,12 +138,6 @@ def fit(
         target has another size or is black; an argument is out of range; or, with `gradient`, a
         field or the loss has no derivative, or the image is an `Image`.
 
-    See Also
-    --------
-    translate : Settings of another method, without a picture.
-    fit_pyramid : The weights of a pyramid for a point-spread function.
-    grid : All combinations of some values.
-
     Notes
     -----
     Images of more than 384 pixels are reduced first, by boxes. There,
@@ -158,22 +152,6 @@ def fit(
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
     have it.
-
-    Examples
-    --------
-    >>> image = np.random.default_rng(0).random((48, 64, 3), np.float32) ** 8 * 10
-    >>> target = vkbloom.reference.apply(image, vkbloom.Pyramid(threshold=1.3, levels=3))["bloom"]
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     found = vkbloom.fit(
-    ...         image,
-    ...         target,
-    ...         vkbloom.Pyramid(threshold=0.5),
-    ...         ["threshold", "levels"],
-    ...         framebuffer="bloom",
-    ...         renderer=renderer,
-    ...     )
-    >>> round(found.settings.threshold, 2), found.settings.levels
-    (1.3, 3)
     """
     is_all = isinstance(settings, str) and settings == "all"
     candidates = _candidates(settings)

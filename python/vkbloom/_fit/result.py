@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -16,13 +14,12 @@ from vkbloom._fit.losses import Loss
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
 from vkbloom._views import markup, pictures
-from vkbloom._views.markup import Markup, element
+from vkbloom._views.markup import element
 
 # The smallest shares of the loss without bloom that a good and a fair fit explain.
 _GOOD, _FAIR = 0.95, 0.8
 
-_WIDTH, _HEIGHT = 300, 180  # pixels of a diagram
-_COLOURS = ("#5b8def", "#d9822b")
+_WIDTH = 300  # pixels of a picture
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,7 +106,7 @@ class FitResult:
         return f"{self.verdict}: {self.cause}" if self.cause else self.verdict
 
     def _repr_html_(self) -> str:
-        """Return a report: pictures, radial profile, and the loss over the calls."""
+        """Return a report with pictures."""
         found = self.target + self.residual
         peak = float(np.percentile(self.target.max(axis=2), 99.9)) or 1.0
         largest = float(np.abs(self.residual).max()) or 1.0
@@ -126,12 +123,6 @@ class FitResult:
             style = f"width:{_WIDTH}px;max-width:100%;image-rendering:pixelated"
             image = markup.image(data, name, style=style)
             parts.append(markup.figure(image, element("b", name), f" {note}", style="margin:0"))
-        radii, profiles = radial_profiles((found, self.target))
-        best = np.minimum.accumulate(self.history)
-        parts += [
-            diagram("radial profile", radii, profiles, (self.framebuffer, "target"), "pixels"),
-            diagram("loss", np.arange(1, len(best) + 1.0), [best], ("best so far",), "calls"),
-        ]
         summary = (
             f", from a loss ({self.loss_name}) of {self.start_loss:.3g}, in {self.seconds:.1f} s"
         )
@@ -145,81 +136,6 @@ class FitResult:
             style="color:inherit;font-size:13px;max-width:68em",
         )
         return str(report)
-
-
-def radial_profiles(
-    images: Sequence[NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Return the mean of images in rings around the brightest pixel of the last one."""
-    planes = [image.mean(axis=2) for image in images]
-    height, width = planes[-1].shape
-    y, x = np.unravel_index(int(planes[-1].argmax()), planes[-1].shape)
-    distance = np.hypot(np.arange(width) - x, (np.arange(height) - y)[:, np.newaxis])
-    count = max(2, int(math.log(max(2.0, float(distance.max()))) / math.log(1.25)))
-    edges = np.concatenate([[0.0], 0.9 * 1.25 ** np.arange(count + 1)])
-    ring = np.searchsorted(edges, distance.ravel(), side="right") - 1
-    size = np.bincount(ring, minlength=len(edges))
-    lit = size > 0
-    middle = np.bincount(ring, distance.ravel(), len(edges))[lit] / size[lit]
-    sums = [np.bincount(ring, plane.ravel(), len(edges))[lit] / size[lit] for plane in planes]
-    return middle + 0.5, sums
-
-
-def diagram(
-    title: str,
-    x: NDArray[np.float64],
-    lines: Sequence[NDArray[np.float64]],
-    labels: Sequence[str],
-    unit: str,
-) -> Markup:
-    """Return curves on double logarithmic axes as SVG; values of 0 and less are left out."""
-    values = np.concatenate([line[line > 0] for line in lines])
-    if not values.size:
-        return Markup()
-    top = float(values.max())
-    bottom = max(float(values.min()), top * 1e-6)
-    span = math.log(top / bottom) or 1.0
-    across = math.log(float(x[-1] / x[0])) or 1.0
-    shapes = []
-    for number, line in enumerate(lines):
-        points = " ".join(
-            f"{_WIDTH * math.log(place / x[0]) / across:.1f},"
-            f"{_HEIGHT * (1 - math.log(max(value, bottom) / bottom) / span):.1f}"
-            for place, value in zip(x, line, strict=True)
-            if value > 0
-        )
-        shapes.append(
-            element(
-                "polyline",
-                points=points,
-                fill="none",
-                stroke=_COLOURS[number],
-                stroke_width=2 - number,
-            )
-        )
-    box = element(
-        "rect",
-        width=_WIDTH,
-        height=_HEIGHT,
-        fill="none",
-        stroke="currentColor",
-        stroke_opacity=0.3,
-    )
-    drawn = element(
-        "svg",
-        box,
-        *shapes,
-        width=_WIDTH,
-        height=_HEIGHT,
-        viewBox=f"-2 -2 {_WIDTH + 4} {_HEIGHT + 4}",
-        role="img",
-        aria_label=title,
-    )
-    key: list[object] = []
-    for colour, label in zip(_COLOURS, labels, strict=False):
-        key += [" ", element("span", label, style=f"color:{colour}")]
-    ends = f"; {x[0]:.3g} to {x[-1]:.3g} {unit}, {bottom:.2g} to {top:.2g}"
-    return markup.figure(drawn, element("b", title), *key, ends, style="margin:0")
 
 
 def loss_text(loss: Loss) -> str:

@@ -96,23 +96,6 @@ def translate(
         `settings` are those of the method `to`; ``final`` was compared, without tone curve and
         encoding.
 
-    See Also
-    --------
-    fit : Finds the settings of a picture.
-    psf.measured : The point spread of settings.
-
-    Examples
-    --------
-    Kawase's chain by a pyramid:
-
-    >>> found = vkbloom.translate(
-    ...     vkbloom.DualKawase(levels=3, intensity=0.5),
-    ...     vkbloom.Pyramid(),
-    ...     size=(96, 64),
-    ...     max_calls=40,
-    ... )
-    >>> type(found.settings).__name__, found.loss < found.start_loss
-    ('Pyramid', True)
     """
     if not callable(settings):
         check_settings(settings)

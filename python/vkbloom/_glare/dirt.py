@@ -13,14 +13,12 @@ from vkbloom._checks import check_number
 from vkbloom._core_kernel import CoreKernel, core_kernel
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field
+from vkbloom.psf._sampled import check_values
 
 DirtMode = Literal["multiply", "lerp"]
 
 
 def _read_image(image: Any) -> Any:
-    # Imported here, since settings are used without point-spread functions, too.
-    from vkbloom.psf._sampled import check_values  # noqa: PLC0415
-
     return check_values("image", image)
 
 
@@ -44,15 +42,6 @@ class Dirt(Glare):
     -----
     Source: "multiply" from google/filament, colorGrading.mat @ 263d042924de; "lerp" from
     godotengine/godot, tonemap.glsl @ 001c8c9c24dc (the glow map).
-
-    Examples
-    --------
-    >>> image = np.ones((4, 4, 3), np.float32)
-    >>> dirt = vkbloom.Dirt(image=[[0.5, 1]], mode="lerp", strength=0.5)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     final = renderer.apply(image, vkbloom.Pyramid(glare=(dirt,)))["final"]
-    >>> final[0, :, 0]
-    array([1.75  , 1.8125, 1.9375, 2.    ], dtype=float32)
     """
 
     stage: ClassVar[str] = "dirt"

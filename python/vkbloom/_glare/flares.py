@@ -49,16 +49,6 @@ class Ghosts(GlareLight):
     Source: Chapman, "Pseudo Lens Flare", 2013. The weights are those of three.js
     (LensflareNode.js), Blender and Unity (LensFlareScreenSpaceCommon.hlsl), the aberration is
     Filament's (flare.mat).
-
-    Examples
-    --------
-    >>> image = np.zeros((9, 9, 3), np.float32)
-    >>> image[4, 7] = 1
-    >>> ghosts = vkbloom.Ghosts(scales=(-1,), tints=((1, 0.5, 0),), falloff=0, halvings=0)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Pyramid(glare=(ghosts,)))
-    >>> frames["ghosts"][4, 1]
-    array([1. , 0.5, 0. , 1. ], dtype=float32)
     """
 
     stage: ClassVar[str] = "ghosts"

@@ -50,10 +50,10 @@ class Chunks:
 
     def key(self, name: str, block: Block) -> str:
         """Return the key of a block's chunk of a variable."""
-        places = (start // size for start, size in zip(block.start, self.chunk, strict=True))
+        numbers = (start // size for start, size in zip(block.start, self.chunk, strict=True))
         # An array without dimensions has the key "c".
         trailing = "0" * self.trailing.get(name, 0)
-        return f"{name}/" + ".".join(["c", *map(str, places), *trailing])
+        return f"{name}/" + ".".join(["c", *map(str, numbers), *trailing])
 
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a block's variables."""
@@ -77,25 +77,42 @@ class Chunks:
         if self.key(DONE, block) not in held:
             return False
         try:
-            return bool(self._read(DONE, block).all())
+            return bool(self._read(DONE, block.slices).all())
         except ValueError as error:
             return f"damaged ({error})"
 
-    def problem(self, name: str, block: Block, held: set[str], *, read: bool = True) -> str | None:
-        """Return what is wrong with a block's chunk of a variable: missing, or damaged if read."""
+    def problem(self, name: str, block: Block, held: set[str]) -> str | None:
+        """Return what is wrong with a block's chunk of a variable: it is missing or damaged."""
         if self.key(name, block) not in held:
             return "missing"
         try:
-            if read:
-                self._read(name, block)
+            self._read(name, block.slices)
         except ValueError as error:
             return f"damaged ({error})"
         return None
 
-    def _read(self, name: str, block: Block) -> NDArray[Any]:
-        """Read a block's chunk of a variable, or raise ValueError if it is damaged."""
+    def array_problem(self, name: str, held: set[str]) -> str | None:
+        """Return what is wrong with an array's metadata, or with the values of a coordinate."""
+        is_coordinate = name != DONE and name not in self.trailing
+        keys = [f"{name}/zarr.json", *[f"{name}/c.0"] * is_coordinate]
+        missing = [key for key in keys if key not in held]
+        if missing:
+            return f"{missing[0]} is missing"
         try:
-            found: NDArray[Any] = self._array(name, "r")[block.slices]
+            if is_coordinate:
+                self._read(name, (...,))
+            else:
+                self._array(name, "r")
+        except MemoryError:
+            raise
+        except Exception as error:  # Zarr does not document what damaged metadata raise
+            return f"{keys[-1]} is damaged ({error})"
+        return None
+
+    def _read(self, name: str, slices: tuple[Any, ...]) -> NDArray[Any]:
+        """Read a part of a variable, or raise ValueError if it is damaged."""
+        try:
+            found: NDArray[Any] = self._array(name, "r")[slices]
         except MemoryError:
             raise
         except Exception as error:

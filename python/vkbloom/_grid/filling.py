@@ -47,16 +47,16 @@ class Filler:
         grid, total = self._grid, Tally()
         path = map(grid.point, points(block, self._layout.ranking))
         for index, frames in visit(self._renderer, grid.source, path, grid.wanted):
-            place = tuple(i - start for i, start in zip(index, block.start, strict=True))
+            inside = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, array in arrays.items():
-                self._put(name, index, frames, array, place)
+                self._put(name, index, frames, array, inside)
             count = Tally(1, len(frames.timings))
             total.add(count)
             on_point(count)
         return total
 
     def _put(
-        self, name: str, index: Index, frames: Frames, array: NDArray[Any], place: Index
+        self, name: str, index: Index, frames: Frames, array: NDArray[Any], inside: Index
     ) -> None:
         variable = self._layout.variables[name]
         reduction = self._grid.reduce.get(name)
@@ -68,4 +68,4 @@ class Filler:
                 f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)} is not "
                 f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
-        array[place] = value
+        array[inside] = value

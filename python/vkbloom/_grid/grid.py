@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, import_extra
+from vkbloom._grid.filling import Tally
 from vkbloom._grid.identity import chunk_in
 from vkbloom._grid.keys import Keys, open_keys
-from vkbloom._grid.layout import Grid, Layout, ask
+from vkbloom._grid.layout import Grid, Layout, ask, lay_out
 from vkbloom._grid.memory import chunk_of, in_memory
-from vkbloom._grid.order import Index
-from vkbloom._grid.parts import read_part
-from vkbloom._grid.rendering import Workers, render_grid
+from vkbloom._grid.order import Index, read_part
+from vkbloom._grid.progress import Progress
+from vkbloom._grid.running import run_here
 from vkbloom._grid.sources import ImageSource
-from vkbloom._grid.store import IDENTITY, METADATA, GridStore, read_json, stored_identity
+from vkbloom._grid.store import IDENTITY, GridStore, stored_identity
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -55,10 +56,8 @@ def grid(
     chunks: Mapping[str, int] | None = None,
     part: tuple[int, int] | str | None = None,
     resume: bool = True,
-    verify: bool = True,
     client: Client | None = None,
     adapter: str | None = None,
-    validation: bool = False,
     progress: bool | None = None,
     renderer: Renderer | None = None,
 ) -> xarray.Dataset:
@@ -103,17 +102,15 @@ def grid(
     part : (int, int) or str, optional
         Render only part i of n of a store, from 1. Part 0 is part n. Each part is a run of chunks,
         about 1/n of the points. Processes may render parts at the same time, in any order and
-        repeatedly; `check_grid` names missing parts. Text is "3/16". The default of `chunks` has at
-        least n chunks; name `chunks` for the same bytes as without parts.
+        repeatedly; what is done is not rendered again. Text is "3/16". The default of `chunks` has
+        at least n chunks; name `chunks` for the same bytes as without parts.
     resume : bool
-        Whether to continue an existing store. False: raise FileExistsError.
-    verify : bool
-        Whether to read the existing points of a store first and render damaged ones again. False:
-        trust the marks in ``done``.
+        Whether to continue an existing store: its points are read first, and damaged ones are
+        rendered again. False: raise FileExistsError.
     client : distributed.Client, optional
         The workers of its cluster render a store and write it. Default: this process does.
-    adapter, validation
-        Arguments of the renderers that the workers open, or that this process opens for the grid.
+    adapter : str, optional
+        The adapter of the renderers that the workers open, or that this process opens for the grid.
     progress : bool, optional
         True: a progress bar in a terminal or a notebook, but not elsewhere. None: the same if tqdm
         is installed. False: no progress bar.
@@ -140,10 +137,6 @@ def grid(
         The store exists and `resume` is False.
     OSError
         Writing failed, for example because the disk is full. Completed points are kept.
-
-    See Also
-    --------
-    check_grid : Reads a store, and names missing and damaged data.
 
     Notes
     -----
@@ -182,29 +175,63 @@ def grid(
         reduce=reduce,
     )
     with ExitStack() as stack:
-        by: Renderer | Workers
-        if client is not None:
-            by = Workers(client, adapter or "auto", validation)
-        elif adapter is not None or validation:
-            by = stack.enter_context(opened_renderer(adapter or "auto", validation))
-        else:
-            by = renderer or default_renderer()
+        if client is None and adapter is not None:
+            renderer = stack.enter_context(opened_renderer(adapter, False))
         if keys is None:
-            assert isinstance(by, Renderer)  # a client needs a store
-            return in_memory(asked, by, progress)
+            return in_memory(asked, renderer or default_renderer(), progress)
         number, count = read_part(part)
-        _check_stored(asked, by, chunks)
+        _check_stored(asked, chunks, is_shared=client is not None)
 
         def prepared(layout: Layout) -> GridStore:
             chunk = _chunk(asked, layout, chunks, keys, count)
             stored = GridStore(keys, asked, layout, chunk, (number, count))
-            stored.prepare(resume=resume, verify=verify)
+            stored.prepare(resume=resume)
             return stored
 
-        tally = render_grid(asked, prepared, by, progress=progress)
+        if client is not None:
+            tally = _filled_there(asked, prepared, client, adapter or "auto", progress)
+        else:
+            tally = _filled_here(asked, prepared, renderer or default_renderer(), progress)
     dataset: xarray.Dataset = xr.open_zarr(keys.store)
     dataset.attrs.pop(IDENTITY, None)
     return dataset.assign_attrs(passes_run=tally.ran)
+
+
+def _filled_here(
+    asked: Grid, prepared: Callable[[Layout], GridStore], renderer: Renderer, progress: bool | None
+) -> Tally:
+    """Render the points of a store that are not done."""
+    layout = lay_out(asked, renderer)
+    store = prepared(layout)
+    with _progress(store, progress) as shown:
+        run_here(asked, layout, store, renderer, shown)
+    return shown.tally
+
+
+def _filled_there(
+    asked: Grid,
+    prepared: Callable[[Layout], GridStore],
+    client: Client,
+    adapter: str,
+    progress: bool | None,
+) -> Tally:
+    """Let the workers of a cluster render the points of a store that are not done."""
+    from vkbloom._grid import cluster  # noqa: PLC0415  Dask is optional
+
+    cluster.check_client(client)
+    shared = cluster.shared_grid(client, asked)
+    store = prepared(cluster.lay_out_there(client, shared, adapter))
+    with _progress(store, progress) as shown:
+        cluster.run_there(client, shared, store, adapter, shown)
+    return shown.tally
+
+
+def _progress(store: GridStore, shown: bool | None) -> Progress:
+    done = int(store.done.sum())
+    progress = Progress(store.total, done, shown=shown)
+    if done < store.total:
+        progress.add(Tally(ran=store.layout.ran))
+    return progress
 
 
 def _keys(store: Any, client: Client | None) -> Keys:
@@ -216,10 +243,10 @@ def _keys(store: Any, client: Client | None) -> Keys:
     return keys
 
 
-def _check_stored(grid: Grid, by: Renderer | Workers, chunks: Mapping[str, int] | None) -> None:
-    """Raise TypeError or ValueError for a grid that cannot be stored, or not by these workers."""
+def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bool) -> None:
+    """Raise TypeError or ValueError for a grid that cannot be stored, or not by workers."""
     if (
-        isinstance(by, Workers)
+        is_shared
         and isinstance(grid.source, ImageSource)
         and any(isinstance(image, Image) for image in grid.source.images)
     ):
@@ -240,7 +267,7 @@ def _chunk(
 ) -> Index:
     """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
-        stored = stored_identity(read_json(keys.read(METADATA)) or {})
+        stored = stored_identity(keys)
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -38,15 +37,6 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     # The same conversion as by storing it in JSON, which turns tuples into lists.
     plain: dict[str, Any] = json.loads(json.dumps(found))
     return plain
-
-
-def fingerprint(own: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of an identity, whatever the order of its names."""
-    try:
-        text = json.dumps(own, sort_keys=True)
-    except RecursionError:
-        text = ""
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
@@ -89,10 +79,7 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
 
 def short(value: Any) -> str:
     """Return any JSON value as a short text for a message."""
-    try:
-        text = json.dumps(value)
-    except RecursionError:
-        text = "nested lists"
+    text = json.dumps(value)
     if len(text) <= _LONGEST:
         return text
     return f"{text[: _LONGEST - 20]} ... {text[-12:]}"

@@ -118,13 +118,11 @@ def open_keys(store: Any) -> Keys:
     zarr = import_extra("zarr", "grid", _PURPOSE)
     if isinstance(store, zarr.abc.store.Store):
         return Keys(store)
-    if isinstance(store, str) and "://" in store:
-        system, path = import_extra("fsspec.core", "grid", _PURPOSE).url_to_fs(store)
-        local = import_extra("fsspec.implementations.local", "grid", _PURPOSE)
-        if not isinstance(system, local.LocalFileSystem):
-            return Keys(zarr.storage.FsspecStore.from_url(store))
+    if isinstance(store, str):
         # A local folder: use LocalStore, which writes each key atomically.
-        store = path
+        store = store.removeprefix("file://")
+        if "://" in store:
+            return Keys(zarr.storage.FsspecStore.from_url(store))
     if isinstance(store, str | os.PathLike):
         return Keys(zarr.storage.LocalStore(Path(store).absolute()))
     raise TypeError(f"store: {store!r} is not a folder, a URL or a Zarr store")

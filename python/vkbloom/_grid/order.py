@@ -1,8 +1,7 @@
-"""The order in which the points of a grid are rendered, and their division into blocks.
+"""The order in which the points of a grid are rendered, and their division into blocks and parts.
 
-Each step changes one axis only, as in reflected Gray code: after the last value of a fast axis, a
-slower axis moves to its next value and the fast axis runs backwards. A step then runs only the
-passes that depend on the axis that changed.
+Loops over the axes are nested. The axis whose steps run the most passes is the outermost, so that
+most steps run few passes.
 """
 
 from __future__ import annotations
@@ -11,23 +10,21 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-
-from vkbloom._grid.parts import WHOLE, Part
+from typing import Any, Final, TypeAlias
 
 Index = tuple[int, ...]
+#: The number of a part, from 1, and the number of parts.
+Part: TypeAlias = tuple[int, int]
+
+WHOLE: Final[Part] = (1, 1)
 
 
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring points of a grid: a box along its axes.
-
-    - `start`, `stop`: The box, by axis.
-    - `backwards`: By axis, whether the visit begins with the box's last value.
-    """
+    """Neighbouring points of a grid: a box along its axes, from `start` to `stop` by axis."""
 
     start: Index
     stop: Index
-    backwards: tuple[bool, ...]
 
     @property
     def shape(self) -> Index:
@@ -45,13 +42,6 @@ class Block:
         return tuple(slice(*ends) for ends in zip(self.start, self.stop, strict=True))
 
 
-def _reflected(position: int, radices: Sequence[int]) -> Iterator[int]:
-    """Yield the digits of a position in reflected Gray code, the slowest first."""
-    for place in range(len(radices)):
-        sweeps, digit = divmod(position // math.prod(radices[place + 1 :]), radices[place])
-        yield radices[place] - 1 - digit if sweeps % 2 else digit
-
-
 def blocks(
     shape: Index, chunk: Index, ranking: Sequence[int], part: Part = WHOLE
 ) -> Iterator[Block]:
@@ -65,38 +55,22 @@ def blocks(
 
 
 def _all_blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
-    counts = [-(-shape[axis] // chunk[axis]) for axis in ranking]
-    backwards = [False] * len(shape)
-    for position in range(math.prod(counts)):
-        start, stop = [0] * len(shape), [1] * len(shape)
-        for axis, number in zip(ranking, _reflected(position, counts), strict=True):
-            start[axis] = number * chunk[axis]
-            stop[axis] = min(start[axis] + chunk[axis], shape[axis])
-        block = Block(tuple(start), tuple(stop), tuple(backwards))
-        yield block
-        # Each axis has been swept once for every point of the slower ones within the block.
-        sweeps = 1
-        for axis in ranking:
-            backwards[axis] ^= bool(sweeps % 2)
-            sweeps *= block.shape[axis]
+    for starts in itertools.product(*(range(0, shape[axis], chunk[axis]) for axis in ranking)):
+        start = _in_order(starts, ranking)
+        ends = zip(start, chunk, shape, strict=True)
+        yield Block(start, tuple(min(first + size, end) for first, size, end in ends))
 
 
 def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
     """Yield the points of a block in the order in which they are visited."""
-    index = list(block.start)
+    ranges = (range(block.start[axis], block.stop[axis]) for axis in ranking)
+    for numbers in itertools.product(*ranges):
+        yield _in_order(numbers, ranking)
 
-    def sweep(depth: int, backwards: list[bool]) -> Iterator[Index]:
-        if depth == len(ranking):
-            yield tuple(index)
-            return
-        axis = ranking[depth]
-        numbers = range(block.start[axis], block.stop[axis])
-        for number in reversed(numbers) if backwards[axis] else numbers:
-            index[axis] = number
-            yield from sweep(depth + 1, backwards)
-        backwards[axis] ^= True
 
-    return sweep(0, list(block.backwards))
+def _in_order(numbers: Sequence[int], ranking: Sequence[int]) -> Index:
+    """Return numbers of ranked axes in the order of the axes."""
+    return tuple(number for _, number in sorted(zip(ranking, numbers, strict=True)))
 
 
 def default_chunk(shape: Index, ranking: Sequence[int], most: int) -> Index:
@@ -123,3 +97,26 @@ def walk(shape: Index, *, backwards: bool) -> Iterator[tuple[int | None, Index]]
 def ranking_of(costs: Sequence[int], later: Sequence[bool]) -> tuple[int, ...]:
     """Return the axes from the highest cost of a step to the lowest."""
     return tuple(sorted(range(len(costs)), key=lambda axis: (-costs[axis], later[axis])))
+
+
+def read_part(part: Any) -> Part:
+    """Check a part: (i, n), or text such as "3/16"; None is the whole.
+
+    i is 1 to n. 0 is the same as n, so that arrays that count from 0 have all parts, too.
+    """
+    if part is None:
+        return WHOLE
+    given = part
+    if isinstance(part, str):
+        words = part.split("/")
+        if len(words) != 2 or not all(word.isascii() and word.isdecimal() for word in words):
+            raise ValueError(f"part: {given!r} is not I/N, such as 3/16")
+        part = tuple(map(int, words))
+    if not isinstance(part, tuple | list) or len(part) != 2:
+        raise TypeError(f"part: {given!r} is not a pair (i, n), such as (3, 16)")
+    if any(isinstance(number, bool) or not hasattr(number, "__index__") for number in part):
+        raise TypeError(f"part: {given!r} is not a pair of integers")
+    number, count = (value.__index__() for value in part)
+    if not 0 <= number <= count or count < 1:
+        raise ValueError(f"part: {number} of {count} is not 1 to {max(count, 1)}")
+    return number or count, count

@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom._background_writer import written_in_background
 from vkbloom._grid.chunks import Chunks
@@ -26,24 +25,14 @@ _COMMIT_SECONDS: Final = 2.0
 _COMMIT_BLOCKS: Final = 64
 
 
-def empty_arrays(layout: Layout, block: Block) -> dict[str, NDArray[Any]]:
-    """Return arrays for the points of a block."""
-    return {
-        name: np.empty((*block.shape, *variable.shape), variable.dtype)
-        for name, variable in layout.variables.items()
-    }
-
-
 def run_here(
     grid: Grid,
     layout: Layout,
     store: GridStore,
-    todo: Iterable[Block],
-    *,
     renderer: Renderer,
     progress: Progress,
 ) -> None:
-    """Render blocks one after the other.
+    """Render missing blocks one after the other.
 
     Blocks that were written are marked as done, also when an exception ends the call.
     """
@@ -58,14 +47,18 @@ def run_here(
             pending.clear()
 
     try:
-        for block in written(filler, store.writer, todo, layout, progress.add):
+        for block in written(filler, store.writer, store.missing(), layout, progress.add):
             pending.append(block)
             if len(pending) >= _COMMIT_BLOCKS or time.monotonic() - committed > _COMMIT_SECONDS:
                 commit()
                 committed = time.monotonic()
         commit()
     except BaseException as error:
-        _commit_after(error, commit)
+        try:
+            commit()
+        except OSError as second:
+            # On a full disk the marks may not fit either. A resumed grid finds complete blocks.
+            error.add_note(f"the last written points could not be marked as done: {second}")
         raise
 
 
@@ -80,16 +73,11 @@ def written(
 
     def made() -> Iterator[tuple[Block, Callable[[], None]]]:
         for block in todo:
-            arrays = empty_arrays(layout, block)
+            arrays = {
+                name: np.empty((*block.shape, *variable.shape), variable.dtype)
+                for name, variable in layout.variables.items()
+            }
             filler.fill(block, arrays, on_point)
             yield block, functools.partial(writer.write, block, arrays)
 
     return written_in_background(made())
-
-
-def _commit_after(error: BaseException, commit: Callable[[], None]) -> None:
-    try:
-        commit()
-    except OSError as second:
-        # On a full disk the marks may not fit either. A resumed grid finds complete blocks.
-        error.add_note(f"the last written points could not be marked as done: {second}")

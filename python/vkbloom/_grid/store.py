@@ -11,9 +11,7 @@ The process may be killed at any time, because it writes in this order:
 4. The blocks' chunks of ``done``, after the blocks have been flushed to the disk.
 
 ``done`` has the same chunks as the variables. So a process writes only keys of its own blocks, and
-processes with different parts need no lock: they write the same metadata. ``done/parts.N`` tells
-that the grid is rendered in N parts, and the order of the axes in which they are divided; when all
-parts are done, it is removed.
+processes with different parts need no lock: they write the same metadata.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Final
 
@@ -29,16 +27,13 @@ import numpy as np
 
 from vkbloom._checks import import_extra
 from vkbloom._grid.chunks import DONE, Chunks
-from vkbloom._grid.identity import FORMAT, differences, fingerprint, identity, short
+from vkbloom._grid.identity import FORMAT, differences, identity, short
 from vkbloom._grid.keys import Keys
 from vkbloom._grid.layout import Grid, Layout, Variable, attributes_of
-from vkbloom._grid.order import Block, Index, blocks
-from vkbloom._grid.parts import WHOLE, Part
+from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
 
 METADATA: Final = "zarr.json"
 IDENTITY: Final = "vkbloom_grid"
-# In the folder of an array, where readers of Zarr expect chunks and list no members.
-PARTS: Final = f"{DONE}/parts."
 
 _PURPOSE: Final = "Grids on disk"
 # Level 1 is fast; on noisy pictures higher levels compress little better.
@@ -61,7 +56,7 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
         lone = Variable((name,), (), values.dtype, attrs)
         array = _add_array(group, name, values.shape, values.shape, lone)
         array[...] = values.astype(object) if values.dtype.kind == "U" else values
-    facts = {"description": "Whether the point is done", "grid": fingerprint(own)}
+    facts = {"description": "Whether the point is done"}
     done = Variable((), (), np.dtype(np.bool_), facts)
     dims = tuple(axis.name for axis in grid.axes)
     for name, variable in {DONE: done, **layout.variables}.items():
@@ -119,10 +114,7 @@ class GridStore:
 
     def blocks(self) -> Iterable[Block]:
         """Return the blocks of the part in the order in which they are rendered."""
-        return self._blocks(self.part)
-
-    def _blocks(self, part: Part) -> Iterable[Block]:
-        return blocks(self.grid.shape, self.chunk, self.layout.ranking, part)
+        return blocks(self.grid.shape, self.chunk, self.layout.ranking, self.part)
 
     @property
     def total(self) -> int:
@@ -137,22 +129,13 @@ class GridStore:
 
     def mark(self, written: Iterable[Block]) -> None:
         """Mark points as done; their data must be on the disk."""
-        found = list(written)
-        self._chunks.mark(found)
-        for block in found:
+        marked = list(written)
+        self._chunks.mark(marked)
+        for block in marked:
             self.done[block.slices] = True
 
-    def finish(self) -> None:
-        """Remove what only an incomplete store needs, if no other part is missing."""
-        held = self.keys.all()
-        if all(self._chunks.key(DONE, block) in held for block in self._blocks(WHOLE)):
-            self.keys.remove_leftovers()
-            for key in held:
-                if key.startswith(PARTS):
-                    self.keys.remove(key)
-
-    def prepare(self, *, resume: bool, verify: bool) -> None:
-        """Create the store, or examine an existing one and replace damaged metadata.
+    def prepare(self, *, resume: bool) -> None:
+        """Create the store, or examine an existing one and replace damaged metadata of arrays.
 
         FileExistsError: the store exists and `resume` is False. ValueError: it contains other data
         or another grid; nothing is written.
@@ -166,46 +149,24 @@ class GridStore:
         if not held:
             # Of processes that start at once, one decides which grid this is.
             self.keys.create(METADATA, expected[METADATA])
-        self._check_identity(expected)
+        stored = checked_identity(self.keys)
+        changed = differences(stored, identity(self.grid, self.layout, self.chunk))
+        if changed:
+            raise ValueError(f"{self.keys.name}: contains another grid; {'; '.join(changed)}")
         if self.part == WHOLE:
             self.keys.remove_leftovers()
         for key, content in expected.items():
-            stored = self.keys.read(key) if held or key == METADATA else None
-            if normal(key, stored) != normal(key, content):
+            if self.keys.read(key) != content:
                 self.keys.write(key, content)
         self.keys.flush(expected)
-        if self.part != WHOLE:
-            order = json.dumps(self.layout.ranking).encode()
-            self.keys.write(f"{PARTS}{self.part[1]}", order)
-        if held:
-            self._find_done(held, verify=verify)
+        self._mark_complete(held)
 
-    def _check_identity(self, expected: Mapping[str, bytes]) -> None:
-        """Raise ValueError unless the store contains this grid."""
-        root = read_json(self.keys.read(METADATA))
-        if root is not None:
-            asked = identity(self.grid, self.layout, self.chunk)
-            found = differences(checked_identity(root, self.keys.name), asked)
-            if found:
-                raise ValueError(f"{self.keys.name}: contains another grid; {'; '.join(found)}")
-        # ``done`` names its grid too. A process that was killed early may not have written it.
-        mark = mark_of(read_json(self.keys.read(f"{DONE}/{METADATA}")))
-        own = mark_of(read_json(expected[f"{DONE}/{METADATA}"]))
-        if mark != own and (root is None or mark is not None):
-            what = "contains another grid" if mark else "its content is not a grid of vkbloom"
-            raise ValueError(f"{self.keys.name}: {what}, and its {METADATA} is missing or damaged")
-
-    def _find_done(self, held: set[str], *, verify: bool) -> None:
-        """Find the completed points, and remove the marks of damaged ones."""
+    def _mark_complete(self, held: set[str]) -> None:
+        """Mark the completed points, and remove the marks of damaged ones."""
         unmarked = []
-        for block in self.blocks():
+        for block in self.blocks() if held else ():
             marked = self._chunks.marked(block, held)
-            if not (marked or verify):
-                continue
-            problems = (
-                self._chunks.problem(name, block, held, read=verify)
-                for name in self.layout.variables
-            )
+            problems = (self._chunks.problem(name, block, held) for name in self.layout.variables)
             is_complete = not any(problems)
             self.done[block.slices] = is_complete
             if is_complete and marked is not True:
@@ -216,53 +177,23 @@ class GridStore:
         self._chunks.mark(unmarked)
 
 
-def read_json(content: bytes | None) -> dict[str, Any] | None:
-    """Parse the JSON object of a key; None if it is missing or damaged."""
-    try:
-        found = None if content is None else json.loads(content)
-    except (ValueError, RecursionError):
-        return None
-    return found if isinstance(found, dict) else None
-
-
-def normal(key: str, content: bytes | None) -> bytes | str | None:
-    """Return a key's content, metadata without white space and order of names, to compare it.
-
-    Metadata are compared as text, because in Python 3.0 == 3 and True == 1.
-    """
-    if not key.endswith(METADATA):
-        return content
-    found = read_json(content)
-    try:
-        return None if found is None else json.dumps(found, sort_keys=True)
-    except RecursionError:
-        return None
-
-
-def stored_identity(root: Mapping[str, Any]) -> dict[str, Any] | None:
+def stored_identity(keys: Keys) -> dict[str, Any] | None:
     """Return the grid's identity from the group's metadata; None if there is none."""
-    stored = _attributes(root).get(IDENTITY)
-    found = read_json(stored.encode()) if isinstance(stored, str) else None
-    return found if isinstance(found, dict) else None
+    try:
+        held = json.loads(json.loads(keys.read(METADATA) or b"")["attributes"][IDENTITY])
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return None
+    return held if isinstance(held, dict) else None
 
 
-def checked_identity(root: Mapping[str, Any], store: str) -> dict[str, Any]:
+def checked_identity(keys: Keys) -> dict[str, Any]:
     """Return the grid's identity, or raise ValueError if there is none of this version."""
-    found = stored_identity(root)
-    if found is None:
-        raise ValueError(f"{store}: its content is not a grid of vkbloom")
-    version = found.get("format")
+    held = stored_identity(keys)
+    if held is None:
+        raise ValueError(
+            f"{keys.name}: its content is not a grid of vkbloom, or its {METADATA} is damaged"
+        )
+    version = held.get("format")
     if version != FORMAT:
-        raise ValueError(f"{store}: its format version {short(version)} is not {FORMAT}")
-    return found
-
-
-def mark_of(metadata: Mapping[str, Any] | None) -> str | None:
-    """Return the fingerprint of the grid in the metadata of ``done``; None if there is none."""
-    found = _attributes(metadata or {}).get("grid")
-    return found if isinstance(found, str) else None
-
-
-def _attributes(metadata: Mapping[str, Any]) -> Mapping[str, Any]:
-    found = metadata.get("attributes")
-    return found if isinstance(found, dict) else {}
+        raise ValueError(f"{keys.name}: its format version {short(version)} is not {FORMAT}")
+    return held

@@ -112,13 +112,6 @@ def read(
     `expand` maps m = max(r, g, b) above the knee a = 0.8 to a + (m - a) / (1 - k (m - a)), with
     k = 1 / (1 - a) - 1 / (expand - a), and multiplies the colour by the ratio. Up to 0.8 (the level
     231 of 255 in sRGB) nothing changes, and 1 becomes `expand`.
-
-    Examples
-    --------
-    >>> photo = vkbloom.read("photo.jpg", expand=4)                         # doctest: +SKIP
-    >>> with vkbloom.Renderer() as renderer:                                # doctest: +SKIP
-    ...     final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
-    >>> vkbloom.write("bloom.jpg", final, quality=95)                       # doctest: +SKIP
     """
     check_name(path)
     subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
@@ -230,11 +223,6 @@ def write(
     written as PNG keeps its colours with ``primaries="p3"``; without it, colours outside of Rec.
     709 are clipped. OpenEXR keeps them as negative components. "pq" and "hlg" need 16 bits to show
     no bands.
-
-    Examples
-    --------
-    >>> vkbloom.write("ramp.png", np.linspace(0, 1, 256 * 64 * 3, dtype=np.float32)
-    ...               .reshape(64, 256, 3), bits=16)                        # doctest: +SKIP
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(check_name(path))

@@ -1,7 +1,7 @@
 """Write image files safely: completely or not at all, in a format that keeps the values.
 
 Files are written to temporary files beside them (`replacing`), which are read again and renamed
-when all of them are complete. `writing` also opens and closes a writer of OpenImageIO.
+when all of them are complete.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from vkbloom._io.images import check_name, failure_of
 
 if TYPE_CHECKING:
     import OpenImageIO
-
-#: A writer of OpenImageIO, its file, and a check of the results of its calls.
-Steps: TypeAlias = tuple[Any, Path, Callable[[bool], None]]
 
 # Formats of OpenImageIO that discard the picture or print it on the terminal.
 _FORMATS_WITHOUT_A_FILE: Final = ("null", "term")
@@ -161,24 +158,6 @@ def replacing(oiio: ModuleType, sizes: Mapping[Path, int]) -> Iterator[list[Path
     finally:
         for temporary in temporaries:
             remove(temporary)
-
-
-@contextlib.contextmanager
-def writing(oiio: ModuleType, file: Path) -> Iterator[Steps]:
-    """Yield a writer of OpenImageIO for the temporary file of `replacing`, and close it."""
-    with replacing(oiio, {file: 0}) as (temporary,):
-        writer: Any = oiio.ImageOutput.create(str(temporary))
-
-        def check(done: bool) -> None:
-            if not done:
-                raise write_error(writer, temporary, file)
-
-        try:
-            yield writer, temporary, check
-            check(writer.close())
-        finally:
-            # Clear the error: OpenImageIO prints an unread one when the writer is destroyed.
-            writer.geterror()
 
 
 def write_file(file: Path, content: bytes) -> None:

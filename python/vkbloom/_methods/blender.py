@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._methods.blender_kernels import core_kernel_of, kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
+from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -22,7 +23,7 @@ from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
 Quality = Literal["high", "medium", "low"]
-Version = Literal["5.0", "4.3"]
+Version = Literal["5.0", "5.2", "4.3"]
 
 
 def _read_tint(tint: Any) -> tuple[float, ...]:
@@ -82,8 +83,9 @@ class BlenderGlare(Settings):
     kernel : PSF, array-like, shape (h, w) or (h, w, 3), or None
         The image of "kernel", in pixels of the glare; None: a point. The glare of a point is the
         image turned by 180 degrees, as in Blender.
-    version : {"5.0", "4.3"}
-        "4.3" has the kernel that "fog_glow" had before Blender 4.4.
+    version : {"5.0", "5.2", "4.3"}
+        "5.2" reduces the kernel of "kernel" in "medium" and "low", and reads some texels beside
+        their place. "4.3" has the kernel that "fog_glow" had before Blender 4.4.
     **settings
         The other fields of `Settings`; there is no knee.
 
@@ -116,12 +118,20 @@ class BlenderGlare(Settings):
       the weights (1 - place / number)^2.
     - "kernel": the convolution with an image, each channel divided by its sum.
 
+    In 5.2, a kernel has sides of half or a quarter of the image's, rounded down, and its pixels are
+    read from the image bilinearly, at their centres. Both texels between which a place u is are
+    those of u and u + 1 in single floats. At u = -3e-8, which is a rounded 0 at widths of 41 and
+    97, u + 1 is 1, so that the first column of the glare is its second one. The same is true for
+    texels 2^k, for rows from the bottom, and for the taps of "streaks" along an axis. Such settings
+    have no adjoint passes: the reference derives them.
+
     The glare is enlarged bilinearly. Its saturation s = (max - min) / max becomes
     clamp(saturation * s, 0, 1), so that a negative channel becomes 0, and it is multiplied by the
     tint.
 
     Source: the formulas of the compositor of Blender 5.0, source/blender/nodes/composite/nodes/
-    node_composite_glare.cc, confirmed by Blender 5.0.1 (``docs/evidence/engines.md``).
+    node_composite_glare.cc, and of 5.2, blenlib/BLI_math_interp.hh, confirmed by Blender 5.0.1 and
+    5.2.3 (``docs/evidence/engines.md``).
     """
 
     method: ClassVar[str] = "blender"
@@ -152,7 +162,11 @@ class BlenderGlare(Settings):
     sun_position: tuple[float, ...] = value_field((0.5, 0.5), read=_read_position)
     jitter: float = number_field("jitter")
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
-    version: Version = choice_field("version", ("5.0", "4.3"), option="blender-version")
+    version: Version = choice_field("version", ("5.0", "5.2", "4.3"), option="blender-version")
+
+    def _core_block(self) -> bytes:
+        """Return the settings, with the version as the core has it."""
+        return settings_block(self.method, vars(self) | {"blender_5_2": self.version == "5.2"})
 
     def kernel_pixels(self, buffers: tuple[int, int]) -> NDArray[np.float64]:
         """Return the kernel of fog glow or of an image, (h, w, 3), with its point in the middle."""

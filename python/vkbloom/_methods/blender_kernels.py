@@ -57,6 +57,8 @@ def kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> NDArray[np.
     if settings.type == "kernel":
         psf: PSF | None = settings.kernel
         image = np.ones((1, 1, 3)) if psf is None else psf.kernel(size)
+        if settings.version == "5.2" and settings.quality != "high":
+            image = _reduced(image, FACTORS[settings.quality])
         return _turned(_normalized(image))
     values = (_fog_glow_of_4_3 if settings.version == "4.3" else _fog_glow)(size, settings.size)
     return np.repeat(values[..., np.newaxis], 3, axis=2)
@@ -137,6 +139,20 @@ def _normalized(values: NDArray[np.float64]) -> NDArray[np.float64]:
     sums = values.sum(axis=(0, 1))
     result: NDArray[np.float64] = values / np.where(sums == 0, 1, sums)
     return result
+
+
+def _reduced(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+    """Return the image bilinearly at the centres of fewer pixels; black, if there are none."""
+    for length in image.shape[:2]:
+        count = length // factor
+        if count == 0:
+            return np.zeros((1, 1, image.shape[2]))
+        place = (np.arange(count) + 0.5) / count * length - 0.5
+        low = place.astype(int)
+        part = (place - low)[:, np.newaxis, np.newaxis]
+        image = (1 - part) * image[low] + part * image[np.minimum(low + 1, length - 1)]
+        image = image.swapaxes(0, 1)
+    return image
 
 
 def _turned(kernel: NDArray[np.float64]) -> NDArray[np.float64]:

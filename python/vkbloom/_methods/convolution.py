@@ -71,18 +71,6 @@ class Convolution(Settings):
     ``kernel`` is K in pixels of the bloom buffers. If these have another size than the frame, K is
     resampled by area. The computation uses single floats for every format of the bloom buffers.
     Values are limited to -1e28..1e28.
-
-    Examples
-    --------
-    >>> image = np.zeros((9, 9, 3), np.float32)
-    >>> image[4, 4] = 1
-    >>> cross = [[0, 1, 0], [1, 4, 1], [0, 1, 0]]
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Convolution(cross))
-    >>> list(frames)
-    ['glow', 'kernel', 'bloom', 'final']
-    >>> frames["bloom"][4, 3:6, 0].round(3)
-    array([0.125, 0.5  , 0.125], dtype=float32)
     """
 
     method: ClassVar[str] = "convolution"

@@ -36,11 +36,6 @@ class DarktableBloom(Settings):
     far as these are inside of the frame. a and b of a colour do not change.
 
     Source: darktable 4.2.1, src/iop/bloom.c.
-
-    Examples
-    --------
-    >>> vkbloom.DarktableBloom(blur_size=5).box_radius
-    15
     """
 
     method: ClassVar[str] = "darktable"

@@ -54,11 +54,6 @@ class Halation(GaussianSum):
     Beyond a border is the mirrored frame, whose outermost pixels are there twice.
 
     Source: andreavolpato/agx-emulsion @ 0e0baf2e3dd5, apply_halation_um.
-
-    Examples
-    --------
-    >>> vkbloom.Halation(pixel_size=20).kernel((640, 480)).shape
-    (163, 163, 3)
     """
 
     method: ClassVar[str] = "halation"

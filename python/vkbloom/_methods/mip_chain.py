@@ -53,17 +53,6 @@ class Pyramid(Settings):
 
     Source: Jimenez, "Next Generation Post Processing in Call of Duty: Advanced Warfare",
     SIGGRAPH 2014.
-
-    Examples
-    --------
-    >>> image = np.zeros((32, 32, 3), np.float16)
-    >>> image[16, 16] = 100
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, vkbloom.Pyramid(levels=3, composite="mix"))
-    >>> list(frames)
-    ['glow', 'down_0', 'down_1', 'down_2', 'up_1', 'up_0', 'bloom', 'final']
-    >>> frames["down_2"].shape
-    (4, 4, 4)
     """
 
     method: ClassVar[str] = "pyramid"

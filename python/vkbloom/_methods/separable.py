@@ -82,16 +82,6 @@ class Separable(Settings):
     Notes
     -----
     Source: the forward system and the outline system, which differ in `first_tap` and `texel`.
-
-    Examples
-    --------
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(1.0), blur_strength=1.0)
-    >>> image = np.zeros((9, 9, 4), np.float32)
-    >>> image[4, 4] = 1
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     bloom = renderer.apply(image, settings)["bloom"]
-    >>> bloom[4, 1:8, 0].round(3)
-    array([0.002, 0.022, 0.097, 0.159, 0.097, 0.022, 0.002], dtype=float32)
     """
 
     method: ClassVar[str] = "separable"
@@ -122,12 +112,6 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
     tuple of float
         w0..w_radius with w_i proportional to exp(-i^2 / (2 sigma^2)) and
         w0 + 2 (w1 + ... + w_radius) = 1.
-
-    Examples
-    --------
-    >>> weights = vkbloom.gaussian_weights(1.0, radius=2)
-    >>> [round(weight, 4) for weight in weights]
-    [0.4026, 0.2442, 0.0545]
     """
     limit = _core.MAX_WEIGHTS - 1
     deviation = as_float("sigma", sigma)

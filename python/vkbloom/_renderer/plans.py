@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vkbloom._views import markup
+
 if TYPE_CHECKING:
     from vkbloom import _core
     from vkbloom._settings.settings import Settings
@@ -114,8 +116,6 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        from vkbloom._views import markup  # noqa: PLC0415  costs start-up time
-
         rows = [[_text(part) for part in one] for one in self.passes]
         return str(markup.table(rows, Pass._fields, caption=self._title))
 

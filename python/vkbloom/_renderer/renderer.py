@@ -357,15 +357,6 @@ class Renderer:
         -----
         A pass runs only if its inputs, its settings or its size have changed since its last run.
         The ``timings`` of the result name the passes that ran.
-
-        Examples
-        --------
-        >>> settings = vkbloom.Separable(bloom_size=(32, 32))
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     scene = vkbloom.Scene.ufo()
-        ...     frames = renderer.render(scene, settings, (64, 48), framebuffers="final")
-        >>> frames["final"].shape
-        (48, 64, 4)
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
@@ -427,19 +418,6 @@ class Renderer:
 
         The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
         With a mask m the result is s + i (b - m s), with an emission s + i b.
-
-        Examples
-        --------
-        There are two lamps, and the mask selects one of them:
-
-        >>> image = np.zeros((32, 64, 3), np.float32)
-        >>> image[16, 16] = image[16, 48] = 10
-        >>> mask = np.zeros((32, 64), bool)
-        >>> mask[:, :32] = True
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     glow = renderer.apply(image, vkbloom.Pyramid(threshold=1.0), mask=mask)["glow"]
-        >>> glow[16, 16, 0].item(), glow[16, 48, 0].item()
-        (10.0, 0.0)
         """
         settings = check_settings(settings, of_image=True)
         self._pending.wait()
@@ -606,14 +584,6 @@ class Renderer:
         frame, settings are taken from the iterable before earlier frames are yielded. An error in
         settings is raised after the frames of all earlier settings. Names of framebuffers that none
         of the settings of a sequence has are raised by the call.
-
-        Examples
-        --------
-        >>> image = np.full((16, 16, 3), 0.5, np.float32)
-        >>> settings = [vkbloom.Pyramid(levels=2, intensity=intensity) for intensity in (0.0, 1.0)]
-        >>> with vkbloom.Renderer("software") as renderer:
-        ...     [frames["final"].max().item() for frames in renderer.sweep(image, settings)]
-        [0.5, 1.0]
         """
         self._pending.wait()
         found = any_source(source, size, shading, time, self._core)

@@ -51,33 +51,15 @@ def _copied(source: object, settings: Settings, framebuffer: str) -> str:
 class Surface:
     """A window, or a display without one, on which a renderer presents framebuffers.
 
-    Parameters
-    ----------
-    renderer : Renderer
-    window : window of glfw or None
-        A window of PyPI's ``glfw``, created with the hint CLIENT_API = NO_API; or None: a display
-        without a window, by VK_EXT_headless_surface, which Mesa's lavapipe 25 has.
-    size : (int, int)
-        Width and height in pixels without a window. A window has its own.
-    mailbox : bool
-        False: each refresh of the screen shows the next image (FIFO); True: it shows the newest
-        one (MAILBOX), which not every surface has.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height in pixels; (0, 0) while a window is minimized.
-
-    Notes
-    -----
     A context manager. Close it before its window is destroyed; one that is not closed lives as
-    long as its renderer.
+    long as its renderer. ``glfw.terminate`` is for the end of the process: Mesa's drivers keep the
+    connection to the display that it closes.
 
-    ``glfw.terminate`` is for the end of the process: Mesa's drivers keep the connection to the
-    display that it closes.
-
-    Two frames are in flight: `present` waits for the device only if it has not finished the frame
-    before the last one. Ctrl-C ends this wait.
+    - `window`: A window of PyPI's ``glfw``, created with the hint CLIENT_API = NO_API; or None: a
+      display without a window, by VK_EXT_headless_surface, which Mesa's lavapipe 25 has.
+    - `size`: Width and height in pixels without a window. A window has its own.
+    - `mailbox`: False: each refresh of the screen shows the next image (FIFO); True: it shows the
+      newest one (MAILBOX), which not every surface has.
     """
 
     def __init__(
@@ -116,32 +98,15 @@ class Surface:
     ) -> bool:
         """Render a scene, or give an image bloom, and show a framebuffer of it.
 
-        Parameters
-        ----------
-        source : Scene or an image
-            As for `Renderer.render` and `Renderer.apply`. An image for many frames is best
-            uploaded once (`Renderer.upload`).
-        settings : Settings, optional
-            Default: as for `Renderer.apply` and `Renderer.render`.
-        shading, time
-            Of a scene, as for `Renderer.render`.
-        size : (int, int), optional
-            Of a scene's frame, by default the surface's.
-        framebuffer : str
-            The framebuffer to show; depth is no colour, and cannot be.
+        The arguments are those of `Renderer.render` and `Renderer.apply`; a scene's `size` is by
+        default the surface's. Levels of uint8 are shown as they are. Floats are light: they are cut
+        off at 0 and 1 and encoded as sRGB; a ``final`` that the settings have encoded is only cut
+        off. A frame of another size is scaled, bilinearly, with black bars where its proportions
+        differ. False: nothing was shown, since the window is minimized or hidden, or its size
+        changes faster than the frames.
 
-        Returns
-        -------
-        bool
-            False: nothing was shown, since the window is minimized or hidden, or its size
-            changes faster than the frames.
-
-        Notes
-        -----
-        Levels of uint8 are shown as they are. Floats are light: they are cut off at 0 and 1 and
-        encoded as sRGB; a ``final`` that the settings have encoded already is only cut off. A
-        frame of another size than the surface's is scaled, bilinearly, and gets black bars where
-        its proportions differ. Framebuffers of other sizes are shown where ``final`` would be.
+        Two frames are in flight: this waits for the device only if it has not finished the frame
+        before the last one. Ctrl-C ends this wait.
         """
         settings = check_settings(settings, of_image=is_image(source))
         width, height = self.size

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._scene import ktx
-from vkbloom._scene.arrays import MAX_SIDE, checked_levels
+from vkbloom._scene.arrays import MAX_SIDE, read_only
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -39,7 +39,7 @@ class Cubemap:
     levels: tuple[NDArray[Any], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", checked_levels(self.levels, (6,), DTYPES))
+        object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
 
     def __reduce__(self) -> tuple[type[Cubemap], tuple[tuple[NDArray[Any], ...]]]:
         # Through the constructor, because NumPy pickles do not keep arrays read-only.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.arrays import checked_levels
+from vkbloom._scene.arrays import read_only
 
 #: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
@@ -36,24 +36,7 @@ class Texture:
     mipmap_filter: Filter = "linear"
 
     def __post_init__(self) -> None:
-        levels = checked_levels(self.levels, (), (np.dtype(np.float16),))
-        for index, level in enumerate(levels):
-            if not np.isfinite(level).all():
-                raise ValueError(f"levels[{index}]: NaN and infinity are not texels")
-        modes = tuple(self.address_mode)
-        if len(modes) != 2:
-            raise ValueError(f"address_mode is {self.address_mode!r}; two modes are needed")
-        for name, value, possible in (
-            ("address_mode", modes[0], AddressMode),
-            ("address_mode", modes[1], AddressMode),
-            ("mag_filter", self.mag_filter, Filter),
-            ("min_filter", self.min_filter, Filter),
-            ("mipmap_filter", self.mipmap_filter, Filter),
-        ):
-            if value not in get_args(possible):
-                raise ValueError(f"{name}: {value!r} is not one of {', '.join(get_args(possible))}")
-        object.__setattr__(self, "levels", levels)
-        object.__setattr__(self, "address_mode", modes)
+        object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
 
     def __reduce__(self) -> tuple[type[Texture], tuple[Any, ...]]:
         # Through the constructor, because NumPy pickles do not keep arrays read-only.
@@ -81,15 +64,6 @@ class Surface:
     index_count: int
     base: Texture = WHITE
     emission: Texture = WHITE
-
-    def __post_init__(self) -> None:
-        if self.index_count <= 0 or self.index_count % 3:
-            raise ValueError(
-                f"index_count is {self.index_count}; a positive multiple of 3 is needed"
-            )
-        for name in ("base", "emission"):
-            if not isinstance(getattr(self, name), Texture):
-                raise TypeError(f"{name} must be a Texture, not {getattr(self, name)!r}")
 
 
 def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:

@@ -119,12 +119,6 @@ class Settings(Record):
         a framebuffer of its name, with a number if there are several of a kind. In ``final``,
         i b + sum of i_k g_k stands in place of i b, with framebuffer g_k and intensity i_k of each.
 
-    See Also
-    --------
-    Separable, Pyramid, DualKawase : The methods.
-    presets : Published settings by name.
-    Renderer.apply, Renderer.render : Use settings.
-
     Examples
     --------
     >>> settings = vkbloom.Pyramid(levels=5, threshold=1.0, composite="mix")

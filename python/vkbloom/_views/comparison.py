@@ -13,17 +13,6 @@ from numpy.typing import NDArray
 from vkbloom._checks import as_float, check_number, import_extra, native_order
 from vkbloom._io.srgb import decode_srgb
 
-__all__ = [
-    "ALL_METRICS",
-    "USUAL_METRICS",
-    "Comparison",
-    "Metric",
-    "checked_image",
-    "compare",
-    "difference",
-    "flip_map",
-]
-
 Metric = Literal["ssim", "psnr", "flip", "cvvdp"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
@@ -103,43 +92,15 @@ def compare(
     nits_per_unit: float | None = None,
     pixels_per_degree: float | None = None,
 ) -> Comparison:
-    """Compare two images.
+    """Compare two images; `a` is the reference.
 
-    Parameters
-    ----------
-    a, b : ndarray, shape (H, W) or (H, W, C)
-        uint8, uint16 (both scaled to 0..1), float16, float32 or float64. `a` is the reference. All
-        channels are compared, including alpha; FLIP uses the first three, or the first as grey.
-    threshold : float, default 0
-        A pixel counts in `percent_over` if it differs by more than this.
-    relative : float, default 0
-        Added to `threshold` after multiplying with the absolute value in `a`.
-    allow_nan : bool, default False
-        Whether NaN, and infinity of the same sign, are equal if both images have it.
-    metrics : collection of {"ssim", "psnr", "flip", "cvvdp"}
-        The metrics to compute; the others are None. They are far slower than the other figures.
-        Default: all but "cvvdp", which is left out with a reason in `not_computed` where its
-        package is missing: ``pip install vkbloom[cvvdp]``.
-    nits_per_unit : float, optional
-        Luminance of a linear value of 1 on the display in cd/m2, above 0; "cvvdp" needs it.
-        Integers are decoded from sRGB first: it is the display's white.
-    pixels_per_degree : float, optional
-        Pixels of the image that one degree of the observer's view spans, above 0. "flip" has
-        67.02 where it is None (a 4K monitor of 0.69 m width at 0.7 m), "cvvdp" needs it.
-
-    Returns
-    -------
-    Comparison
-        SSIM and PSNR are scikit-image's (SSIM with its window of 7 x 7), FLIP is OpenImageIO's:
-        for integers, decoded from sRGB, LDR-FLIP; for floats, taken as linear, HDR-FLIP with
-        OpenImageIO's exposures, which are made for luminances up to 2. Values that are not
-        finite count as 0 in SSIM and FLIP and not at all in the others.
-
-    Raises
-    ------
-    ValueError
-        An image has another number of dimensions or no pixels; `threshold` or `relative` is out
-        of range, or a metric is unknown.
+    They are (H, W) or (H, W, C); uint8 and uint16 are scaled to 0..1. All channels are compared,
+    including alpha; FLIP uses the first three, or the first as grey. A pixel counts in
+    `percent_over` if it differs by more than threshold + relative * abs(a). With `allow_nan`, NaN
+    and infinity of the same sign are equal. SSIM and PSNR are scikit-image's (SSIM with its window
+    of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats. "cvvdp" needs the
+    luminance of a linear 1 in cd/m2 and the pixels of a degree of the observer's view; FLIP has 67
+    where that is None. Values that are not finite count as 0 in SSIM and FLIP only.
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
@@ -164,14 +125,14 @@ def compare(
         pair, metrics, data_range=data_range, nits=nits_per_unit, degree=pixels_per_degree
     )
     over = _over(pair, threshold, relative)
-    place, values = _largest(pair)
+    position, values = _largest(pair)
     is_any = bool(pair.valid.any())
     return Comparison(
         mismatches=mismatches,
         threshold=threshold,
         relative=relative,
         max_error=float(pair.error.max()) if is_any else None,
-        max_error_at=place,
+        max_error_at=position,
         max_error_values=values,
         mean_error=float(pair.error.mean(where=pair.valid)) if is_any else None,
         percent_over=100.0 * float(over.any(axis=2).mean()),
@@ -227,15 +188,15 @@ def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
     """Return the reasons why two images cannot be compared value by value."""
-    found: list[str] = []
+    results: list[str] = []
     if a.shape[:2] != b.shape[:2]:
         sizes = (f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
-        found.append(f"the sizes differ, {' against '.join(sizes)}")
+        results.append(f"the sizes differ, {' against '.join(sizes)}")
     if a.shape[2] != b.shape[2]:
-        found.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
+        results.append(f"the numbers of channels differ, {a.shape[2]} against {b.shape[2]}")
     if a.dtype.kind != b.dtype.kind:
-        found.append(f"integers against floats, {a.dtype} against {b.dtype}")
-    return tuple(found)
+        results.append(f"integers against floats, {a.dtype} against {b.dtype}")
+    return tuple(results)
 
 
 def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
@@ -391,14 +352,14 @@ def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
     """Return both images as linear (H, W, 3) of float32."""
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
-    found = []
+    results = []
     for image in (pair.a, pair.b):
         linear = image[:, :, :colours]
         if pair.is_integer:
             linear = decode_srgb(linear)
         limited = np.clip(linear, -largest, largest).astype(np.float32)
-        found.append(np.repeat(limited, 3 // colours, axis=2))
-    return found
+        results.append(np.repeat(limited, 3 // colours, axis=2))
+    return results
 
 
 def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:

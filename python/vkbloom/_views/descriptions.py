@@ -8,8 +8,6 @@ import itertools
 import re
 from collections.abc import Mapping
 
-__all__ = ["described_parameters"]
-
 
 # By the text, not the class: a class of a file that is loaded again must not be kept.
 @functools.lru_cache(maxsize=128)

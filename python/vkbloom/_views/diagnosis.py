@@ -15,8 +15,6 @@ from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._views.comparison import checked_image
 from vkbloom._views.shifts import MIN_SHIFT, find_shift
 
-__all__ = ["Cause", "Diagnosis", "diagnose"]
-
 Cause = Literal[
     "equal",
     "gain",
@@ -120,10 +118,8 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     (3.0, 0.0)
     """
     a, b = checked_image("a", a), checked_image("b", b)
-    if a.shape[:2] != b.shape[:2]:
-        return _of_sizes(a, b)
-    if a.shape[2] != b.shape[2]:
-        return _of_channel_counts(a, b)
+    if a.shape != b.shape:
+        return _of_shapes(a, b)
     real_a, real_b = _real(a), _real(b)
     finite_a, finite_b = np.isfinite(real_a), np.isfinite(real_b)
     same = (real_a == real_b) | (np.isnan(real_a) & np.isnan(real_b))
@@ -141,13 +137,13 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     scale = max(float(np.abs(plain_a).max()), float(np.abs(plain_b).max()))
     if scale > 1e150:
         plain_a, plain_b = plain_a / scale, plain_b / scale
-    found = _of_rounding(a, b, plain_a, plain_b)
-    if found is None:
+    result = _of_rounding(a, b, plain_a, plain_b)
+    if result is None:
         for candidate in _candidates(plain_a, plain_b):
-            found = _judged(candidate, plain_a, plain_b, step, tiny)
-            if found is not None:
+            result = _judged(candidate, plain_a, plain_b, step, tiny)
+            if result is not None:
                 break
-    return found or _of_shift(plain_a, plain_b, step)
+    return result or _of_shift(plain_a, plain_b, step)
 
 
 def _none(a: _Image, b: _Image) -> Diagnosis:
@@ -156,31 +152,21 @@ def _none(a: _Image, b: _Image) -> Diagnosis:
     )
 
 
-def _of_sizes(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
-    sizes = " against ".join(f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
+def _of_shapes(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
+    """Return the diagnosis of another size or number of channels."""
     count = min(a.shape[2], b.shape[2])
     height, width = a.shape[:2]
     rows = ((np.arange(height) + 0.5) * b.shape[0] / height).astype(np.intp)
     columns = ((np.arange(width) + 0.5) * b.shape[1] / width).astype(np.intp)
     scaled = _real(b)[rows[:, np.newaxis], columns, :count]
-    difference = np.nan_to_num(scaled - np.nan_to_num(_real(a)[:, :, :count]))
-    return Diagnosis(
-        cause="size",
-        value=(b.shape[1], b.shape[0]),
-        residual=_rms(difference),
-        text=f"size: {sizes}",
-    )
-
-
-def _of_channel_counts(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
-    count = min(a.shape[2], b.shape[2])
-    difference = np.nan_to_num(_real(b)[:, :, :count]) - np.nan_to_num(_real(a)[:, :, :count])
-    return Diagnosis(
-        cause="channels",
-        value=(a.shape[2], b.shape[2]),
-        residual=_rms(difference),
-        text=f"channels: {a.shape[2]} against {b.shape[2]}",
-    )
+    residual = _rms(np.nan_to_num(scaled) - np.nan_to_num(_real(a)[:, :, :count]))
+    if a.shape[:2] == b.shape[:2]:
+        text = f"channels: {a.shape[2]} against {b.shape[2]}"
+        value = (a.shape[2], b.shape[2])
+        return Diagnosis(cause="channels", value=value, residual=residual, text=text)
+    sizes = " against ".join(f"{image.shape[1]} x {image.shape[0]}" for image in (a, b))
+    value = (b.shape[1], b.shape[0])
+    return Diagnosis(cause="size", value=value, residual=residual, text=f"size: {sizes}")
 
 
 def _of_not_finite(a: _Image, b: _Image, count: int, step: float) -> Diagnosis:
@@ -334,10 +320,10 @@ def _judged(
 
 def _of_shift(a: _Image, b: _Image, step: float) -> Diagnosis:
     """Return the diagnosis of a shift by any number of pixels, or of no known cause."""
-    found = find_shift(a, b, step)
-    if found is None:
+    result = find_shift(a, b, step)
+    if result is None:
         return _none(a, b)
-    shift, residual = found
+    shift, residual = result
     return Diagnosis(
         cause="shift",
         value=(round(shift[0], 3) + 0.0, round(shift[1], 3) + 0.0),

@@ -10,8 +10,6 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-__all__ = ["Markup", "element", "figure", "image", "joined", "page", "table"]
-
 _NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
 # Of cells: some notebooks, such as marimo, have no padding of their own.
 _CELL: Final = "padding:2px 8px"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 import zlib
 from typing import Any
@@ -14,9 +13,7 @@ from vkbloom._framebuffers import Framebuffers, leading
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
-from vkbloom._views.markup import Markup, element
-
-__all__ = ["contact_sheet_html", "leading_png", "picture", "png", "reduced"]
+from vkbloom._views.markup import element
 
 _CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
@@ -37,24 +34,18 @@ def leading_png(frames: Framebuffers) -> bytes:
 def contact_sheet_html(frames: Framebuffers) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
-    Pictures are made as in `leading_png`, without alpha, and reduced to at most 320 pixels by
-    averaging. Linear floats with more than one pixel in a hundred above 1 are shown with less
-    exposure; the caption gives the exposure, and the range of all floats. Text inherits the
-    page's colours.
+    Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
     """
     thumbnails = []
     for name, array in frames.items():
         height, width = array.shape[:2]
         shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
-        stops = _viewing_stops(frames, name)
-        shown = _picture(frames, name, scaled(width, height, shrink), stops)[:, :, :3]
+        shown = _picture(frames, name, scaled(width, height, shrink))[:, :, :3]
         # Show the pixels of an enlarged pyramid level without smoothing.
         rendering = "auto" if max(shown.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
         size = _described(array, _note(frames, name)) + _ranged(array)
-        size += f", shown at {stops:g} stops" if stops else ""
         style = "display:block;width:100%;height:auto;max-width:none;object-fit:contain;"
-        style += f"aspect-ratio:{_aspect(frames):.4g};image-rendering:{rendering};"
-        style += "background:rgba(128,128,128,.15)"
+        style += f"image-rendering:{rendering};background:rgba(128,128,128,.15)"
         thumbnails.append(
             markup.figure(
                 markup.image(png(shown), f"{name}, {size}", style=style),
@@ -65,11 +56,13 @@ def contact_sheet_html(frames: Framebuffers) -> str:
             )
         )
     columns = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
+    times = [(name, f"{1e3 * seconds:.3f} ms") for name, seconds in frames.timings.items()]
+    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}")
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
     sheet = element(
         "div",
         element("div", *thumbnails, style=columns),
-        *([_timings_html(frames)] if frames.timings else []),
+        *([markup.table(times, head)] if times else []),
         element(
             "div",
             facts,
@@ -82,33 +75,12 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     return str(sheet)
 
 
-def _timings_html(frames: Framebuffers) -> Markup:
-    longest = max((t for t in frames.timings.values() if math.isfinite(t)), default=0.0)
-    bar = "height:.7em;background:#5b8def;border-radius:2px"
-    cells = []
-    for name, seconds in frames.timings.items():
-        part = seconds / longest if longest > 0 and math.isfinite(seconds) else 0.0
-        cells += [
-            element("div", name),
-            element("div", style=f"width:{100 * part:.1f}%;{bar}"),
-            element("div", f"{1e3 * seconds:.3f} ms", style="text-align:right"),
-        ]
-    adapter = frames.info.get("adapter", "the device")
-    grid = "display:grid;grid-template-columns:max-content 1fr max-content;gap:2px 8px"
-    return markup.joined(
-        (
-            element("div", f"Time of each pass on {adapter}", style="margin-top:10px"),
-            element("div", *cells, style=f"{grid};align-items:center"),
-        )
-    )
-
-
 def _picture(
-    frames: Framebuffers, name: str, size: tuple[int, int] | None = None, stops: float = 0.0
+    frames: Framebuffers, name: str, size: tuple[int, int] | None = None
 ) -> NDArray[np.uint8]:
     """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
     encoded = name == "final" and frames.settings.encoding != "none"
-    return picture(frames[name], name, encoded=encoded, size=size, stops=stops)
+    return picture(frames[name], name, encoded=encoded, size=size)
 
 
 def picture(
@@ -143,20 +115,6 @@ def picture(
     return pixels
 
 
-def _viewing_stops(frames: Framebuffers, name: str) -> float:
-    """Return the exposure, 0 or negative in half stops, that leaves 99 % of the pixels below 1."""
-    array = frames[name]
-    is_light = array.ndim == 3 and array.dtype != np.uint8 and name not in ("normal", "position")
-    if not is_light or (name == "final" and frames.settings.encoding != "none"):
-        return 0.0
-    # A subset of rows and columns: a percentile of all pixels would take longer than the picture.
-    step = max(1, max(array.shape[:2]) // _THUMBNAIL_SIDE)
-    brightest = array[::step, ::step, :3].max(axis=2).astype(np.float32)
-    brightest = brightest[np.isfinite(brightest)]
-    peak = float(np.percentile(brightest, 99, method="lower")) if brightest.size else 0.0
-    return -math.ceil(2 * math.log2(peak)) / 2 if peak > 1 else 0.0
-
-
 def _ranged(array: NDArray[Any]) -> str:
     """Return the range of finite floats without alpha as text; "" for integers."""
     if array.dtype == np.uint8:
@@ -168,15 +126,6 @@ def _ranged(array: NDArray[Any]) -> str:
     low = values.min(where=finite, initial=np.inf)
     high = values.max(where=finite, initial=-np.inf)
     return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
-
-
-def _aspect(arrays: Framebuffers) -> float:
-    """Return the aspect of a contact sheet's cells, that of the leading framebuffer.
-
-    It is bounded, so that a strip of one pixel leaves room for the others.
-    """
-    height, width = arrays[leading(arrays)].shape[:2]
-    return float(min(max(width / height, 0.5), 3.0))
 
 
 def _described(array: NDArray[Any], note: str = "") -> str:

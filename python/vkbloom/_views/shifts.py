@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
 
-__all__ = ["MIN_SHIFT", "find_shift"]
-
 _Image = NDArray[np.float64]
 _Shift = tuple[float, float]
 
@@ -87,11 +85,11 @@ def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
     inner = _inner(a.shape, shift)
     share = _REMAINS_OF_WHOLE if _is_whole(shift) else _REMAINS
     best: float | None = None
-    for moved, found, reference in _interpolations(a, b, shift):
-        images = [image[inner] for image in (moved, found, reference)]
+    for moved, target, reference in _interpolations(a, b, shift):
+        images = [image[inner] for image in (moved, target, reference)]
         small = [_compressed(image) for image in images]
         if all(_is_explained(*three, share=share, step=step) for three in (images, small)):
-            residual = _rms((found - moved)[inner])
+            residual = _rms((target - moved)[inner])
             best = residual if best is None else min(best, residual)
     return best
 
@@ -116,10 +114,10 @@ def _is_whole(shift: _Shift) -> bool:
 
 
 def _is_explained(
-    moved: _Image, found: _Image, reference: _Image, *, share: float, step: float
+    moved: _Image, target: _Image, reference: _Image, *, share: float, step: float
 ) -> bool:
-    difference = _rms(found - reference)
-    return difference > 2 * step and _rms(found - moved) <= share * difference + step / 2
+    difference = _rms(target - reference)
+    return difference > 2 * step and _rms(target - moved) <= share * difference + step / 2
 
 
 def _compressed(image: _Image) -> _Image:

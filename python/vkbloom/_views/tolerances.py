@@ -10,9 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from vkbloom._checks import check_number
-from vkbloom._views.comparison import Comparison, Metric
-
-__all__ = ["DEFAULTS", "Stage", "Tolerances", "failures", "worst"]
+from vkbloom._views.comparison import USUAL_METRICS, Comparison, Metric
 
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
 
@@ -45,8 +43,6 @@ class Tolerances:
         Percentage of pixels that may fail, 0 to 100: ``failpercent``.
     hard_fail : float or None
         Difference that no pixel may exceed, independent of `fail_percent`: ``hardfail``.
-    warn : float or None
-        Largest difference that passes without a warning: ``warn``.
     ssim : float or None
         Smallest structural similarity, -1 to 1.
     psnr : float or None
@@ -66,7 +62,6 @@ class Tolerances:
     rtol: float | None = None
     fail_percent: float = 0.0
     hard_fail: float | None = None
-    warn: float | None = None
     ssim: float | None = None
     psnr: float | None = None
     flip: float | None = None
@@ -78,7 +73,6 @@ class Tolerances:
             ("rtol", 0.0, float(np.finfo(np.float64).max)),
             ("fail_percent", 0.0, 100.0),
             ("hard_fail", 0.0, math.inf),
-            ("warn", 0.0, math.inf),
             ("ssim", -1.0, 1.0),
             ("psnr", -math.inf, math.inf),
             ("flip", 0.0, 1.0),
@@ -98,45 +92,39 @@ class Tolerances:
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The metrics that have a limit, which `compare` must compute."""
-        limits: dict[Metric, float | None] = {
-            "ssim": self.ssim,
-            "psnr": self.psnr,
-            "flip": self.flip,
-        }
-        return tuple(name for name, limit in limits.items() if limit is not None)
+        return tuple(name for name in USUAL_METRICS if getattr(self, name) is not None)
 
 
 def failures(
-    found: Comparison, tolerances: Tolerances, metrics: Collection[Metric]
+    comparison: Comparison, tolerances: Tolerances, metrics: Collection[Metric]
 ) -> list[tuple[Stage, str]]:
     """List the limits that a comparison exceeds."""
-    failed: list[tuple[Stage, str]] = [("finiteness", reason) for reason in found.mismatches]
-    over = found.percent_over or 0.0
-    limits = (found.threshold, found.relative)
+    failed: list[tuple[Stage, str]] = [("finiteness", reason) for reason in comparison.mismatches]
+    over = comparison.percent_over or 0.0
+    limits = (comparison.threshold, comparison.relative)
     if over > tolerances.fail_percent:
         stage: Stage = "tolerances" if any(limits) or tolerances.fail_percent else "exact"
         allowed = f", {tolerances.fail_percent:.4g} % allowed" if tolerances.fail_percent else ""
-        reason = f"{over:.4g} % of the pixels {_limits_in_words(*limits)}{allowed}; {worst(found)}"
+        reason = (
+            f"{over:.4g} % of the pixels {_limits_in_words(*limits)}{allowed}; {worst(comparison)}"
+        )
         failed.append((stage, reason))
-    hard, largest = tolerances.hard_fail, found.max_error or 0.0
+    hard, largest = tolerances.hard_fail, comparison.max_error or 0.0
     if hard is not None and largest > hard:
-        failed.append(("tolerances", f"{worst(found)}, over {hard:.6g}, the most allowed"))
-    figures: tuple[tuple[Metric, Stage, float | None, float | None, bool], ...] = (
-        ("ssim", "SSIM", found.ssim, tolerances.ssim, False),
-        ("psnr", "PSNR", found.psnr, tolerances.psnr, False),
-        ("flip", "FLIP", found.flip, tolerances.flip, True),
-    )
-    for metric, name, value, limit, is_most in figures:
+        failed.append(("tolerances", f"{worst(comparison)}, over {hard:.6g}, the most allowed"))
+    names: dict[Metric, Stage] = {"ssim": "SSIM", "psnr": "PSNR", "flip": "FLIP"}
+    for metric, name in names.items():
+        value, limit = getattr(comparison, metric), getattr(tolerances, metric)
         if metric not in metrics or limit is None:
             continue
         if value is None:
             # For images that do not match, the reason has already been given.
-            if not found.mismatches:
-                why = found.not_computed.get(metric, "no values to compare")
+            if not comparison.mismatches:
+                why = comparison.not_computed.get(metric, "no values to compare")
                 failed.append((name, f"{name} is not computed: {why}"))
-        elif is_most and value > limit:
+        elif metric == "flip" and value > limit:
             failed.append((name, f"{name} {value:.6g} is over {limit:.6g}"))
-        elif not is_most and value < limit:
+        elif metric != "flip" and value < limit:
             failed.append((name, f"{name} {value:.6g} is under {limit:.6g}"))
     return failed
 
@@ -147,13 +135,13 @@ def _limits_in_words(atol: float, rtol: float) -> str:
     return f"differ by more than {atol:.4g}" if atol else "differ"
 
 
-def worst(found: Comparison) -> str:
+def worst(comparison: Comparison) -> str:
     """Describe the pixel with the largest difference."""
-    if found.max_error_at is None or found.max_error_values is None:
+    if comparison.max_error_at is None or comparison.max_error_values is None:
         return "no finite value differs"
-    x, y, channel = found.max_error_at
-    expected, actual = found.max_error_values
+    x, y, channel = comparison.max_error_at
+    expected, actual = comparison.max_error_values
     return (
-        f"largest difference {found.max_error:.6g} at x {x}, y {y}, channel {channel}: "
+        f"largest difference {comparison.max_error:.6g} at x {x}, y {y}, channel {channel}: "
         f"{actual:.6g}, not {expected:.6g}"
     )

@@ -170,11 +170,6 @@ class aperture(SampledPSF):
     wavelengths : sequence of float or None
         In nm, 380 to 780. A single wavelength is shown in grey. None: 390 to 730 in steps of 10.
 
-    See Also
-    --------
-    iris : Makes masks.
-    airy : The formula for a circle at one wavelength.
-
     Notes
     -----
     A is the mask's Fourier transform, and P(u) = ``|A(u)|^2``. At the position r and the wavelength
@@ -193,7 +188,7 @@ class aperture(SampledPSF):
     pixel_pitch: float = number_field(default=4.0, range=(0, math.inf), unit="um", slider=(1, 20))
     wavelengths: tuple[float, ...] | None = value_field(None, unit="nm", read=_check_wavelengths)
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         return _pattern(self, _reach(self), _reach(self))
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:

@@ -85,10 +85,6 @@ class cie_general(RadialPSF):
     pigment : float
         Colour of the iris: 0 very dark, 0.5 brown, 1 blue, 1.2 very light.
 
-    See Also
-    --------
-    cie_total : The complete function, with the central peak.
-
     Notes
     -----
     With theta in degrees, age A and pigment p:

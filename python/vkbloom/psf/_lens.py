@@ -71,10 +71,6 @@ class airy(PSF):
     pixel_pitch : float
         Distance of the pixels on the sensor in um, above 0.
 
-    See Also
-    --------
-    aperture : Diffraction of any aperture, in colour.
-
     Notes
     -----
     With x = pi r / (wavelength f_number), the density is (2 J1(x) / x)^2 divided by its integral.

@@ -52,7 +52,7 @@ class measured(SampledPSF):
     settings: Settings = value_field(read=_read_settings)
     size: tuple[int, int] = (256, 256)
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         return _spread(self)
 
 

@@ -40,7 +40,7 @@ class fog_glow(SampledPSF):
 
     size: int = number_field(default=256, range=(2, 4096), unit="pixel", slider=(2, 1024))
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         u = 2 * np.arange(self.size) / self.size - 1
         # Puts the point of an odd side at its centre.
         u = u - u[self.size // 2]
@@ -115,7 +115,7 @@ class unreal(SampledPSF):
     prefilter: tuple[float, float, float] = value_field((7.0, 15000.0, 15.0), read=_check_prefilter)
     scatter: float = number_field(default=1.0, range=(0, 1000))
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         height, width = _image_of(self).shape[:2]
         return _scattered(self, max(width, height) / self.size)
 
@@ -164,7 +164,7 @@ def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = N
 def _image_of(psf: unreal) -> Array:
     """Return the kernel image, (h, w, 3)."""
     if isinstance(psf.image, SampledPSF):
-        return np.maximum(psf.image.own_array(), 0)
+        return np.maximum(psf.image.native_array(), 0)
     return rgb(psf.image)
 
 

@@ -22,14 +22,14 @@ class SampledPSF(PSF):
     unit = "pixel"
 
     @abc.abstractmethod
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0."""
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
-        return centred(self.own_array(), size)
+        return centred(self.native_array(), size)
 
     def energy(self) -> Array:
-        return np.asarray(self.own_array().sum(axis=(0, 1)))
+        return np.asarray(self.native_array().sum(axis=(0, 1)))
 
     def encircled_energy(self, radii: ArrayLike) -> Array:
         """Return the energy of the pixels whose centres are inside circles around the point.
@@ -43,7 +43,7 @@ class SampledPSF(PSF):
         -------
         ndarray of float64, shape (N, 3)
         """
-        values = self.own_array()
+        values = self.native_array()
         y, x = (np.arange(side) - side // 2 for side in values.shape[:2])
         distance = np.hypot(y[:, np.newaxis], x).ravel()
         order = np.argsort(distance, kind="stable")
@@ -52,7 +52,7 @@ class SampledPSF(PSF):
         return np.asarray(sums[inside])
 
     def mtf(self, frequencies: ArrayLike) -> Array:
-        lines = self.own_array().sum(axis=0)
+        lines = self.native_array().sum(axis=0)
         places = np.arange(len(lines)) - len(lines) // 2
         cycles = check_radii("frequencies", frequencies)
         waves = np.exp(-2j * np.pi * np.outer(cycles, places))
@@ -92,7 +92,7 @@ class samples(SampledPSF):
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.values.array, dtype=dtype, copy=copy)
 
-    def own_array(self) -> Array:
+    def native_array(self) -> Array:
         return rgb(self.values)
 
     def kernel(
@@ -101,7 +101,7 @@ class samples(SampledPSF):
         size: tuple[int, int] | None = None,
         pixels_per_degree: float | None = None,
     ) -> Array:
-        return self.own_array() if size is None else centred(self.own_array(), size)
+        return self.native_array() if size is None else centred(self.native_array(), size)
 
 
 def rgb(values: ArrayValue) -> Array:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._blender_lights import FACTORS, GAINS, LIGHTS
+from ._blender_lights import FACTORS, GAINS, LIGHTS, reads_next
 from ._image import BlurInput, Storage, finite, storage
 from ._levels import halved
 from ._pyramid import GROUPS, downsample
@@ -42,11 +42,26 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     exact = source.store.high > 65024
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
     images = _TYPES[settings.type](bright, settings, store, (width, height))
-    light = sample(images.pop("light"), source.size)
+    light = _enlarged(images.pop("light"), source.size, settings.version)
     rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
     rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
     return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
+
+
+def _enlarged(light: Array, size: tuple[int, int], version: str) -> Array:
+    """Return the light in another size."""
+    if version != "5.2":
+        return sample(light, size)
+    # Blender counts rows from the bottom.
+    light = light[::-1]
+    for count in size[::-1]:
+        length, width, _ = light.shape
+        after = light[np.minimum(np.arange(1, length + 1), length - 1)]
+        steps = reads_next(length, count)[:, np.newaxis, np.newaxis]
+        light = np.where(steps, sample(after, (width, count)), sample(light, (width, count)))
+        light = light.swapaxes(0, 1)
+    return light[::-1]
 
 
 def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:

@@ -15,6 +15,7 @@ from ._convolution import convolve
 from ._glare import moved_by, places, read, tap_colours, texels_at
 from ._image import Storage
 from ._sampling import Array
+from ._tape import value_of
 
 if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
@@ -23,6 +24,35 @@ if TYPE_CHECKING:
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
 
 Images = dict[str, Array]
+
+
+def reads_next(size: int, count: int, offset: Any = 0) -> Array:
+    """Return in which of `count` pixels Blender 5.2 reads the texel after the one at their place.
+
+    It finds both texels of a pixel by themselves, at u and at u + 1 in single floats. Where u is
+    just below 0 or a power of two, by rounding only, u + 1 is rounded to the integer after the next
+    one.
+    """
+    single = np.float32
+    shares = (np.arange(count, dtype=single) + single(0.5)) / single(count) + single(offset)
+    place = shares * single(size) - single(0.5)
+    found: Array = np.floor(place + single(1)) > np.floor(place) + single(1)
+    return found
+
+
+def _tap(light: Array, version: str, angle: float, distance: float, tap: int) -> Array:
+    """Return the light at a tap of a streak: at `tap` times a distance along an angle."""
+    x, y = tap * distance * np.cos(angle), tap * distance * np.sin(angle)
+    if version != "5.2":
+        return moved_by(light, x, -y)
+    height, width, _ = light.shape
+    single = np.float32(value_of(angle))
+    direction = np.array([np.cos(single), np.sin(single)])
+    steps = direction * np.float32(distance) / np.array([width, height], np.float32)
+    steps *= np.float32(tap)
+    columns = np.arange(width) + x + reads_next(width, width, steps[0])
+    rows = np.arange(height) + y + reads_next(height, height, steps[1])
+    return texels_at(light[::-1], columns[np.newaxis], rows[:, np.newaxis])[::-1]
 
 
 def _streaks(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -> Images:
@@ -41,7 +71,7 @@ def _streaks(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -
             taps = [
                 settings.fade ** (step * tap)
                 * tap_colours(tap, kept, bright.shape[2])
-                * moved_by(light, tap * step * np.cos(angle), -tap * step * np.sin(angle))
+                * _tap(light, settings.version, angle, step, tap)
                 for tap in range(4)
             ]
             light = store(sum(taps[1:], taps[0]) / 2)

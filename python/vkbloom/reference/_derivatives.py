@@ -93,17 +93,6 @@ def vjp(
     -----
     The formulas of the reference run on arrays that record each operation with its derivative; the
     records are applied in reverse order (Griewank and Walther, "Evaluating Derivatives", 2008).
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> image = np.full((4, 4, 3), 0.5)
-    >>> frames, pullback = reference.vjp(image, vkbloom.Pyramid(levels=1, intensity=0.5))
-    >>> derivatives = pullback({"final": np.ones_like(image)})
-    >>> float(derivatives["intensity"])  # the sum of the bloom
-    24.0
-    >>> derivatives["image"].sum() / image.size  # scene and half of the bloom
-    np.float64(1.5)
     """
     if hasattr(settings, "numpy_reference"):
         raise ValueError(

@@ -71,18 +71,6 @@ def apply(
     ValueError
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> image = np.zeros((16, 16, 4), np.float32)
-    >>> image[8, 8] = 4
-    >>> settings = vkbloom.Pyramid(levels=2, threshold=1.0)
-    >>> expected = reference.apply(image, settings)
-    >>> with vkbloom.Renderer("software") as renderer:
-    ...     frames = renderer.apply(image, settings)
-    >>> bool(np.allclose(frames["bloom"], expected["bloom"], atol=1e-4))
-    True
     """
     if (function := getattr(settings, "numpy_reference", None)) is not None:
         scene = as_float(image, "image", (3, 4))
@@ -258,14 +246,6 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     -------
     float, or ndarray of float64, shape (3,)
         For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
-
-    Examples
-    --------
-    >>> from vkbloom import reference
-    >>> reference.gain(vkbloom.Pyramid(levels=3))
-    1.0
-    >>> round(reference.gain(vkbloom.Separable()), 3)
-    1.922
     """
     method = _method(settings)
     threshold = None if settings.published else settings.threshold

@@ -7,6 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from . import _unreal
+
+# The passes of Unreal's bloom, with other kernels.
+passes = _unreal.passes
+
 
 def gain(settings: Any, size: tuple[int, int]) -> float:
     """Return the bloom of a flat image of 1: 1, since light is only moved."""

@@ -52,17 +52,6 @@ def shade(
     ------
     ValueError
         An array has another shape, or the shapes differ.
-
-    Examples
-    --------
-    Without a surface, the result is the albedo plus the brightness:
-
-    >>> from vkbloom import reference
-    >>> nothing = np.zeros((1, 1, 3), np.float16)
-    >>> albedo = np.full((1, 1, 3), 0.25, np.float16)
-    >>> brightness = np.full((1, 1, 3), 2.0, np.float16)
-    >>> reference.shade(albedo, nothing, nothing, brightness)
-    array([[[2.25, 2.25, 2.25, 1.  ]]])
     """
     given = {
         "albedo": albedo,

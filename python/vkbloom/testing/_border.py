@@ -5,17 +5,15 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
+from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figure, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
-
-__all__ = ["BORDER_LIMITS", "assert_border", "assert_views", "border_energy", "takes"]
 
 _DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
@@ -66,23 +64,12 @@ def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
     E(p) / E(c), where E(p) is the sum of the bloom of a square of 3 x 3 pixels from the pixel p on,
     less that of a black image, and c is the middle.
 
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-
     Returns
     -------
     dict of str to float
         "edge": the larger of the middle of the left and of the upper edge; "corner": the upper left
         corner. 1 in a bloom that loses no light and adds none. A bloom that repeats the outermost
         pixels has more, one that reads black outside less.
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite, or the bloom of the light in the middle is black.
     """
     __tracebackhide__ = True
     lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
@@ -114,11 +101,6 @@ def assert_border(
         Where light reaches the border from the middle, only energies and flat images are tested.
     limits : mapping of str to float, optional
         Limits by figure, in place of those of `BORDER_LIMITS`.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, the result is black, or it is not finite.
     """
     __tracebackhide__ = True
     allowed = BORDER_LIMITS | dict(limits or {})
@@ -126,87 +108,75 @@ def assert_border(
     dark, flat = _check_stale(bloom, probe, allowed["stale"])
     lights = _Lights(bloom, probe, dark)
     share = border_share(_expected(lights, probe.centre)[0])
-    reasons = _near_the_border(lights, allowed, law) if share <= _OUTERMOST else []
-    reasons += _at_the_border(lights, allowed, law, complete=share <= _OUTERMOST)
-    reasons += _flat(flat, dark, probe, allowed["flat"], law)
+    complete = share <= _OUTERMOST
+    reasons = breaches(law, _near_the_border(lights, allowed)) if complete else []
+    reasons += breaches(law, _at_the_border(lights, allowed, complete=complete))
+    reasons += breaches(law, _flat(flat, dark, probe, allowed["flat"]))
     if reasons:
         fail("assert_border", law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
 
 
-def _flat(flat: Image, dark: Image, probe: Probe, allowed: float, law: str) -> list[str]:
-    """Return what is wrong with the outermost pixels of the blooms of a flat and a black image."""
+def _flat(flat: Image, dark: Image, probe: Probe, allowed: float) -> Iterator[Measured]:
+    """Measure the outermost pixels of the blooms of a flat and a black image."""
     x, y = probe.centre
-    reasons = []
-    rings = [
+    ring, black = (
         np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]).mean(axis=1)
         for image in (flat, dark)
-    ]
-    glow = float(np.abs(rings[1] - dark[y, x].mean()).max()) / probe.value
-    if not is_within(law, glow, allowed, "dark"):
-        reasons.append(f"a black image has {glow:.3g} of the light of a flat one at its border")
-    ring, middle = rings[0], float(flat[y, x].mean())
+    )
+    glow = float(np.abs(black - dark[y, x].mean()).max()) / probe.value
+    text = f"a black image has {glow:.3g} of the light of a flat one at its border"
+    yield "dark", glow, allowed, text
+    middle = float(flat[y, x].mean())
     if middle > 0:
         farthest = float(ring[np.abs(ring - middle).argmax()]) / middle
-        if not is_within(law, abs(farthest - 1), allowed, "flat"):
-            reasons.append(
-                f"a flat image has {farthest:.3g} times as much bloom in its outermost pixels as "
-                "in the middle"
-            )
-    return reasons
+        text = f"a flat image has {farthest:.3g} times as much bloom in its outermost pixels as in "
+        yield "flat", abs(farthest - 1), allowed, f"{text}the middle"
 
 
-def _near_the_border(lights: _Lights, allowed: dict[str, float], law: str) -> list[str]:
-    """Return what is wrong with lights 1.5 standard deviations from an edge."""
+def _near_the_border(lights: _Lights, allowed: dict[str, float]) -> Iterator[Measured]:
+    """Measure lights 1.5 standard deviations from an edge."""
     __tracebackhide__ = True
-    reasons = []
     for name, at in _near(lights).items():
-        found, error = lights.spread(at)
+        spread, error = lights.spread(at)
         expected, energy = _expected(lights, at)
-        excess = np.abs(found - expected)
+        excess = np.abs(spread - expected)
         excess[excess <= 2 * error] = 0
         across = int(name == "left")
         profile = excess.sum(axis=(1 - across, 2)) / energy
         # Light that comes round is at the far edge; light that is spread too far is nearer.
         quarter = len(profile) // 4
         wrapped = profile[-quarter:].sum() - profile[-2 * quarter : -quarter].sum()
-        shares = {"wrap": max(0.0, float(wrapped)), "inside": float(profile.sum())}
-        reasons += [
-            f"{100 * share:.3g} % of the light of a square near the {name} edge is "
-            + ("at the opposite side" if kind == "wrap" else "where the middle has none")
-            for kind, share in shares.items()
-            if not is_within(law, share, allowed[kind], kind)
-        ]
-    return reasons
+        for kind, share, where in (
+            ("wrap", max(0.0, float(wrapped)), "at the opposite side"),
+            ("inside", float(profile.sum()), "where the middle has none"),
+        ):
+            text = f"{100 * share:.3g} % of the light of a square near the {name} edge is {where}"
+            yield kind, share, allowed[kind], text
 
 
 def _at_the_border(
-    lights: _Lights, allowed: dict[str, float], law: str, *, complete: bool
-) -> list[str]:
-    """Return what is wrong with lights in the outermost pixels."""
+    lights: _Lights, allowed: dict[str, float], *, complete: bool
+) -> Iterator[Measured]:
+    """Measure lights in the outermost pixels."""
     __tracebackhide__ = True
-    reasons = []
     for name, at in _places(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
         inside = float(expected.sum()) / energy
         kind = "corner" if name == "corner" else "edge"
         figure(f"energy_{name}", share)
-        lost = max(0.0, inside - share)
-        if complete and not is_within(law, lost, allowed["lost"], "lost"):
-            reasons.append(
-                f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the frame"
-            )
-        if not is_within(law, share, allowed[kind], kind):
-            reasons.append(f"a light at the {name} swells to {share:.3g} times its energy")
+        if complete:
+            text = f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the "
+            yield "lost", max(0.0, inside - share), allowed["lost"], f"{text}frame"
+        text = f"a light at the {name} swells to {share:.3g} times its energy"
+        yield kind, share, allowed[kind], text
     x, height = _PERIOD * round(lights.probe.centre[0] / _PERIOD), lights.probe.size[1]
     outermost, inner = (float(lights.spread((left, 0), (1, height))[0].sum()) for left in (0, x))
-    if inner > 0 and not is_within(law, max(0.0, 0.5 - outermost / inner), 0.25, "column"):
-        reasons.append(
-            f"a line in the outermost column has {outermost / inner:.3g} of the energy of one in "
-            "the middle"
-        )
-    return reasons
+    if inner > 0:
+        share = outermost / inner
+        text = f"a line in the outermost column has {share:.3g} of the energy of one in the middle"
+        yield "column", max(0.0, 0.5 - share), 0.25, text
 
 
 def _check_stale(bloom: Bloom, probe: Probe, allowed: float) -> tuple[Image, Image]:
@@ -253,11 +223,6 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
     limit : float
         Allowed difference, as a share of the largest value of the bloom, beyond the errors of
         values.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     if not takes(bloom, "region"):
@@ -271,10 +236,10 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
         for other in (probe.flat(0.0), noise[1 - second]):
             views = [other, noise[second]] if second else [noise[second], other]
             given = probe.given(np.concatenate(views, axis=axis))
-            found = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
-            if found.shape[:2] == given.shape[:2]:
-                found = np.split(found, 2, axis=axis)[second]
-            results.append(probe.values(found, probe.given(noise[second])))
+            result = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
+            if result.shape[:2] == given.shape[:2]:
+                result = np.split(result, 2, axis=axis)[second]
+            results.append(probe.values(result, probe.given(noise[second])))
         (alone, error), (beside, _) = results
         off = np.abs(beside - alone)
         largest = float(np.abs(alone).max()) or 1.0
@@ -295,7 +260,10 @@ def takes(bloom: object, name: str) -> bool:
         parameters = inspect.signature(bloom).parameters.values()  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return False
-    return any(one.name == name or one.kind is one.VAR_KEYWORD for one in parameters)
+    return any(
+        parameter.name == name or parameter.kind is parameter.VAR_KEYWORD
+        for parameter in parameters
+    )
 
 
 def _places(probe: Probe) -> dict[str, tuple[int, int]]:
@@ -325,8 +293,8 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     """
     __tracebackhide__ = True
     x, y = (
-        place + _PERIOD * round((middle - place) / _PERIOD)
-        for place, middle in zip(at, lights.probe.centre, strict=True)
+        position + _PERIOD * round((middle - position) / _PERIOD)
+        for position, middle in zip(at, lights.probe.centre, strict=True)
     )
     spread = lights.spread((x, y))[0]
     energy = float(spread.sum())
@@ -334,10 +302,10 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     return _moved(spread, (x, y), at), energy
 
 
-def _moved(spread: Image, place: tuple[int, int], to: tuple[int, int]) -> Image:
+def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
     moved = np.zeros_like(spread)
-    (x, y), (height, width) = np.subtract(to, place), spread.shape[:2]
+    (x, y), (height, width) = np.subtract(to, start), spread.shape[:2]
     rows, columns = (
         (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
         for by, size in ((y, height), (x, width))

@@ -9,8 +9,6 @@ from typing import Any, Final, Literal
 
 from vkbloom.testing._shape import LEVELS
 
-__all__ = ["Change", "changes", "newly_broken"]
-
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
 #: Figures by name: their place in the values of a bloom, and whether less of them is better.
@@ -37,7 +35,7 @@ _FIGURE: Final = (0.02, 1e-3)
 _TIME: Final = 0.2
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Change:
     """A law, a figure or a time of two blooms.
 
@@ -59,9 +57,9 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[Change
     return (*_laws(before, after), *_figures(before, after), *_times(before, after))
 
 
-def newly_broken(found: Sequence[Change], required: Sequence[str]) -> list[str]:
+def newly_broken(changes: Sequence[Change], required: Sequence[str]) -> list[str]:
     """Return the required laws that the second bloom breaks and the first did not."""
-    broken = [one.name for one in found if one.kind == "law" and one.verdict == "broken"]
+    broken = [each.name for each in changes if each.verdict == "broken"]
     return [name for name in broken if name in required]
 
 
@@ -70,21 +68,12 @@ def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Chang
     for name, new in after["laws"].items():  # a law that does not apply to both tells nothing
         old = before["laws"].get(name, untested)
         was, now = _share(old), _share(new)
-        verdict: Verdict
+        verdict = _verdict(was, now, *_LAW, less=True)
         if old["held"] != new["held"]:
             # A law that is no longer tested is no longer promised.
             lost = new["held"] is False or old["held"]
             verdict = "broken" if lost else "mended" if old["held"] is False else "changed"
-        else:
-            verdict = _verdict(was, now, *_LAW, less=True)
-        yield Change(
-            kind="law",
-            name=name,
-            before=was,
-            after=now,
-            words=(_held(old), _held(new)),
-            verdict=verdict,
-        )
+        yield Change("law", name, was, now, (_held(old), _held(new)), verdict)
 
 
 def _share(law: Mapping[str, Any]) -> float | None:
@@ -98,43 +87,31 @@ def _held(law: Mapping[str, Any]) -> str:
 
 
 def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
-    for name, (place, less) in _FIGURES.items():
-        old, new = (_at(side, place) for side in (before, after))
-        words = tuple("none" if x is None else f"{x:.4g}" for x in (old, new))
+    for name, (keys, less) in _FIGURES.items():
+        old, new = (_at(side, keys) for side in (before, after))
         verdict = _verdict(old, new, *_FIGURE, less=less)
-        yield Change(
-            kind="figure",
-            name=name,
-            before=old,
-            after=new,
-            words=(words[0], words[1]),
-            verdict=verdict,
-        )
+        yield Change("figure", name, old, new, (_words(old), _words(new)), verdict)
 
 
-def _at(values: Mapping[str, Any], place: Sequence[str]) -> float | None:
-    found: Any = values
-    for key in place:
-        found = found.get(key)
-    return None if found is None else float(found)
+def _at(values: Any, keys: Sequence[str]) -> float | None:
+    for key in keys:
+        values = values.get(key)
+    return None if values is None else float(values)
 
 
 def _times(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
-    sides = [{one["name"]: one["seconds"] for one in side["passes"]} for side in (before, after)]
+    sides = [{each["name"]: each["seconds"] for each in side["passes"]} for side in (before, after)]
     for side in sides:
         side["together"] = math.fsum(side.values())
     for name in dict.fromkeys([*sides[1], *sides[0]]):
         old, new = (side.get(name) for side in sides)
-        words = tuple("none" if x is None else f"{1e3 * x:.3f} ms" for x in (old, new))
+        words = (_words(old, 1e3, ".3f", " ms"), _words(new, 1e3, ".3f", " ms"))
         verdict = _verdict(old, new, _TIME, 0.0, less=True) if name == "together" else "same"
-        yield Change(
-            kind="time",
-            name=name,
-            before=old,
-            after=new,
-            words=(words[0], words[1]),
-            verdict=verdict,
-        )
+        yield Change("time", name, old, new, words, verdict)
+
+
+def _words(value: float | None, factor: float = 1.0, form: str = ".4g", unit: str = "") -> str:
+    return "none" if value is None else f"{factor * value:{form}}{unit}"
 
 
 def _verdict(
@@ -150,48 +127,53 @@ def _verdict(
     return "worse" if new > old else "better"
 
 
-def summary(found: Sequence[Change]) -> str:
+def summary(changes: Sequence[Change]) -> str:
     """Return which laws, figures and times got better and worse, as a sentence for each verdict."""
     reasons = []
     for verdict in ("broken", "mended", "worse", "better"):
-        names = [one.name for one in found if one.verdict == verdict and one.name != "together"]
-        times = [one for one in found if one.verdict == verdict and one.name == "together"]
-        names += [f"time ({_ratio(one)})" for one in times]
+        names = [
+            f"time ({_ratio(each)})" if each.name == "together" else each.name
+            for each in changes
+            if each.verdict == verdict
+        ]
         if names:
             reasons.append(f"{verdict}: {', '.join(names)}")
     return "; ".join(reasons) or "nothing got better or worse"
 
 
-def _ratio(change: Change) -> str:
-    return f"{change.after / change.before:.2f} times" if change.before and change.after else "new"
+def _ratio(time: Change) -> str:
+    return f"{time.after / time.before:.2f} times" if time.before and time.after else "new"
 
 
-def as_text(found: Sequence[Change], names: tuple[str, str]) -> str:
+def as_text(changes: Sequence[Change], names: tuple[str, str]) -> str:
     """Return a table for a terminal: before, after, and what became of it."""
-    lines = [f"{names[1]}, against {names[0]}: {summary(found)}", ""]
+    lines = [f"{names[1]}, against {names[0]}: {summary(changes)}", ""]
     for kind in ("law", "figure", "time"):
         lines.append(f"{kind:<24} {'against':>22} {'now':>22}")
-        for one in found:
-            if one.kind == kind:
-                old, new = (words.replace("*", "") for words in one.words)
-                verdict = "" if one.verdict == "same" else one.verdict
-                lines.append(f"{one.name:<24} {old:>22} {new:>22}  {verdict}".rstrip())
+        for each in changes:
+            if each.kind == kind:
+                old, new = (words.replace("*", "") for words in each.words)
+                verdict = "" if each.verdict == "same" else each.verdict
+                lines.append(f"{each.name:<24} {old:>22} {new:>22}  {verdict}".rstrip())
         lines.append("")
     return "\n".join(lines[:-1])
 
 
-def as_markdown(found: Sequence[Change], names: tuple[str, str], device: str) -> str:
+def as_markdown(changes: Sequence[Change], names: tuple[str, str], device: str) -> str:
     """Return the comparison for a pull request: what changed, then everything, folded."""
     old, new = (name.replace("|", "\\|").replace("`", "'") for name in names)
     head = f"| | `{old}` | `{new}` | |\n|---|---|---|---|"
     rows = [
-        (one.verdict, f"| {one.name} | {one.words[0]} | {one.words[1]} | {_mark(one.verdict)} |")
-        for one in found
+        (
+            each.verdict,
+            f"| {each.name} | {each.words[0]} | {each.words[1]} | {_mark(each.verdict)} |",
+        )
+        for each in changes
     ]
     changed = "\n".join(row for verdict, row in rows if verdict != "same")
     every = "\n".join(row for _, row in rows)
     return (
-        f"### `{new}` against `{old}`\n\n{summary(found).capitalize()}. On {device}.\n\n"
+        f"### `{new}` against `{old}`\n\n{summary(changes).capitalize()}. On {device}.\n\n"
         + (f"{head}\n{changed}\n\n" if changed else "")
         + f"<details><summary>All laws, figures and times</summary>\n\n{head}\n{every}\n\n"
         "</details>\n"
@@ -203,7 +185,7 @@ def _mark(verdict: Verdict) -> str:
 
 
 def as_values(
-    found: Sequence[Change],
+    changes: Sequence[Change],
     before: Mapping[str, Any],
     after: Mapping[str, Any],
     failed: Sequence[str],
@@ -213,11 +195,10 @@ def as_values(
         "bloom": after,
         "against": before,
         "changes": [
-            {"kind": one.kind, "name": one.name, "before": one.before, "after": one.after}
-            | {"verdict": one.verdict}
-            for one in found
+            {key: getattr(each, key) for key in ("kind", "name", "before", "after", "verdict")}
+            for each in changes
         ],
-        "summary": summary(found),
+        "summary": summary(changes),
         "newly_broken": list(failed),
         "passed": not failed,
     }

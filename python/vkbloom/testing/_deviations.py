@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -12,8 +12,6 @@ from typing import NoReturn
 import numpy as np
 
 from vkbloom.testing._probe import Image
-
-__all__ = ["Deviation", "NotTaken", "compare_with_law", "fail", "figure", "is_within", "measuring"]
 
 
 class NotTaken(ValueError):
@@ -30,26 +28,34 @@ class Deviation:
     name: str
 
 
+#: The name of a figure, the deviation, the limit, and what is wrong where it is beyond the limit.
+Measured = tuple[str, float, float, str]
+
 _measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
 
 
 @contextmanager
 def measuring() -> Iterator[list[Deviation]]:
     """Collect the deviations of all assertions inside, up to the first one that fails."""
-    found: list[Deviation] = []
-    token = _measured.set(found)
+    results: list[Deviation] = []
+    token = _measured.set(results)
     try:
-        yield found
+        yield results
     finally:
         _measured.reset(token)
 
 
 def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     """Return whether a deviation is within its limit; NaN is not."""
-    found = _measured.get()
-    if found is not None:
-        found.append(Deviation(law, off, allowed, name))
+    result = _measured.get()
+    if result is not None:
+        result.append(Deviation(law, off, allowed, name))
     return off <= allowed
+
+
+def breaches(law: str, measured: Iterable[Measured]) -> list[str]:
+    """Return what is wrong with each deviation that is beyond its limit."""
+    return [text for name, off, limit, text in measured if not is_within(law, off, limit, name)]
 
 
 def figure(name: str, value: float) -> None:
@@ -60,7 +66,7 @@ def figure(name: str, value: float) -> None:
 def compare_with_law(
     assertion: str,
     law: str,
-    found: Image,
+    actual: Image,
     expected: Image,
     allowed: float,
     *,
@@ -69,15 +75,15 @@ def compare_with_law(
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
     __tracebackhide__ = True
-    difference = np.abs(found - expected)
-    place = np.unravel_index(int(difference.argmax()), difference.shape)
-    if not is_within(law, float(difference[place]), allowed):
-        y, x, channel = (int(index) for index in place)
+    difference = np.abs(actual - expected)
+    position = np.unravel_index(int(difference.argmax()), difference.shape)
+    if not is_within(law, float(difference[position]), allowed):
+        y, x, channel = (int(index) for index in position)
         fail(
             assertion,
             law,
-            f"{found[place]:.6g} instead of {expected[place]:.6g} at x {x + border}, "
-            f"y {y + border}, channel {channel}: off by {difference[place]:.3g}, {allowed:.3g} "
+            f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x + border}, "
+            f"y {y + border}, channel {channel}: off by {difference[position]:.3g}, {allowed:.3g} "
             f"allowed{note}",
         )
 

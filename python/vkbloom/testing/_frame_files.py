@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._io import image_reading
 
-__all__ = ["read_frame"]
-
 
 @checked
 def read_frame(path: str | os.PathLike[str]) -> NDArray[Any]:

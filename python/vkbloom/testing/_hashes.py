@@ -13,21 +13,19 @@ from numpy.typing import NDArray
 
 from vkbloom._io import safe_writing
 
-__all__ = ["difference", "hashes_of", "load", "save"]
-
 # Hashes of framebuffers by name, by the hash of the driver that drew them.
 Hashes = dict[str, dict[str, str]]
 
 
 def hashes_of(images: Mapping[str, NDArray[Any]]) -> dict[str, str]:
     """Return the SHA-256 of each image: of its dtype, its shape and its values."""
-    found = {}
+    results = {}
     for name, image in images.items():
         digest = hashlib.sha256(f"{image.dtype.name} {image.shape} ".encode())
         little = image.astype(image.dtype.newbyteorder("<"), copy=False)
         digest.update(np.ascontiguousarray(little).data)
-        found[name] = digest.hexdigest()
-    return found
+        results[name] = digest.hexdigest()
+    return results
 
 
 def load(file: Path) -> Hashes:
@@ -47,12 +45,12 @@ def save(file: Path, hashes: Hashes) -> None:
     safe_writing.write_file(file, f"{json.dumps(hashes, indent=1)}\n".encode())
 
 
-def difference(expected: Mapping[str, str], found: Mapping[str, str]) -> str | None:
+def difference(expected: Mapping[str, str], actual: Mapping[str, str]) -> str | None:
     """Return the first framebuffer that differs, is missing or is new, in words; None if none."""
-    for name, digest in found.items():
+    for name, digest in actual.items():
         if name not in expected:
             return f"{name} is not in the reference"
         if expected[name] != digest:
             return f"{name} is the first framebuffer whose values are not the reference's"
-    lost = [name for name in expected if name not in found]
+    lost = [name for name in expected if name not in actual]
     return f"{lost[0]} is missing" if lost else None

@@ -11,9 +11,17 @@ from numpy.typing import NDArray
 
 from vkbloom._views.comparison import Comparison, compare
 from vkbloom._views.diagnosis import Diagnosis, diagnose
-from vkbloom._views.tolerances import Stage, Tolerances, failures, worst
+from vkbloom._views.tolerances import Stage, Tolerances, failures
 
-__all__ = ["Verdict", "first_failure", "judge", "judge_image"]
+__all__ = [
+    "Diagnosis",
+    "Tolerances",
+    "Verdict",
+    "diagnose",
+    "first_failure",
+    "judge",
+    "judge_image",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +31,6 @@ class Verdict:
     - `name`: Name of the framebuffer.
     - `failed_at`: The first check that failed; None if all passed.
     - `reasons`: One reason for each failed check.
-    - `warning`: Text of a warning if the framebuffer passed but differs by more than
-      `Tolerances.warn`.
     - `comparison`: The figures; None if shapes or dtypes differ, or one image is missing.
     - `diagnosis`: The cause of the difference of two images that failed.
     - `atol`, `rtol`: The tolerances that were used.
@@ -33,7 +39,6 @@ class Verdict:
     name: str
     failed_at: Stage | None = None
     reasons: tuple[str, ...] = ()
-    warning: str | None = None
     comparison: Comparison | None = None
     diagnosis: Diagnosis | None = None
     atol: float = 0.0
@@ -88,7 +93,7 @@ def judge_image(
     atol, rtol = tolerances.of(expected.dtype)
     # Equal images pass every limit, so the slow metrics need not be computed.
     metrics = () if np.array_equal(expected, actual) else tolerances.metrics
-    found = compare(
+    comparison = compare(
         expected,
         actual,
         threshold=atol,
@@ -96,16 +101,12 @@ def judge_image(
         allow_nan=tolerances.allow_nan,
         metrics=metrics,
     )
-    failed = failures(found, tolerances, metrics)
-    warning = None
-    if not failed and tolerances.warn is not None and (found.max_error or 0) > tolerances.warn:
-        warning = f"{name}: {worst(found)}, over {tolerances.warn:.6g}"
+    failed = failures(comparison, tolerances, metrics)
     return Verdict(
         name=name,
         failed_at=failed[0][0] if failed else None,
         reasons=tuple(reason for _, reason in failed),
-        warning=warning,
-        comparison=found,
+        comparison=comparison,
         diagnosis=diagnose(expected, actual) if failed else None,
         atol=atol,
         rtol=rtol,

@@ -21,8 +21,6 @@ from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import Subject, fitting_probe
 
-__all__ = ["COLOURS", "LawReport", "LawRow", "law_report", "report"]
-
 #: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
 COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
 
@@ -249,7 +247,7 @@ def _row(law: Law, subject: Subject) -> LawRow:
     message, why, applies = "", law.why, True
     held: bool | None = True
     # NaN and infinity among the test images are no fault of the caller's arithmetic.
-    with measuring() as found, np.errstate(all="ignore"):
+    with measuring() as deviations, np.errstate(all="ignore"):
         try:
             law.test(subject, law.limit)
         except AssertionError as error:
@@ -259,11 +257,13 @@ def _row(law: Law, subject: Subject) -> LawRow:
         except (TypeError, ValueError) as error:
             # Not of the bloom itself: report has called it before.
             message, held, applies = str(error), None, not isinstance(error, NotTaken)
-    limited = [one for one in found if not math.isinf(one.allowed)] if held is not None else []
-    worst = max(limited, key=lambda one: one.off / max(one.allowed, 1e-300), default=None)
+    limited = (
+        [item for item in deviations if not math.isinf(item.allowed)] if held is not None else []
+    )
+    worst = max(limited, key=lambda item: item.off / max(item.allowed, 1e-300), default=None)
     figures: dict[str, float] = {}
-    for one in found:
-        figures[one.name] = max(one.off, figures.get(one.name, -math.inf))
+    for item in deviations:
+        figures[item.name] = max(item.off, figures.get(item.name, -math.inf))
     return LawRow(
         name=law.name,
         held=held,

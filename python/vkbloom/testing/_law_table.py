@@ -16,8 +16,6 @@ from vkbloom.testing import _time as in_time
 from vkbloom.testing import _transparency as transparency
 from vkbloom.testing._subject import Subject
 
-__all__ = ["LAWS", "Law", "law_name"]
-
 
 @dataclass(frozen=True)
 class Law:

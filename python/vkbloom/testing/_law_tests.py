@@ -165,29 +165,29 @@ def channels(subject: Subject, limit: float) -> None:
 
 
 def stability(subject: Subject, limit: Mapping[str, float]) -> None:
-    found = subject.stability
-    if not found.energy.max() > 0:
+    result = subject.stability
+    if not result.energy.max() > 0:
         raise ValueError("the bloom of a small light is black")
     # Without a figure, such as the radius of a negative variance, there is nothing to judge.
-    known = {name: one for name, one in limit.items() if math.isfinite(getattr(found, name))}
+    known = {name: item for name, item in limit.items() if math.isfinite(getattr(result, name))}
     try:
-        moving_light.check_stable(found, known, subject.lamp)
+        moving_light.check_stable(result, known, subject.lamp)
     except ValueError:
         # At each pixel of the path, no more light leaves the image than lies in its outermost
         # pixels. So energy and peak may still be wrong by more than that; place and width may not.
-        lost = TEXEL * found.at_border
+        lost = TEXEL * result.at_border
         judged = ("ripple", "shimmer")
         loose = {name: known[name] + lost for name in known if name in judged}
-        whole = dataclasses.replace(found, at_border=0.0)
+        whole = dataclasses.replace(result, at_border=0.0)
         moving_light.check_stable(whole, loose, subject.lamp)
         raise
 
 
 def resolution(subject: Subject, limit: Mapping[str, float]) -> None:
-    found = subject.resolution
-    if not all(values.mean() > 0 for values in (found.r50, found.r90, found.peak)):
+    result = subject.resolution
+    if not all(values.mean() > 0 for values in (result.r50, result.r90, result.peak)):
         raise ValueError("the bloom of a light is black at some size")
-    scaled_scene.check_independent(found, limit["radius"], limit["peak"])
+    scaled_scene.check_independent(result, limit["radius"], limit["peak"])
 
 
 def finite(subject: Subject, limit: float) -> None:
@@ -226,10 +226,10 @@ def reference(subject: Subject, limit: float) -> None:
     if subject.differences is None:
         raise ValueError("the bloom has no reference")
     law = "each framebuffer is that of the reference"
-    found = subject.reference
-    over = [name for name, off in found.items() if not is_within(law, off, limit, name)]
+    result = subject.reference
+    over = [name for name, off in result.items() if not is_within(law, off, limit, name)]
     if over:
-        names = ", ".join(f"{name} is off by {found[name]:.3g}" for name in over)
+        names = ", ".join(f"{name} is off by {result[name]:.3g}" for name in over)
         fail("assert_reference", law, f"{names} of its largest value, {limit:g} allowed")
 
 
@@ -250,13 +250,13 @@ def shift_explained(subject: Subject, why: str) -> str:
     ]
     for axis, size in zip("xy", mean, strict=True):
         figure(f"shift_{axis}", float(size))
-    x, y = (max(0, place - _PERIOD // 2) for place in probe.centre)
+    x, y = (max(0, position - _PERIOD // 2) for position in probe.centre)
     places = [(x + i, y + i) for i in range(min(_PERIOD, probe.size[0] - x, probe.size[1] - y))]
     down = int(abs(mean[1]) > abs(mean[0]))
     shifts = np.array(
         [
-            _centroid(point_spread.point_spread(bloom, probe, at=place))[down] - place[down]
-            for place in places
+            _centroid(point_spread.point_spread(bloom, probe, at=position))[down] - position[down]
+            for position in places
         ]
     )
     shifts = shifts[np.isfinite(shifts)]

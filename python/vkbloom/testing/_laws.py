@@ -19,16 +19,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "assert_additive",
-    "assert_bounded_fireflies",
-    "assert_gain",
-    "assert_no_ringing",
-    "assert_superposition",
-    "assert_symmetric",
-    "first_infected",
-]
-
 _DEFAULT = Probe()
 
 
@@ -39,26 +29,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
     additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
     with a threshold, a clamp or a firefly filter is not linear.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width.
-    probe : Probe
-        The kind of test image, and the allowed errors.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(blur_strength=1.0)
-    >>> testing.assert_superposition(lambda image: reference.blur(image, settings))
-
-    A square is not linear:
-
-    >>> testing.assert_superposition(lambda image: image**2)  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-        ...
-    AssertionError: assert_superposition: ...
     """
     __tracebackhide__ = True
     # Otherwise the dtype would round halves and quarters of the values in the test images.
@@ -285,12 +255,12 @@ def assert_bounded_fireflies(
     left, top = (max(0, side // 2 - period // 2) for side in probe.size)
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     for light in brightness:
-        for place in ((left + x, top + y) for y in range(period) for x in range(period)):
-            image = probe.point(place, light)
-            result, error = probe.apply(bloom, image, exempt=place)
+        for position in ((left + x, top + y) for y in range(period) for x in range(period)):
+            image = probe.point(position, light)
+            result, error = probe.apply(bloom, image, exempt=position)
             compare_with_law(
                 "assert_bounded_fireflies",
-                f"a pixel of {light:g} at x {place[0]}, y {place[1]} brightens others by "
+                f"a pixel of {light:g} at x {position[0]}, y {position[1]} brightens others by "
                 f"{limit:g} at most",
                 result,
                 np.minimum(result, dark + limit),
@@ -353,10 +323,10 @@ def first_infected(
     for value in (math.nan, math.inf, -math.inf):
         image = probe.noise(0, probe.value)
         image[y, x] = value
-        found = bloom(probe.given(image))
-        if not isinstance(found, Mapping):
-            raise TypeError(f"bloom: it returns {type(found).__name__}, not a mapping of names")
-        for name, frame in found.items():
+        result = bloom(probe.given(image))
+        if not isinstance(result, Mapping):
+            raise TypeError(f"bloom: it returns {type(result).__name__}, not a mapping of names")
+        for name, frame in result.items():
             wrong = ~np.isfinite(np.asarray(frame))
             if wrong.shape[:2] == image.shape[:2]:
                 wrong[y, x] = False

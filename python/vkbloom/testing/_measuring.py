@@ -1,11 +1,11 @@
-"""What `vkbloom check` measures: a bloom of settings or of a program, its times and its likes."""
+"""What `vkbloom check` measures of a bloom of settings or of a program."""
 
 from __future__ import annotations
 
 import functools
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,8 +19,7 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._sampled import samples
-from vkbloom.testing._law_report import LawReport, law_report
-from vkbloom.testing._law_table import LAWS
+from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._programs import COARSE_ERROR, Program
@@ -48,7 +47,10 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """All that was measured of a bloom. `passes`: seconds at `size`."""
+    """All that is measured of a bloom; figures are measured when they are read.
+
+    `passes`: seconds at `size`.
+    """
 
     name: str
     device: str
@@ -57,10 +59,24 @@ class Measured:
     passes: Mapping[str, float]
     subject: Subject
     report: LawReport
-    spread: Spread
-    veiling_glare_index: float
-    first_infected: str | None
-    nearest: tuple[str, float]
+    renderer: Renderer
+
+    @functools.cached_property
+    def spread(self) -> Spread:
+        """The point spread of the lamp."""
+        return spread_of(self.subject.spread, self.subject.lamp)
+
+    @functools.cached_property
+    def veiling_glare_index(self) -> float:
+        """The index of the picture, or of the bloom alone."""
+        probe, bloom = self.subject.probe, self.subject.picture or self.subject.bloom
+        patch = max(1, min(probe.size) // 8)
+        return veiling_glare_index(bloom, size=probe.size, patch=patch, value=probe.value)
+
+    @functools.cached_property
+    def nearest(self) -> tuple[str, float]:
+        """The preset whose bloom is nearest, and its difference."""
+        return nearest_preset(self.name, self.subject.bloom, self.renderer)
 
 
 def exact(settings: Settings) -> Settings:
@@ -73,8 +89,8 @@ def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
     """Return the colours of a framebuffer as a function of the image."""
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        found = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
-        return found[..., : image.shape[2]]
+        result = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
+        return result[..., : image.shape[2]]
 
     return bloom
 
@@ -84,8 +100,8 @@ def of_settings(
 ) -> Subject:
     """Return the bloom of settings.
 
-    An own bloom is expected to keep the light of flat images, others to have the gain that a flat
-    image gets in its middle.
+    A file that saves BLOOM is expected to keep the light of flat images, other methods to have the
+    gain that a flat image gets in its middle.
     """
     used = exact(settings)
     bloom = shown(renderer, used, "bloom")
@@ -99,8 +115,8 @@ def of_settings(
         frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
-        own = isinstance(used, CustomMethod) and used.file.saves_bloom
-        subject.gain = 1.0 if own else subject.measured_gain
+        keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
+        subject.gain = 1.0 if keeps_light else subject.measured_gain
     return subject
 
 
@@ -115,12 +131,12 @@ def of_program(
 
     @functools.wraps(program)
     def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
-        found = program(image, **options)[..., :3]
+        result = program(image, **options)[..., :3]
         x, y, *_ = options.get("region") or (0, 0)
-        if found.shape[:2] == image.shape[:2]:
+        if result.shape[:2] == image.shape[:2]:
             x, y = 0, 0
-        height, width = found.shape[:2]
-        return np.asarray(found - image[y : y + height, x : x + width, :3])
+        height, width = result.shape[:2]
+        return np.asarray(result - image[y : y + height, x : x + width, :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(
@@ -134,53 +150,17 @@ def of_program(
     return subject
 
 
-def measured(
-    subject: Subject,
-    renderer: Renderer,
-    *,
-    name: str,
-    device: str,
-    settings: Settings | None,
-    passes: Mapping[str, float],
-    frame: tuple[int, int],
-    required: tuple[str, ...],
-    progress: Callable[[str], None],
-) -> Measured:
-    """Measure a bloom."""
-    report = law_report(subject, LAWS, required, progress)
-    probe = subject.probe
-    progress("presets")
-    return Measured(
-        name=name,
-        device=device,
-        settings=settings,
-        size=frame,
-        passes=passes,
-        subject=subject,
-        report=report,
-        spread=spread_of(subject.spread, subject.lamp),
-        veiling_glare_index=veiling_glare_index(
-            subject.picture or subject.bloom,
-            size=probe.size,
-            patch=max(1, min(probe.size) // 8),
-            value=probe.value,
-        ),
-        first_infected=subject.first_infected,
-        nearest=nearest_preset(name, subject.bloom, renderer),
-    )
-
-
 def pass_times(
     renderer: Renderer, settings: Settings, size: tuple[int, int], repeats: int = 5
 ) -> dict[str, float]:
     """Return the shortest time of each pass in seconds, for an image of 16-bit floats."""
     images = [noise(size, seed).astype(np.float16) for seed in (0, 1)]
-    found: dict[str, float] = {}
+    results: dict[str, float] = {}
     for turn in range(repeats + 1):
         timings = renderer.apply(images[turn % 2], settings, framebuffers=("final",)).timings
         if turn:
-            found = {name: min(time, found.get(name, time)) for name, time in timings.items()}
-    return found
+            results = {name: min(time, results.get(name, time)) for name, time in timings.items()}
+    return results
 
 
 def run_time(program: Bloom, size: tuple[int, int]) -> dict[str, float]:
@@ -229,32 +209,32 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     image = noise((96, 64), 2).astype(np.float32)
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
-    found = {}
+    results = {}
     for name, array in expected.items():
         wanted, got = np.atleast_3d(array)[..., :3], np.atleast_3d(frames[name])[..., :3]
         if wanted.shape != got.shape:
             raise ValueError(f"reference: the shape of {name}, {wanted.shape}, is not {got.shape}")
         largest = float(np.abs(wanted).max()) or 1.0
-        found[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
-    return found
+        results[name] = float(np.abs(got.astype(np.float64) - wanted).max()) / largest
+    return results
 
 
-def nearest_preset(own: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
+def nearest_preset(excluded: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
     """Return the other preset whose bloom of four lights is nearest, at its best intensity."""
     image = lights(VIEW)
     target = np.asarray(bloom(image))[..., :3].astype(np.float64)
     if not np.linalg.norm(target) > 0:
         return "", math.nan
-    found = {}
+    results = {}
     for name in presets:
-        if own == name:
+        if excluded == name:
             continue
         light = preset_bloom(renderer, name).astype(np.float64)
         power = float((light * light).sum())
         factor = max(0.0, float((light * target).sum()) / power) if power > 0 else 0.0
-        found[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
-    best = min(found, key=lambda name: found[name])
-    return best, found[best]
+        results[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
+    best = min(results, key=lambda name: results[name])
+    return best, results[best]
 
 
 #: Blooms of presets by the adapter and their name: most of the time goes into their pipelines.

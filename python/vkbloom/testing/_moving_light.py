@@ -16,16 +16,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "LIMITS",
-    "Stability",
-    "area_sampled",
-    "assert_stable",
-    "check_stable",
-    "moments",
-    "stability",
-]
-
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.
@@ -134,16 +124,6 @@ def stability(
     Stability
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
-
-    Examples
-    --------
-    A pyramid whose first reduction drops every second pixel loses a small light half of the time:
-
-    >>> from vkbloom import testing
-    >>> def dropping(image):
-    ...     return image[::2, ::2].repeat(2, axis=0).repeat(2, axis=1)
-    >>> testing.stability(dropping, texel=2).ripple > 1
-    True
     """
     __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)
@@ -163,8 +143,8 @@ def stability(
     lit = probe.apply(bloom, probe.point(probe.centre, probe.value))[0][:, :, 0]
     spread = (lit - dark) / probe.value
     rows = []
-    for place in positions.reshape(-1, 2):
-        given = _light(probe, place)
+    for position in positions.reshape(-1, 2):
+        given = _light(probe, position)
         result = probe.values(bloom(given), given)[0][:, :, 0]
         rows.append(_figures(result - dark, probe, given, spread))
     energy, across, down, peak, ideal, radius, border = np.array(rows).T.reshape(
@@ -218,47 +198,47 @@ def assert_stable(
     for name, limit in limits.items():
         check_number(name, limit, 0.0, math.inf)
     probe = probe or _wide(texel)
-    found = stability(bloom, texel=texel, steps=steps, probe=probe)
-    check_stable(found, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
+    figures = stability(bloom, texel=texel, steps=steps, probe=probe)
+    check_stable(figures, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
 
 
-def check_stable(found: Stability, limits: Mapping[str, float], probe: Probe) -> None:
+def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
     """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
     __tracebackhide__ = True
-    if not found.energy.max() > 0:
+    if not figures.energy.max() > 0:
         fail(
             "assert_stable",
             "the bloom of a light is not black",
-            f"the largest sum of the bloom is {found.energy.max():.3g}: only sums above 0 are "
+            f"the largest sum of the bloom is {figures.energy.max():.3g}: only sums above 0 are "
             "allowed",
         )
-    check_inside(found.at_border, probe.size)
+    check_inside(figures.at_border, probe.size)
     shown = {
-        "ripple": (found.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
+        "ripple": (figures.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
         "jitter": (
-            np.hypot(found.shift[..., 0], found.shift[..., 1]),
+            np.hypot(figures.shift[..., 0], figures.shift[..., 1]),
             "the centroid of the bloom",
             "is {:.3g} pixels from that of the image",
         ),
         "shimmer": (
-            found.peak / found.ideal,
+            figures.peak / figures.ideal,
             "the peak of the bloom",
             "changes by {:.3g} of its mean, beside that of a convolution",
         ),
-        "growth": (found.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
+        "growth": (figures.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
     }
     laws = {
         name: f"{shown[name][1]} stays the same while a light smaller than a pixel moves"
         for name in limits
     }
-    off = {name: getattr(found, name) for name in limits}
+    off = {name: getattr(figures, name) for name in limits}
     over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
     for name in over[:1]:
         values, what, how = shown[name]
         fail(
             "assert_stable",
             laws[name],
-            f"{what} {how.format(off[name])}, {_extremes(found, values)}: {limits[name]:.3g} "
+            f"{what} {how.format(off[name])}, {_extremes(figures, values)}: {limits[name]:.3g} "
             "allowed" + f"; also above their limits: {', '.join(over[1:])}" * bool(over[1:]),
         )
 
@@ -268,9 +248,9 @@ def area_sampled(
 ) -> Image:
     """Return the share of each pixel that a rectangle covers."""
     covered = []
-    for count, place, side in zip(size, centre, sides, strict=True):
+    for count, position, side in zip(size, centre, sides, strict=True):
         edges = np.arange(count + 1) - 0.5
-        covered.append(np.diff(np.clip(edges, place - side / 2, place + side / 2)))
+        covered.append(np.diff(np.clip(edges, position - side / 2, position + side / 2)))
     return np.outer(covered[1], covered[0])
 
 
@@ -279,9 +259,9 @@ def _wide(texel: int) -> Probe:
     return Probe(size=(side, side))
 
 
-def _light(probe: Probe, place: NDArray[np.float64]) -> NDArray[Any]:
+def _light(probe: Probe, position: NDArray[np.float64]) -> NDArray[Any]:
     """Return the image of the light in the probe's dtype."""
-    share = area_sampled(probe.size, (place[0], place[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
+    share = area_sampled(probe.size, (position[0], position[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
     return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
 
 
@@ -297,14 +277,14 @@ def _convolved_peak(spread: Image, image: Image) -> float:
 def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:
     """Return energy, x and y of the shift, peak, ideal, radius, and the share at the border."""
     image = probe.values(given, given)[0][:, :, 0]
-    energy, place, variance = moments(bloom)
+    energy, position, variance = moments(bloom)
     _, from_place, from_variance = moments(image)
     # Replace the variance of the sampled light by that of the square.
     left = variance - from_variance + _LIGHT**2 / 6
     return (
         energy,
-        place[0] - from_place[0],
-        place[1] - from_place[1],
+        position[0] - from_place[0],
+        position[1] - from_place[1],
         float(bloom.max()),
         _convolved_peak(spread, image),
         math.sqrt(left) if left >= 0 else math.nan,
@@ -340,11 +320,11 @@ def _largest(values: NDArray[np.float64]) -> float:
     return float(known.max()) if known.size else math.nan
 
 
-def _extremes(found: Stability, values: NDArray[np.float64]) -> str:
+def _extremes(figures: Stability, values: NDArray[np.float64]) -> str:
     """Return a text with the positions of the smallest and the largest value."""
     parts = []
     for index in (np.nanargmin(values), np.nanargmax(values)):
-        place = np.unravel_index(int(index), values.shape)
-        x, y = found.positions[place]
-        parts.append(f"{values[place]:.4g} with the light at x {x:.4g}, y {y:.4g}")
+        position = np.unravel_index(int(index), values.shape)
+        x, y = figures.positions[position]
+        parts.append(f"{values[position]:.4g} with the light at x {x:.4g}, y {y:.4g}")
     return f"from {parts[0]} to {parts[1]}"

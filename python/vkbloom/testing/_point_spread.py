@@ -12,16 +12,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law, fail, is_within
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "assert_centroid_kept",
-    "assert_separable",
-    "assert_spread",
-    "border_share",
-    "check_inside",
-    "measured_spread",
-    "point_spread",
-]
-
 _DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
 # that light, which moves a centroid by a thousandth of half the image.
@@ -136,11 +126,11 @@ def assert_centroid_kept(
     spread, error = measured_spread(bloom, probe, at)
     _check_lit("assert_centroid_kept", spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
-    place = at or probe.centre
+    position = at or probe.centre
     for channel in range(spread.shape[2]):
         for axis, name in ((0, "x"), (1, "y")):
             profile = spread[:, :, channel].sum(axis=axis)
-            distance = np.arange(len(profile), dtype=np.float64) - place[axis]
+            distance = np.arange(len(profile), dtype=np.float64) - position[axis]
             off = float((profile * distance).sum() / profile.sum())
             allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
             law = "the centroid of the light of a pixel is that pixel"
@@ -148,8 +138,8 @@ def assert_centroid_kept(
                 fail(
                     "assert_centroid_kept",
                     law,
-                    f"the centroid is {name} {place[axis] + off:.6g}, {off:+.3g} pixels from "
-                    f"{name} {place[axis]}, channel {channel}: {allowed:.3g} allowed",
+                    f"the centroid is {name} {position[axis] + off:.6g}, {off:+.3g} pixels from "
+                    f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed",
                 )
 
 
@@ -192,20 +182,20 @@ def assert_spread(
         for axis, name in ((0, "x"), (1, "y")):
             profile = spread[:, :, channel].sum(axis=axis)
             distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
-            found = _deviation(profile)
+            result = _deviation(profile)
             # The error of the variance is 2 sigma times the error of the standard deviation.
             variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
-            allowed = rtol * pair[axis] + variance_error / max(2 * found, 1e-6)
+            allowed = rtol * pair[axis] + variance_error / max(2 * result, 1e-6)
             law = (
                 f"the standard deviation of the light of a pixel along {name} is "
                 f"{pair[axis]:.6g} pixels"
             )
-            if not is_within(law, abs(found - pair[axis]), allowed):
+            if not is_within(law, abs(result - pair[axis]), allowed):
                 fail(
                     "assert_spread",
                     law,
-                    f"it is {found:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
-                    f"{channel}: off by {abs(found - pair[axis]):.3g}, {allowed:.3g} allowed",
+                    f"it is {result:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
+                    f"{channel}: off by {abs(result - pair[axis]):.3g}, {allowed:.3g} allowed",
                 )
 
 
@@ -214,10 +204,10 @@ def measured_spread(
 ) -> tuple[Image, float]:
     """Return the point spread and the error of its values."""
     __tracebackhide__ = True
-    place = at or probe.centre
-    if not all(0 <= number < side for number, side in zip(place, probe.size, strict=True)):
+    position = at or probe.centre
+    if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
-    lit, lit_error = probe.apply(bloom, probe.point(place, probe.value))
+    lit, lit_error = probe.apply(bloom, probe.point(position, probe.value))
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
 

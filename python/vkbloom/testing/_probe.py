@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size
 
-__all__ = ["Bloom", "Image", "Probe", "beside_multiple", "small_probe"]
-
 #: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
 
@@ -98,10 +96,10 @@ class Probe:
         """Return an image of one value."""
         return np.full((self.size[1], self.size[0], self.colours), value)
 
-    def point(self, place: tuple[int, int], value: float) -> Image:
+    def point(self, position: tuple[int, int], value: float) -> Image:
         """Return a black image with one lit pixel at (x, y)."""
         image = self.flat(0.0)
-        image[place[1], place[0]] = value
+        image[position[1], position[0]] = value
         return image
 
     def noise(self, index: int, highest: float) -> Image:
@@ -113,21 +111,9 @@ class Probe:
     def apply(
         self, bloom: Bloom, image: Image, *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, float]:
-        """Return the bloom of an image, and the allowed error of its values.
+        """Return the bloom of an image in real units, without alpha, and the error of its values.
 
-        Parameters
-        ----------
-        bloom : callable
-        image : ndarray of float64, shape (H, W, C)
-            In real units, C as in `colours`.
-        exempt : (int, int), optional
-            x and y of a pixel to ignore; it is 0 in the result.
-
-        Returns
-        -------
-        result : ndarray of float64, shape (H, W, C)
-            The result in real units, without alpha.
-        error : float
+        The pixel `exempt`, x and y, is ignored; it is 0 in the result.
         """
         __tracebackhide__ = True
         if not callable(bloom):
@@ -136,17 +122,7 @@ class Probe:
         return self.values(bloom(given), given, exempt=exempt)
 
     def given(self, image: Image) -> NDArray[Any]:
-        """Return an image in the probe's dtype and number of channels, as input of a bloom.
-
-        Parameters
-        ----------
-        image : ndarray of float64, shape (H, W, C)
-            In real units, C as in `colours`.
-
-        Returns
-        -------
-        ndarray, shape (H, W) or (H, W, channels)
-        """
+        """Return an image in the probe's dtype and number of channels, as input of a bloom."""
         stored = self._stored(image)
         if self.channels == 4:
             opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
@@ -157,20 +133,7 @@ class Probe:
     def values(
         self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, float]:
-        """Check the result of a bloom for the input `given`.
-
-        Parameters
-        ----------
-        result : array_like
-        given : ndarray
-        exempt : (int, int), optional
-            x and y of a pixel to ignore; it is 0 in the result.
-
-        Returns
-        -------
-        result, error
-            As for `apply`, which has the same errors.
-        """
+        """Check the result of a bloom for the input `given`, and return the same as `apply`."""
         __tracebackhide__ = True
         if isinstance(result, Mapping):
             raise TypeError(

@@ -22,8 +22,6 @@ from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
 from vkbloom.testing._probe import Bloom
 
-__all__ = ["COARSE_ERROR", "Program", "command"]
-
 _PLACES: Final = ("{input}", "{output}")
 #: Keywords of the bloom, by what stands for them in a command.
 _KEYWORDS: Final = {"{region}": "region", "{frame}": "time"}
@@ -82,24 +80,22 @@ class Program:
         if isinstance(argv, str) or not all(isinstance(word, str) for word in argv):
             raise TypeError(f"argv: {argv!r} is not a sequence of str; use shlex.split")
         self._argv = tuple(argv)
-        if missing := [place for place in _PLACES if not any(place in word for word in argv)]:
-            raise ValueError(f"argv: {' '.join(argv)!r} has no {missing[0]}")
+        for placeholder in _PLACES:
+            if not any(placeholder in word for word in argv):
+                raise ValueError(f"argv: {' '.join(argv)!r} has no {placeholder}")
         if not suffix.startswith("."):
             raise ValueError(f"suffix: {suffix!r} does not begin with a dot")
         check_number("timeout", timeout, 1e-3, 1e6)
         self._suffix, self._timeout = suffix, timeout
         self.bits: int | None = None
         # The laws ask for the keywords that a bloom takes.
-        kinds = dict.fromkeys(
-            (key for place, key in _KEYWORDS.items() if any(place in word for word in argv)),
-            inspect.Parameter.KEYWORD_ONLY,
-        )
-        self.__signature__ = inspect.Signature(
-            [
-                inspect.Parameter(name, kind, default=None)
-                for name, kind in {"image": inspect.Parameter.POSITIONAL_ONLY, **kinds}.items()
-            ]
-        )
+        taken = [
+            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None)
+            for placeholder, key in _KEYWORDS.items()
+            if any(placeholder in word for word in argv)
+        ]
+        image = inspect.Parameter("image", inspect.Parameter.POSITIONAL_ONLY)
+        self.__signature__ = inspect.Signature([image, *taken])
 
     def __call__(
         self,
@@ -127,7 +123,7 @@ class Program:
             )
         wrong = ~np.isfinite(result)
         if wrong.any() and np.isfinite(image).all():
-            y, x, channel = (int(place) for place in np.argwhere(wrong)[0])
+            y, x, channel = (int(position) for position in np.argwhere(wrong)[0])
             raise ValueError(
                 f"{self._name}: it wrote {result[y, x, channel]} at x {x}, y {y}, channel "
                 f"{channel} for an image of finite values ({int(wrong.sum())} such values)"
@@ -140,7 +136,7 @@ class Program:
 
     def _run(self, values: Mapping[str, str]) -> None:
         __tracebackhide__ = True
-        words = [_PLACE.sub(lambda found: values[found[0]], word) for word in self._argv]
+        words = [_PLACE.sub(lambda match: values[match[0]], word) for word in self._argv]
         # A session of its own, so that what the program started ends with it.
         with subprocess.Popen(
             words,

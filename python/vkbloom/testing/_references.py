@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.images import Picture
 
-__all__ = ["NAME", "Origin", "Reference", "ReferenceFolder", "cpu_vendor"]
-
 #: Allowed names of references and framebuffers: safe as file names on every system.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
 _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
@@ -93,10 +91,6 @@ class ReferenceFolder:
         """Return the file that lists the references of a name."""
         return self.path / f"{name}.json"
 
-    def names(self) -> list[str]:
-        """List the names that have references."""
-        return sorted(file.name.removesuffix(".json") for file in self.path.glob("*.json"))
-
     def load(self, name: str) -> list[Reference]:
         """Read the references of a name."""
         return [
@@ -160,8 +154,8 @@ class ReferenceFolder:
             raise ValueError(f"{file}: not a list of references: no {error}") from error
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise ValueError(f"{file}: not a list of references: {error}") from error
-        found: list[dict[str, Any]] = references
-        return found
+        result: list[dict[str, Any]] = references
+        return result
 
     def _image(self, entry: Mapping[str, Any], listed_in: Path) -> NDArray[Any]:
         file = self.path / entry["file"]
@@ -230,9 +224,9 @@ def cpu_vendor() -> str:
         information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
         information = ""
-    found = re.search(r"^(?:vendor_id|CPU implementer)\s*:\s*(\S+)", information, re.MULTILINE)
-    if found:
-        return found[1]
+    match = re.search(r"^(?:vendor_id|CPU implementer)\s*:\s*(\S+)", information, re.MULTILINE)
+    if match:
+        return match[1]
     return os.environ.get("PROCESSOR_IDENTIFIER") or platform.processor() or platform.machine()
 
 

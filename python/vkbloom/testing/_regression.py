@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +22,6 @@ from vkbloom.testing._judging import Verdict, first_failure, judge
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
 from vkbloom.testing._test_report import Record
 
-__all__ = ["FrameDifferenceWarning", "FrameRegression", "Mode", "name_of_test"]
-
-
-class FrameDifferenceWarning(UserWarning):
-    """An image passed, but differs by more than ``warn``."""
-
 
 class Limits(TypedDict, total=False):
     """The fields of `Tolerances`."""
@@ -37,7 +30,6 @@ class Limits(TypedDict, total=False):
     rtol: float | None
     fail_percent: float
     hard_fail: float | None
-    warn: float | None
     ssim: float | None
     psnr: float | None
     flip: float | None
@@ -52,7 +44,6 @@ class Mode:
     - `add`: Whether to write further references for failed checks, and keep the existing ones.
     - `allow_missing`: Whether a check without a reference passes.
     - `hashed`: Whether references are hashes, and every value must be equal.
-    - `expect_adapter`: A part of the name or driver of the adapter that frames must come from.
     - `parts`: Folder for the report's pictures of failed checks; None: no report.
     """
 
@@ -60,7 +51,6 @@ class Mode:
     add: bool = False
     allow_missing: bool = False
     hashed: bool = False
-    expect_adapter: str | None = None
     parts: Path | None = None
 
 
@@ -133,15 +123,7 @@ class FrameRegression:
             reference. `Frames` have their own.
         **limits
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
-            decide. A difference above `warn` that passes issues a `FrameDifferenceWarning`.
-
-        Raises
-        ------
-        AssertionError
-            The frames differ, or there is no reference. The message names the position and the
-            remedy.
-        OSError
-            A file cannot be read or written.
+            decide.
         """
         __tracebackhide__ = True
         if exact:
@@ -154,7 +136,6 @@ class FrameRegression:
         given = _Given(
             self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
         )
-        self._check_adapter(given.origin)
         if self._mode.hashed:
             self._check_hashes(given)
             return
@@ -194,10 +175,6 @@ class FrameRegression:
         **limits
             As for `check`.
 
-        Raises
-        ------
-        AssertionError
-            The frames differ.
         """
         __tracebackhide__ = True
         tolerances = Tolerances(**limits)
@@ -223,16 +200,6 @@ class FrameRegression:
         self._has_used_name = True
         return self._name
 
-    def _check_adapter(self, origin: Origin) -> None:
-        __tracebackhide__ = True
-        wanted = self._mode.expect_adapter
-        if wanted is None or origin.adapter is None:
-            return
-        if wanted.lower() not in f"{origin.adapter} {origin.driver or ''}".lower():
-            raise ValueError(
-                f"--bloom-expect-adapter={wanted}: the frames come from {origin.summary}"
-            )
-
     def _of_one_driver(self, references: list[Reference], given: _Given) -> list[Reference]:
         """Return the references that the driver of the given frames made.
 
@@ -246,9 +213,13 @@ class FrameRegression:
                 "results may differ between machines; use the driver of vkbloom-lavapipe, or "
                 "tolerances"
             )
-        same = [one for one in references if one.origin.driver_sha256 == origin.driver_sha256]
+        same = [
+            reference
+            for reference in references
+            if reference.origin.driver_sha256 == origin.driver_sha256
+        ]
         if references and not same and not (self._mode.update or self._mode.add):
-            made_by = "; ".join(one.origin.summary for one in references)
+            made_by = "; ".join(reference.origin.summary for reference in references)
             raise ValueError(
                 f"exact: {self._folder.file(given.name)} has no reference of the frames' driver "
                 f"({origin.summary}), only of {made_by}; install that version of "
@@ -266,19 +237,18 @@ class FrameRegression:
                 "use the driver of vkbloom-lavapipe"
             )
         file = self._folder.file(given.name).with_suffix(".hashes")
-        listed, found = hashes.load(file), hashes.hashes_of(given.images)
+        listed, results = hashes.load(file), hashes.hashes_of(given.images)
         expected = listed.get(driver)
         message = (
-            "there is no reference" if expected is None else hashes.difference(expected, found)
+            "there is no reference" if expected is None else hashes.difference(expected, results)
         )
         if message and (self._mode.update or self._mode.add):
-            hashes.save(file, {**(listed if self._mode.add else {}), driver: found})
+            hashes.save(file, {**(listed if self._mode.add else {}), driver: results})
             self._record(given, "written", None)
             return
         missing = expected is None
         outcome = "missing" if missing else "failed" if message else "passed"
         record = self._record(given, outcome, None)
-        record["has_files"] = False
         if message and not (missing and self._mode.allow_missing):
             record["message"] = (
                 f"{given.name}: {message} of {file} for the driver {driver[:12]}. Compare images "
@@ -324,16 +294,11 @@ class FrameRegression:
         __tracebackhide__ = True
         failure = first_failure(verdicts)
         record = self._record(given, "failed" if failure else "passed", reference)
-        record["has_files"] = count is not None
         record["first_failure"] = failure.name if failure else None
         record["framebuffers"] = [
             test_report.figures(verdict, given.images) for verdict in verdicts
         ]
         if failure is None:
-            for verdict in verdicts:
-                if verdict.warning:
-                    text = f"{given.name}: {verdict.warning}"
-                    warnings.warn(text, FrameDifferenceWarning, stacklevel=3)
             return
         record["message"] = _message(given, verdicts, reference, count)
         if self._mode.parts is not None:
@@ -347,7 +312,6 @@ class FrameRegression:
             "test": self._test,
             "name": given.name,
             "folder": str(self._folder.path),
-            "has_files": True,
             "outcome": outcome,
             "origin": given.origin.summary,
             "reference_origin": reference.origin.summary if reference else None,

@@ -17,13 +17,6 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe
 
-__all__ = [
-    "ResolutionResponse",
-    "assert_resolution_independent",
-    "check_independent",
-    "resolution_response",
-]
-
 _DEFAULT = Probe(size=(128, 128))
 _SCALES: Final = (0.5, 1.0, 2.0, 4.0)
 # Rings that the light is sorted into, for each pixel of distance, and pixels of the shorter side.
@@ -81,29 +74,18 @@ def resolution_response(
     Returns
     -------
     ResolutionResponse
-
-    Examples
-    --------
-    The radius of this blur is fixed in pixels, so at twice the height its share is half as large:
-
-    >>> from vkbloom import reference, testing
-    >>> def bloom(image):
-    ...     return reference.blur(image, vkbloom.Separable(blur_scale=4.0))
-    >>> found = testing.resolution_response(bloom, scales=(1, 2))
-    >>> bool(found.r90[1] < 0.7 * found.r90[0])
-    True
     """
     __tracebackhide__ = True
     check_number("light", light, math.ulp(0.0), 1.0)
     sizes = _sizes(scales, probe.size)
     rows = []
     for width, height in sizes:
-        one = dataclasses.replace(probe, size=(width, height))
+        sized = dataclasses.replace(probe, size=(width, height))
         side = light * height
-        share = area_sampled(one.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
-        scene = probe.value * np.repeat(share[:, :, np.newaxis], one.colours, axis=2)
-        lit = one.apply(bloom, scene)[0][:, :, 0]
-        lit -= one.apply(bloom, one.flat(0.0))[0][:, :, 0]
+        share = area_sampled(sized.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
+        scene = probe.value * np.repeat(share[:, :, np.newaxis], sized.colours, axis=2)
+        lit = sized.apply(bloom, scene)[0][:, :, 0]
+        lit -= sized.apply(bloom, sized.flat(0.0))[0][:, :, 0]
         radii = _radii(lit, (0.5, 0.9))
         rows.append((radii[0] / height, radii[1] / height, float(lit.max()) / probe.value))
     r50, r90, peak = np.array(rows).T
@@ -142,15 +124,15 @@ def assert_resolution_independent(
     check_independent(resolution_response(bloom, scales, light=light, probe=probe), radius, peak)
 
 
-def check_independent(found: ResolutionResponse, radius: float, peak: float) -> None:
+def check_independent(response: ResolutionResponse, radius: float, peak: float) -> None:
     """Raise AssertionError if radii or peak change by more than a share of their mean."""
     __tracebackhide__ = True
     for name, what, values, allowed in (
-        ("r50", "the radius of 50 % of the light", found.r50, radius),
-        ("r90", "the radius of 90 % of the light", found.r90, radius),
-        ("peak", "the peak of the bloom", found.peak, peak),
+        ("r50", "the radius of 50 % of the light", response.r50, radius),
+        ("r90", "the radius of 90 % of the light", response.r90, radius),
+        ("peak", "the peak of the bloom", response.peak, peak),
     ):
-        share = "the light's value" if values is found.peak else "the height"
+        share = "the light's value" if values is response.peak else "the height"
         if not values.mean() > 0:
             fail(
                 "assert_resolution_independent",
@@ -164,8 +146,8 @@ def check_independent(found: ResolutionResponse, radius: float, peak: float) -> 
             fail(
                 "assert_resolution_independent",
                 law,
-                f"{what} is {values[low]:.4g} of {share} at {_shown(found.sizes[low])} and "
-                f"{values[high]:.4g} at {_shown(found.sizes[high])}: off by {change:.3g} of the "
+                f"{what} is {values[low]:.4g} of {share} at {_shown(response.sizes[low])} and "
+                f"{values[high]:.4g} at {_shown(response.sizes[high])}: off by {change:.3g} of the "
                 f"mean, {allowed:.3g} allowed",
             )
 
@@ -173,7 +155,7 @@ def check_independent(found: ResolutionResponse, radius: float, peak: float) -> 
 def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:
     if not len(scales):
         raise ValueError("scales: the sequence is empty; give at least one scale")
-    found = []
+    results = []
     for scale in scales:
         check_number("scales", scale, 1e-3, 1e3)
         width, height = (float(side * scale) for side in size)
@@ -182,8 +164,8 @@ def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, i
                 f"scales: {scale!r} makes {width:g} x {height:g} of an image of {_shown(size)}, "
                 "not integers; choose a scale or a size with integer sides"
             )
-        found.append((int(width), int(height)))
-    return tuple(found)
+        results.append((int(width), int(height)))
+    return tuple(results)
 
 
 def _radii(plane: Image, shares: Sequence[float]) -> list[float]:

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
+from vkbloom._checks import check_number, import_extra
 from vkbloom._io.srgb import decode_srgb, encode_srgb
-
-__all__ = ["Flash", "Flicker", "flash", "flicker"]
 
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
 # relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
@@ -141,7 +139,7 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
         red_flashes=red[0],
         area=general[1],
         red_area=red[1],
-        second=max(general, red, key=lambda found: found[1])[2],
+        second=max(general, red, key=lambda match: match[1])[2],
     )
 
 
@@ -288,11 +286,10 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
 
 
 def _jod(frames: list[NDArray[Any]], fps: float) -> float:
-    import pycvvdp  # noqa: PLC0415  an extra, and it imports PyTorch
-
+    package = import_extra("pycvvdp", "cvvdp", "The JOD of flicker")
     lights = np.stack([_linear(np.asarray(frame)[..., :3]).astype(np.float32) for frame in frames])
     still = np.broadcast_to(lights.mean(axis=0), lights.shape)
-    metric = pycvvdp.cvvdp(display_name="standard_4k", heatmap=None, quiet=True)
+    metric = package.cvvdp(display_name="standard_4k", heatmap=None, quiet=True)
     encoded = [encode_srgb(x).astype(np.float32) for x in (lights, still)]
     jod, _ = metric.predict(*encoded, dim_order="FHWC", frames_per_second=fps)
     return float(jod)

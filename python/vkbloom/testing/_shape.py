@@ -16,8 +16,6 @@ from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
 
-__all__ = ["SIZE_LIMITS", "assert_round", "assert_sizes", "roundness"]
-
 _DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
@@ -42,21 +40,10 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     count as three. Contours that are nearer everywhere, or that leave the image, are not in the
     result.
 
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-
     Returns
     -------
     dict of float to float
         Greatest over smallest distance, by the share of the peak.
-
-    Raises
-    ------
-    AssertionError
-        A result is not finite.
     """
     __tracebackhide__ = True
     plane = point_spread(bloom, probe).mean(axis=2)
@@ -73,7 +60,7 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
     rays = _bilinear(
         plane, x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps)
     )
-    found = {}
+    results = {}
     for level in LEVELS:
         above = rays >= level * peak
         if not above.any(axis=1).all() or above[:, -1].any():
@@ -82,8 +69,8 @@ def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
         inner, outer = (rays[np.arange(_ANGLES), last + i] for i in (0, 1))
         radii = steps[last] + 0.125 * (inner - level * peak) / np.maximum(inner - outer, 1e-300)
         if radii.max() >= _MIN_RADIUS:
-            found[level] = float(radii.max() / max(radii.min(), _MIN_RADIUS))
-    return found
+            results[level] = float(radii.max() / max(radii.min(), _MIN_RADIUS))
+    return results
 
 
 @checked
@@ -100,22 +87,17 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
         Takes an image and returns one of the same height and width: the bloom alone.
     probe : Probe
     limit : float
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
-    found = roundness(bloom, probe)
-    if not found:
+    ratios = roundness(bloom, probe)
+    if not ratios:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
     reasons = [
         f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction as in "
         "another"
-        for level, ratio in found.items()
+        for level, ratio in ratios.items()
         if not is_within(law, ratio, limit, f"round_{level:g}")
     ]
     if reasons:
@@ -141,11 +123,6 @@ def assert_sizes(
     limits : mapping of str to float, optional
         Largest difference from the size 16 n: "width", "energy" and "flat" as shares, "centroid" in
         pixels; by default 0.05, 0.05, 0.1, 0.3.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, a result is black or not finite.
     """
     __tracebackhide__ = True
     allowed = SIZE_LIMITS | dict(limits or {})
@@ -179,11 +156,11 @@ def _compare_sizes(
     reasons: dict[str, str] = {}
     for step in (-3, -2, -1, 1, 2, 3):
         sized = dataclasses.replace(probe, size=(width + step, height + step))
-        found = _square_figures(bloom, sized, at, dark)
+        result = _square_figures(bloom, sized, at, dark)
         off = {
-            "width": abs(found[0] - base[0]) / base[0] if base[0] > 0 else 0.0,
-            "energy": abs(found[1] - base[1]) / base[1],
-            "centroid": math.hypot(found[2] - base[2], found[3] - base[3]),
+            "width": abs(result[0] - base[0]) / base[0] if base[0] > 0 else 0.0,
+            "energy": abs(result[1] - base[1]) / base[1],
+            "centroid": math.hypot(result[2] - base[2], result[3] - base[3]),
         }
         if step < 0:  # the other sizes are as far from multiples of 4
             off["flat"] = float(np.abs(_flatness(bloom, sized) - base_flat).max())
@@ -219,13 +196,13 @@ def _square_figures(
     left, top = at
     image[top : top + _SQUARE, left : left + _SQUARE] = probe.value
     lit = probe.apply(bloom, image)[0].mean(axis=2) - dark
-    energy, place, variance = moments(lit)
+    energy, position, variance = moments(lit)
     if not energy > 0:
         fail("assert_sizes", "the bloom of a square is not black", f"its energy is {energy:.3g}")
     middle = (_SQUARE - 1) / 2
     squared = variance - 2 * (_SQUARE**2 - 1) / 12
     figure("squared_width", squared)
-    shift = np.subtract(place, (left, top)) - middle
+    shift = np.subtract(position, (left, top)) - middle
     return math.sqrt(max(squared, 0.0)), energy, shift[0], shift[1], border_share(lit)
 
 

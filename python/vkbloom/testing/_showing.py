@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, Final
 
 import click
-import numpy as np
 
-from vkbloom._fit.result import diagram
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
+from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, LawRow
 from vkbloom.testing._measuring import VIEW, Measured
@@ -23,16 +21,21 @@ _OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
 _COLOURS: Final = {"required": "red", "broken": "yellow", "untested": "bright_black"}
 
 
-def as_text(found: Measured) -> str:
+def as_text(measured: Measured) -> str:
     """Return tables for a terminal; broken laws are red if they are required, else yellow."""
-    lines = [f"{found.name}, on {found.device}", ""]
-    width, height = found.size
+    lines = [f"{measured.name}, on {measured.device}", ""]
+    width, height = measured.size
     lines.append(f"passes at {width} x {height}{'':<10} ms")
-    for name, seconds in found.passes.items():
+    for name, seconds in measured.passes.items():
         lines.append(f"  {name:<24}{1000 * seconds:8.3f}")
-    lines.append(f"  {'together':<24}{1000 * sum(found.passes.values()):8.3f}")
-    lines += ["", "figures", *(f"  {name:<24}{text}" for name, text in figures(found).items()), ""]
-    report = found.report
+    lines.append(f"  {'together':<24}{1000 * sum(measured.passes.values()):8.3f}")
+    lines += [
+        "",
+        "figures",
+        *(f"  {name:<24}{text}" for name, text in figures(measured).items()),
+        "",
+    ]
+    report = measured.report
     kinds = {row.name: report.kind(row) for row in report.rows}
     for line in str(report).splitlines():
         kind = kinds.get(line.partition(" ")[0].rstrip(":"), "held")
@@ -40,12 +43,16 @@ def as_text(found: Measured) -> str:
     return "\n".join(lines)
 
 
-def figures(found: Measured) -> dict[str, str]:
+def figures(measured: Measured) -> dict[str, str]:
     """Return the figures as words, by their name."""
-    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
+    spread, steady, response = (
+        measured.spread,
+        measured.subject.stability,
+        measured.subject.resolution,
+    )
     sizes = ", ".join(f"{height}" for _, height in response.sizes)
     texts = {
-        "gain of flat images": f"{found.report.gain:.4g}",
+        "gain of flat images": f"{measured.report.gain:.4g}",
         "energy of a pixel": f"{spread.energy:.4g} ({100 * spread.at_border:.2g} % at the border)",
         "point spread": f"50 % within {spread.r50:g} and 90 % within {spread.r90:g} pixels, "
         f"peak {spread.peak:.3g}",
@@ -54,34 +61,38 @@ def figures(found: Measured) -> dict[str, str]:
         f"growth {_percent(steady.growth)}",
         "radius of 90 %": f"{', '.join(_percent(value) for value in response.r90)} of the height "
         f"at heights of {sizes}",
-        "veiling glare index": f"{found.veiling_glare_index:.3g} %",
-        "nearest preset": f"{found.nearest[0]}, {_percent(found.nearest[1])} off"
-        if found.nearest[0]
+        "veiling glare index": f"{measured.veiling_glare_index:.3g} %",
+        "nearest preset": f"{measured.nearest[0]}, {_percent(measured.nearest[1])} off"
+        if measured.nearest[0]
         else "none: the bloom is black",
     }
-    if found.subject.reference:
+    if measured.subject.reference:
         texts["from its reference"] = ", ".join(
-            f"{name} {off:.2g}" for name, off in found.subject.reference.items()
+            f"{name} {off:.2g}" for name, off in measured.subject.reference.items()
         )
     return texts
 
 
-def as_values(found: Measured) -> dict[str, Any]:
+def as_values(measured: Measured) -> dict[str, Any]:
     """Return everything as plain values; what is not a number is None."""
-    spread, steady, response = found.spread, found.subject.stability, found.subject.resolution
-    value: dict[str, Any] = _plain(
+    spread, steady, response = (
+        measured.spread,
+        measured.subject.stability,
+        measured.subject.resolution,
+    )
+    value: dict[str, Any] = plain(
         {
-            "name": found.name,
-            "adapter": found.device,
-            "settings": None if found.settings is None else found.settings.to_dict(),
-            "size": found.size,
-            "passes": [{"name": name, "seconds": s} for name, s in found.passes.items()],
+            "name": measured.name,
+            "adapter": measured.device,
+            "settings": None if measured.settings is None else measured.settings.to_dict(),
+            "size": measured.size,
+            "passes": [{"name": name, "seconds": s} for name, s in measured.passes.items()],
             "laws": {
                 row.name: {name: getattr(row, name) for name in _OF_A_LAW}
-                for row in found.report.rows
+                for row in measured.report.rows
             },
-            "untaken": found.report.untaken,
-            "gain": found.report.gain,
+            "untaken": measured.report.untaken,
+            "gain": measured.report.gain,
             "energy": spread.energy,
             "psf": {
                 name: getattr(spread, name)
@@ -94,27 +105,30 @@ def as_values(found: Measured) -> dict[str, Any]:
             "resolution": {
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
-            "veiling_glare_index": found.veiling_glare_index,
-            "first_infected": found.first_infected,
-            "reference": found.subject.reference or None,
-            "nearest_preset": {"name": found.nearest[0] or None, "difference": found.nearest[1]},
-            "required": found.report.required,
-            "passed": not broken(found.report),
+            "veiling_glare_index": measured.veiling_glare_index,
+            "first_infected": measured.subject.first_infected,
+            "reference": measured.subject.reference or None,
+            "nearest_preset": {
+                "name": measured.nearest[0] or None,
+                "difference": measured.nearest[1],
+            },
+            "required": measured.report.required,
+            "passed": not broken(measured.report),
         }
     )
     return value
 
 
-def as_markdown(found: Measured) -> str:
+def as_markdown(measured: Measured) -> str:
     """Return the laws and the figures as tables for a pull request."""
     laws = [
         f"| {row.name} | {row.words} | {cells[0]} | {cells[1]} |"
-        for row in found.report.rows
+        for row in measured.report.rows
         for cells in [("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")]
     ]
-    times = {"passes together": f"{1000 * sum(found.passes.values()):.3f} ms"}
-    shown = [f"| {name} | {text} |" for name, text in (figures(found) | times).items()]
-    head = f"### `{found.name.replace('`', chr(39))}`\n\nOn {found.device}.\n"
+    times = {"passes together": f"{1000 * sum(measured.passes.values()):.3f} ms"}
+    shown = [f"| {name} | {text} |" for name, text in (figures(measured) | times).items()]
+    head = f"### `{measured.name.replace('`', chr(39))}`\n\nOn {measured.device}.\n"
     tables = ("| law | held | off by | allowed |\n|---|---|---|---|", *laws, "")
     return "\n".join((head, *tables, "| figure | |\n|---|---|", *shown, ""))
 
@@ -124,16 +138,12 @@ def broken(report: LawReport) -> list[LawRow]:
     return [row for row in report.rows if row.name in report.required and not row.held]
 
 
-def as_page(found: Measured) -> str:
-    """Return a page with tables, the point spread with its curve, and pictures."""
-    spread, subject = found.spread, found.subject
+def as_page(measured: Measured) -> str:
+    """Return a page with tables, the point spread, and pictures."""
+    spread, subject = measured.spread, measured.subject
     scene = lights(VIEW)
     pictures = {"picture": (subject.picture or subject.bloom)(scene), "bloom": subject.bloom(scene)}
-    times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in found.passes.items()]
-    lit = spread.radii > 0
-    curve = diagram(
-        "encircled energy", spread.radii[lit], [spread.encircled[lit]], ["of a pixel"], "pixels"
-    )
+    times = [(name, f"{1000 * seconds:.3f} ms") for name, seconds in measured.passes.items()]
     shown = (
         {"point spread, logarithmic": samples(spread.array)._repr_png_()} if spread.energy else {}
     )
@@ -142,18 +152,17 @@ def as_page(found: Measured) -> str:
         markup.figure(markup.image(data, name, width=_width(name)), name)
         for name, data in shown.items()
     ]
-    width, height = found.size
+    width, height = measured.size
     return markup.page(
-        f"vkbloom check: {found.name}",
-        element("h1", found.name),
-        element("p", f"On {found.device}."),
+        f"vkbloom check: {measured.name}",
+        element("h1", measured.name),
+        element("p", f"On {measured.device}."),
         element("h2", "Pictures"),
         *images,
-        curve,
         element("h2", "Laws"),
-        Markup(found.report._repr_html_()),
+        Markup(measured.report._repr_html_()),
         element("h2", "Figures"),
-        markup.table(figures(found).items()),
+        markup.table(figures(measured).items()),
         element("h2", f"Passes at {width} x {height}"),
         markup.table(times),
     )
@@ -165,16 +174,3 @@ def _width(name: str) -> int:
 
 def _percent(share: float) -> str:
     return "none" if math.isnan(share) else f"{float(f'{100 * share:.3g}'):g} %"
-
-
-def _plain(value: Any) -> Any:
-    """Return a value for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value

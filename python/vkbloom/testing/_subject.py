@@ -16,8 +16,6 @@ from vkbloom.testing._point_spread import measured_spread, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
 from vkbloom.testing._scaled_scene import ResolutionResponse, resolution_response
 
-__all__ = ["TEXEL", "Subject", "fitting_probe"]
-
 # A threshold of 1, the usual one, lets nothing of an image of 1 through.
 _BRIGHT: Final = 16.0
 # Sum of a light that is above thresholds where it falls on four pixels.

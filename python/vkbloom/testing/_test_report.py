@@ -17,9 +17,8 @@ from vkbloom._version import installed_version
 from vkbloom._views import markup, pictures
 from vkbloom._views.comparison import difference
 from vkbloom._views.markup import Markup, element
+from vkbloom._views.plain_values import plain
 from vkbloom.testing._judging import Verdict
-
-__all__ = ["Record", "figures", "write_part", "write_report"]
 
 _FORMAT: Final = 1
 _LARGEST_SIDE: Final = 640  # pixels of a picture in the page
@@ -31,7 +30,6 @@ class Record(TypedDict):
     test: str
     name: str
     folder: str  # of the references
-    has_files: bool  # not where a test gave what it expects
     outcome: str  # "passed", "failed", "missing" or "written"
     origin: str
     reference_origin: str | None
@@ -119,7 +117,8 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
     """Write ``index.html`` and ``report.json``."""
     folder.mkdir(parents=True, exist_ok=True)
     ordered = sorted(records, key=lambda record: (record["test"], record["name"]))
-    values = {"format": _FORMAT, "version": installed_version(), "checks": _plain(ordered)}
+    checks = [{key: value for key, value in record.items() if key != "part"} for record in ordered]
+    values = {"format": _FORMAT, "version": installed_version(), "checks": plain(checks)}
     (folder / "report.json").write_text(
         json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )
@@ -127,17 +126,6 @@ def write_report(folder: Path, parts: Path, records: Sequence[Record]) -> Path:
     page.write_text(_page(ordered, parts), encoding="utf-8")
     shutil.rmtree(parts, ignore_errors=True)
     return page
-
-
-def _plain(value: Any) -> Any:
-    """Return records for JSON, which has neither NaN nor infinity."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items() if key != "part"}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return value
 
 
 def _page(records: Iterable[Record], parts: Path) -> str:

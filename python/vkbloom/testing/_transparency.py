@@ -12,8 +12,6 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, fail, is_within
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
 
-__all__ = ["assert_alpha"]
-
 _DEFAULT = Probe()
 # Below common thresholds, since a threshold is not linear.
 _BACKDROPS = (0.0, 0.25)
@@ -37,11 +35,6 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
         Its `channels` do not count.
     limit : float
         Allowed difference, as a share of the brightest value of the image.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
     """
     __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)
@@ -87,37 +80,37 @@ def _colours_alike(
     """
     __tracebackhide__ = True
     try:
-        found = _apply(bloom, probe, colours, alpha)
+        result = _apply(bloom, probe, colours, alpha)
     except (TypeError, ValueError) as error:
         raise NotTaken(f"bloom: it takes no image of four channels ({error})") from None
     opaque = _apply(bloom, probe, colours, np.ones_like(alpha))[..., :3]
     law = "the colours of a premultiplied bloom do not depend on alpha"
-    _judge(law, found[..., :3] - opaque, colours.max(), limit, "")
+    _judge(law, result[..., :3] - opaque, colours.max(), limit, "")
     # A picture contains its image; the bloom alone has another light.
-    contains = bool((found[..., :3] >= colours - limit * colours.max()).all())
-    return found, opaque, contains and found.shape[2] == 4
+    contains = bool((result[..., :3] >= colours - limit * colours.max()).all())
+    return result, opaque, contains and result.shape[2] == 4
 
 
 def _apply(bloom: Bloom, probe: Probe, colours: Image, alpha: Image) -> Image:
     given: NDArray[Any] = np.concatenate([colours, alpha], axis=2).astype(probe.dtype)
-    found = np.asarray(bloom(given))
-    if found.ndim != 3 or found.shape[:2] != given.shape[:2] or found.shape[2] not in (3, 4):
-        raise ValueError(f"it returns shape {found.shape} for {given.shape}")
-    result: Image = found.astype(np.float64)
+    outcome = np.asarray(bloom(given))
+    if outcome.ndim != 3 or outcome.shape[:2] != given.shape[:2] or outcome.shape[2] not in (3, 4):
+        raise ValueError(f"it returns shape {outcome.shape} for {given.shape}")
+    result: Image = outcome.astype(np.float64)
     return result
 
 
 def _judge(law: str, off: Image, largest: float, limit: float, where: str) -> None:
     """Compare differences with the limit."""
     __tracebackhide__ = True
-    place = np.unravel_index(int(np.abs(off).argmax()), off.shape)
-    share = abs(float(off[place])) / largest
+    position = np.unravel_index(int(np.abs(off).argmax()), off.shape)
+    share = abs(float(off[position])) / largest
     if not is_within(law, share, limit, "alpha"):
-        y, x, channel = place
+        y, x, channel = position
         fail(
             "assert_alpha",
             law,
             f"{where}x {x}, y {y}, channel {channel} is too "
-            f"{'bright' if off[place] > 0 else 'dark'} by {share:.3g} of the brightest value: "
+            f"{'bright' if off[position] > 0 else 'dark'} by {share:.3g} of the brightest value: "
             f"{limit:g} allowed",
         )

@@ -8,8 +8,6 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number, check_size
 from vkbloom.testing._probe import Bloom, Probe
 
-__all__ = ["veiling_glare_index"]
-
 
 @checked
 def veiling_glare_index(
@@ -41,15 +39,6 @@ def veiling_glare_index(
     float
         0 without glare; the bloom's share of the light far from the patch is near 100 times its
         gain.
-
-    Examples
-    --------
-    >>> from vkbloom import reference, testing
-    >>> settings = vkbloom.Separable(weights=vkbloom.gaussian_weights(4.0), blur_strength=1.0)
-    >>> def bloom(image):
-    ...     return reference.blur(image, settings)
-    >>> round(testing.veiling_glare_index(bloom, size=(64, 64), patch=8), 2)
-    62.49
     """
     __tracebackhide__ = True
     probe = Probe(size=size)

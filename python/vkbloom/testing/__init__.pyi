@@ -1,0 +1,78 @@
+# The public names of `vkbloom.testing`; lazy_loader reads them, and imports what is asked for.
+from ._border import assert_border, assert_views, border_energy
+from ._frame_files import read_frame
+from ._judging import Diagnosis, Tolerances, diagnose
+from ._law_report import LawReport, LawRow, report
+from ._laws import (
+    assert_additive,
+    assert_bounded_fireflies,
+    assert_gain,
+    assert_no_ringing,
+    assert_superposition,
+    assert_symmetric,
+    first_infected,
+)
+from ._moving_light import Stability, assert_stable, stability
+from ._point_spread import (
+    assert_centroid_kept,
+    assert_separable,
+    assert_spread,
+    point_spread,
+)
+from ._probe import Probe
+from ._programs import command
+from ._regression import FrameRegression
+from ._scaled_scene import (
+    ResolutionResponse,
+    assert_resolution_independent,
+    resolution_response,
+)
+from ._sequences import Flash, Flicker, flash, flicker
+from ._shape import assert_round, assert_sizes, roundness
+from ._time import assert_history, assert_jitter
+from ._transparency import assert_alpha
+from ._veiling_glare import veiling_glare_index
+
+__all__ = [
+    "Diagnosis",
+    "Flash",
+    "Flicker",
+    "FrameRegression",
+    "LawReport",
+    "LawRow",
+    "Probe",
+    "ResolutionResponse",
+    "Stability",
+    "Tolerances",
+    "assert_additive",
+    "assert_alpha",
+    "assert_border",
+    "assert_bounded_fireflies",
+    "assert_centroid_kept",
+    "assert_gain",
+    "assert_history",
+    "assert_jitter",
+    "assert_no_ringing",
+    "assert_resolution_independent",
+    "assert_round",
+    "assert_separable",
+    "assert_sizes",
+    "assert_spread",
+    "assert_stable",
+    "assert_superposition",
+    "assert_symmetric",
+    "assert_views",
+    "border_energy",
+    "command",
+    "diagnose",
+    "first_infected",
+    "flash",
+    "flicker",
+    "point_spread",
+    "read_frame",
+    "report",
+    "resolution_response",
+    "roundness",
+    "stability",
+    "veiling_glare_index",
+]
