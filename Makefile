@@ -49,7 +49,7 @@ PIP_INSTALL = $(PYTHON) -m pip install --quiet --no-compile
 FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core/test_graph.py \
 	tests/core/test_refusals.py tests/core/test_frames.py tests/core/test_out_of_date.py \
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
-	tests/io/test_files.py tests/views tests/grid/test_grid_order.py
+	tests/io/test_files.py tests/views
 
 .PHONY: demo test test-devices exhaustive check docs tables bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean

@@ -45,9 +45,3 @@ class Row(NamedTuple):
 def rows(plan: _core.Plan) -> list[Row]:
     """Return the passes of a plan."""
     return [Row(*row) for row in plan.passes]
-
-
-def dependencies(plan: _core.Plan, name: str) -> list[tuple[int, ...]]:
-    """Return those of the render pass that is timed under that name."""
-    (number,) = {row.render_pass for row in rows(plan) if row.name == name}
-    return list(plan.dependencies[number])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import Camera, Scene
+from vkbloom import Camera, Frames, Renderer, Scene, Settings
 from vkbloom._scene import Mesh
 from vkbloom._scene.textures import WHITE, Surface, Texture
 
@@ -97,3 +97,23 @@ def noise(size: tuple[int, int], highest: float = 1.0) -> NDArray[np.float64]:
     # Never all black: a mesh needs a triangle.
     colours[0, 0] = highest
     return colours
+
+
+SIZE = (320, 180)
+GBUFFER = ["albedo", "normal", "position", "brightness", "depth"]
+BLURRED = ["blur_vertical", "bloom"]
+LIT = ["scene", "final"]
+
+
+def deferred(
+    renderer: Renderer,
+    scene: Scene,
+    settings: Settings | None = None,
+    size: tuple[int, int] = SIZE,
+    **more: Any,
+) -> Frames:
+    return renderer.render(scene, settings, size, shading="deferred", **more)
+
+
+def rgb(image: NDArray[Any]) -> NDArray[np.float64]:
+    return image[..., :3].astype(np.float64)

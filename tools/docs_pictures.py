@@ -115,31 +115,29 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     y, x = height // 2, width // 2
     # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
-    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
+    # Six lines in each are as many as the eye tells apart.
+    figure, grid = plt.subplots(
+        2, 3, figsize=(11, 7.5), sharex=True, sharey=True, layout="constrained"
+    )
     random, tiles = np.random.default_rng(1), []
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
         exact = settings.replace(format="rgba32float", bloom=True)
         bloom = renderer.apply(image, exact, framebuffers="bloom")["bloom"][..., 0]
         profile = bloom[y, x:]
         seen = profile > 1e-6 * bloom.max()
-        axes.loglog(
-            np.arange(len(profile))[seen] + 0.5,
-            profile[seen] / 9000,
-            label=name,
-            color=mpl.colormaps["tab20"](index % 20 / 20 + 0.01),
-            linestyle="-" if index < 20 else "--",
-            linewidth=1.4,
-        )
+        axes = grid.flat[index // 6]
+        axes.loglog(np.flatnonzero(seen) + 0.5, profile[seen] / 9000, label=name)
         middle = bloom[y - SIDE // 2 : y + SIDE // 2, x - SIDE // 2 : x + SIDE // 2]
         decades = np.log10(np.maximum(middle / bloom.max(), 10.0**-DECADES))
         # Dithered, since levels of 8 bits would be rings that no bloom has.
         grey = 254 * np.maximum(1 + decades / DECADES, 0) + random.random(decades.shape)
         tiles.append((np.repeat(grey[..., np.newaxis], 3, axis=2).astype(np.uint8), name))
-    axes.set_xlabel("distance, pixels (+ 0.5)")
-    axes.set_ylabel("share of the light of the point, per pixel")
-    axes.set_ylim(1e-7, 1)
-    axes.grid(alpha=0.3)
-    figure.legend(fontsize=7, loc="outside right upper")
+    for axes in grid.flat:
+        axes.set_ylim(1e-7, 1)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+    figure.supxlabel("distance, pixels (+ 0.5)")
+    figure.supylabel("share of the light of the point, per pixel")
     figure.savefig(folder / "profiles.png", dpi=110)
     plt.close(figure)
     write_sheet(folder / "presets.png", tiles, 5)

@@ -79,7 +79,9 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
 
 // For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
 // blur commutes with the filter between the sizes. So it runs at the source's size, and each pixel
-// of the target takes one sample of the result instead of one for each tap.
+// of the target takes one sample of the result instead of one for each tap. Without it
+// `Separable(bloom_scale=0.5)` takes 243 ms in place of 62, `threejs_unreal` 120 in place of 69
+// (processor time of 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
 bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                       bool *fits, struct vkb_error *error)
 {

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.core.descriptors import open_descriptors
 from tests.device.device_work import Consumer, OnDevice, vjp
 from tests.exhaustive import some
 from tests.images import picture
+from tests.processes import open_descriptors
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
 from vkbloom._renderer.surface import Surface

@@ -59,13 +59,6 @@ def test_the_memory_of_an_array_that_is_gone_is_used_again(
     np.testing.assert_array_equal(second, expected[1])
 
 
-def test_other_arrays_own_their_memory(own: Renderer) -> None:
-    large = final(own, picture(SIDE - 1, SIDE, dtype="float32"), 1.0)
-    small = final(own, picture(63, 64, dtype="float32"), 1.0)
-    for array in (large.copy(), large + 1, small):
-        assert array.flags.owndata
-
-
 @pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
 def test_arrays_are_large_from_a_mebibyte_on(own: Renderer, dtype: str) -> None:
     """Elements were counted once: a quarter of a mebibyte of uint8 was large."""
@@ -130,12 +123,6 @@ def test_arrays_outlive_the_renderer(own: Renderer) -> None:
     del own, later
     gc.collect()
     np.testing.assert_array_equal(array, kept)
-
-
-def test_pages_of_a_closed_renderer(own: Renderer) -> None:
-    own.close()
-    with pytest.raises(ValueError, match="closed"):
-        own._core.pages(1 << 20)
 
 
 def test_idle_memory_has_a_limit(own: Renderer) -> None:

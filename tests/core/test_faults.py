@@ -97,7 +97,7 @@ def test_points_of_every_workload(
     faulty: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     # All of them take about 25 minutes.
-    stride = 1 if EXHAUSTIVE else 300
+    stride = 1 if EXHAUSTIVE else 400
     expected = names()
     rows = walk(faulty, stride)
     show(rows, capsys)

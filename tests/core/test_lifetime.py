@@ -7,14 +7,14 @@ import json
 import os
 import sys
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.core.descriptors import open_descriptors
 from tests.exhaustive import EXHAUSTIVE
-from tests.processes import output
+from tests.processes import open_descriptors, output
 from vkbloom import Renderer, Scene, adapters
 
 SIZE = (64, 36)
@@ -119,24 +119,16 @@ def test_renderers_and_frames_leave_nothing(grown: Measured, thing: str) -> None
     assert growth["code"] == growth["descriptors"] == growth["threads"] == 0
 
 
+def refused() -> None:
+    with pytest.raises(RuntimeError):
+        Renderer("no such adapter")
+
+
 @LINUX
-def test_lists_of_adapters_leave_nothing() -> None:
-    adapters()
+@pytest.mark.parametrize("made", [adapters, refused])
+def test_adapters_and_renderers_that_fail_leave_nothing(made: Callable[[], object]) -> None:
+    made()
     before = in_use()
     for _ in range(20):
-        adapters()
+        made()
     assert in_use() == before
-
-
-@LINUX
-def test_renderers_that_fail_leave_nothing(scene: Scene) -> None:
-    with Renderer() as renderer:
-        renderer.render(scene, None, SIZE)
-        before = in_use()
-        for _ in range(20):
-            with pytest.raises(RuntimeError):
-                Renderer("no such adapter")
-        assert in_use() == before
-
-
-# Threads

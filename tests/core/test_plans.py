@@ -276,27 +276,7 @@ def test_a_dry_run_of_scenes_is_what_runs(
     assert ran[1] == ["final"]
 
 
-def test_dry_run_of_nothing_is_empty_and_of_wrong_values_is_refused() -> None:
-    wrong: Any
-    assert _core.dry_run(()) == []
-    for wrong in ([], ((1, 2),), (5,)):
-        with pytest.raises(TypeError):
-            _core.dry_run(wrong)
-
-
 # Shown
-
-
-def test_mermaid(renderer: Renderer, plain: Any) -> None:
-    plan = renderer.plan(plain, Separable(bloom=False), framebuffers="final")
-    (one,) = plan.passes
-    assert plan.to_mermaid().splitlines() == [
-        "flowchart LR",
-        "    image(image)",
-        '    final["final<br>16 x 9, float32"]',
-        f'    pass0{{{{"final<br>{one.shader}"}}}}',
-        "    image --> pass0 --> final",
-    ]
 
 
 def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> None:

@@ -129,10 +129,3 @@ def test_three_channels_are_stored_without_alpha(
         np.testing.assert_array_equal(out, expected)
         out.view(np.uint8)[:] = 0xA5
         assert (around == 0xA5).all()
-
-
-def test_an_array_that_is_the_image_itself(renderer: Renderer) -> None:
-    image = picture(700, 500, 4, "float32", 4)
-    expected = renderer.apply(image.copy())["final"]
-    renderer.apply(image, out={"final": image})
-    np.testing.assert_array_equal(image, expected)

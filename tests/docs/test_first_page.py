@@ -3,33 +3,57 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from tests.docs.pages import ROOT
 
-PAGE = ROOT / "build" / "docs" / "index.html"
+DOCS = ROOT / "build" / "docs"
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_no_rule_of_accessibility_is_broken(theme: Any) -> None:
-    """Deque's axe-core, on a wide and a narrow screen, which nothing makes wider."""
-    if not PAGE.exists():
+@pytest.fixture(params=["light", "dark"])
+def page(request: pytest.FixtureRequest) -> Iterator[Any]:
+    if not DOCS.joinpath("index.html").exists():
         pytest.skip("build/docs does not exist: run make docs")
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         pytest.skip("Chromium is not installed")
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     api = pytest.importorskip("playwright.sync_api")
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        page = browser.new_page(color_scheme=theme)
-        page.goto(PAGE.as_uri())
-        for width in (1280, 390):
-            page.set_viewport_size({"width": width, "height": 844})
-            page.wait_for_timeout(300)
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            found = axe.run(page)
-            assert found.violations_count == 0, found.generate_report()
+        page = browser.new_page(color_scheme=request.param)
+        page.goto(DOCS.joinpath("index.html").as_uri())
+        yield page
         browser.close()
+
+
+def test_no_rule_of_accessibility_is_broken(page: Any) -> None:
+    """Deque's axe-core, on a wide and a narrow screen, which nothing makes wider."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        found = axe.run(page)
+        assert found.violations_count == 0, found.generate_report()
+
+
+def test_it_says_for_whom_it_is_and_how_to_install_it(page: Any) -> None:
+    for readers in ("Photographers", "Programmers", "Researchers"):
+        assert page.locator("article strong", has_text=readers).is_visible()
+    assert page.locator("article pre", has_text="pip install").count() == 3
+    assert page.locator("button.copybtn").count() == page.locator("article pre").count()
+    for chapter in ("check.html", "gradients.html"):
+        assert page.locator(f"li.toctree-l1 > a[href='{chapter}']").count() > 0
+
+
+def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    hero = page.locator("article img").first
+    hero.scroll_into_view_if_needed()
+    box = hero.bounding_box()
+    assert 300 < box["width"] <= 390 and box["y"] + box["height"] < 844
+    assert hero.evaluate("element => element.naturalWidth") >= box["width"]
+    assert "without bloom" in hero.get_attribute("alt")

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import vkbloom
 from tests.images import noise
@@ -26,7 +28,7 @@ from vkbloom import (
 )
 from vkbloom._grid.filling import Tally
 from vkbloom._grid.layout import Grid, ask, lay_out
-from vkbloom._grid.order import read_part
+from vkbloom._grid.order import blocks, default_chunk, points, read_part
 from vkbloom._grid.progress import Progress
 
 AXES: dict[str, list[Any]] = {
@@ -269,7 +271,7 @@ class TestRefusals:
     def test_a_wrong_value_is_refused(self, filled: Call, call: str, error: str) -> None:
         public = {name: getattr(vkbloom, name) for name in vkbloom.__all__}
         image = np.zeros((23, 37, 3), np.float32)
-        own = {"np": np, "image": image, "grid": filled, "read_part": read_part}
+        own = {"vkbloom": vkbloom, "np": np, "image": image, "grid": filled, "read_part": read_part}
         assert_refused(call, error, {**public, **own})
 
     def test_shapes_are_compared_before_anything_is_rendered(
@@ -334,3 +336,44 @@ class TestProgress:
         message = capsys.readouterr().err
         assert "4/4" in message
         assert "passes run 5" in message
+
+
+@st.composite
+def lattices(draw: st.DrawFn) -> tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]:
+    """Shapes, chunks and rankings; chunks need not divide the shape."""
+    shape = tuple(draw(st.lists(st.integers(1, 5), max_size=4)))
+    chunk = tuple(draw(st.integers(1, count)) for count in shape)
+    return shape, chunk, tuple(draw(st.permutations(range(len(shape)))))
+
+
+def visited(
+    shape: tuple[int, ...], chunk: tuple[int, ...], ranking: tuple[int, ...]
+) -> list[tuple[int, ...]]:
+    return [index for block in blocks(shape, chunk, ranking) for index in points(block, ranking)]
+
+
+@given(lattices())
+def test_every_point_once(
+    lattice: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]],
+) -> None:
+    assert sorted(visited(*lattice)) == list(np.ndindex(lattice[0]))
+
+
+@given(lattices(), st.integers(1, 40))
+def test_default_chunks_keep_the_order_of_nested_loops(
+    lattice: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]], most: int
+) -> None:
+    shape, _, ranking = lattice
+    chunk = default_chunk(shape, ranking, most)
+    assert math.prod(chunk) <= most
+    found = visited(shape, chunk, ranking)
+    assert found == sorted(found, key=lambda index: [index[axis] for axis in ranking])
+
+
+@pytest.mark.parametrize("ranking", [(0, 1), (1, 0)])
+def test_blocks_cover_the_grid(ranking: tuple[int, int]) -> None:
+    count = np.zeros((5, 4), int)
+    for block in blocks((5, 4), (2, 3), ranking):
+        assert block.count == count[block.slices].size
+        count[block.slices] += 1
+    assert (count == 1).all()

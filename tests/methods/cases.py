@@ -97,6 +97,7 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "playcanvas-mask": (PlayCanvasBloom(threshold=0.5, alpha="blur"), MASK),
     "darktable-mask": (DarktableBloom(threshold=60.0, alpha="blur"), MASK),
     "playcanvas-emission": (PlayCanvasBloom(), EMISSION),
+    "darktable-emission": (DarktableBloom(blur_size=1.0, format="rgba32float"), EMISSION),
     "godot-mask": (
         GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),
         MASK,
@@ -180,6 +181,9 @@ OTHERS: dict[str, Settings] = {
     "pmndrs-one-level": PmndrsBloom(levels=1, threshold=None, composite="add"),
     "pmndrs-screen": PmndrsBloom(levels=3, threshold=0.2, smoothing=0.5, intensity=3.0),
     "babylon-narrow": BabylonBloom(kernel=3, scale=1.0, weight=0.7, threshold=None),
+    # (The cube of the lightness makes much of the last bit of a half float.)
+    "darktable": DarktableBloom(threshold=40.0, blur_size=2.0, format="rgba32float"),
+    "darktable-no-threshold": DarktableBloom(threshold=None, strength=60.0, format="rgba32float"),
     "playcanvas-two": PlayCanvasBloom(blur_level=2, intensity=0.3),
     "node": ThreeBloom(variant="node", intensity=1.0, threshold=0.4),
     **{

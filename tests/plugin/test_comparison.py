@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.images import changed, noise_image
+from tests.refusals import assert_refused, rows
 from vkbloom._cli.compare import tolerances_of
 from vkbloom._io.srgb import decode_srgb
 from vkbloom._views.comparison import Comparison, compare, difference, flip_map
@@ -343,62 +344,15 @@ class TestTolerances:
         assert reasons(some, tolerances_of(max_error=0.25, fail_percent=5)) == ()
         assert len(reasons(some, tolerances_of(max_error=0.25, fail_percent=4))) == 1
 
-    @pytest.mark.parametrize(
-        ("name", "value"),
-        [
-            ("max_error", -1e-9),
-            ("max_error", math.nan),
-            ("min_ssim", 1.01),
-            ("min_ssim", math.nan),
-            ("min_psnr", math.nan),
-            ("max_flip", -0.1),
-            ("max_flip", math.nan),
-            ("fail_percent", 101),
-            ("fail_percent", math.nan),
-        ],
-    )
-    def test_ranges(self, name: str, value: float) -> None:
-        with pytest.raises(
-            ValueError,
-            match=rf"{name.removeprefix('min_').removeprefix('max_')}: .* is out of range",
-        ):
-            tolerances_of(**{name: value})
-
     def test_all_that_fail_are_told(self) -> None:
         found = compare(self.A, noise_image(20, 20, 3))
         limits = tolerances_of(max_error=0, min_ssim=1, min_psnr=99, max_flip=0)
         assert len(reasons(found, limits)) == 4
 
 
-class TestArguments:
-    @pytest.mark.parametrize(
-        ("a", "error", "message"),
-        [
-            ([[0.0]], TypeError, "a: an array is needed, not list"),
-            (np.zeros((2, 2), np.int64), TypeError, "a: dtype int64 is not one of uint8"),
-            (np.zeros((2, 2), np.bool_), TypeError, "a: dtype bool is not one of uint8"),
-            (np.zeros(4, np.uint8), ValueError, r"a: shape \(4,\) is not \(H, W\)"),
-            (np.zeros((0, 4, 3), np.uint8), ValueError, r"a: shape \(0, 4, 3\) is not"),
-        ],
-    )
-    def test_wrong_image_is_refused(self, a: Any, error: type[Exception], message: str) -> None:
-        for function in (compare, difference):
-            with pytest.raises(error, match=message):
-                function(a, noise_image(8, 8, 3))
-
-    def test_numbers(self) -> None:
-        a = noise_image(8, 8, 3)
-        with pytest.raises(ValueError, match="threshold"):
-            compare(a, a, threshold=math.nan)
-
-    @pytest.mark.parametrize("relative", [-0.1, math.nan, math.inf])
-    def test_relative_out_of_range(self, relative: float) -> None:
-        with pytest.raises(ValueError, match=r"relative: .* is out of range"):
-            compare(noise_image(8, 8), noise_image(8, 8), relative=relative)
-
-    def test_unknown_metric(self) -> None:
-        with pytest.raises(ValueError, match="metrics: 'mse' is not one of ssim, psnr, flip"):
-            compare(noise_image(8, 8), noise_image(8, 8), metrics=("mse",))  # type: ignore[arg-type]
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "comparisons"))
+def test_a_wrong_value_is_refused(call: str, error: str) -> None:
+    assert_refused(call, error, globals())
 
 
 class TestDifference:

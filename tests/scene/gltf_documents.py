@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hypothesis import HealthCheck, settings, strategies
 
+from tests.exhaustive import examples
 from vkbloom._scene import Mesh
 from vkbloom._scene.gltf import load_mesh
 
@@ -165,3 +167,15 @@ def refusals(path: Path, original: Any, chosen: list[tuple[Any, ...]], step: int
             place[last] = value
             refused += load_or_refuse(path, json.dumps(changed).encode()) is None
     return refused
+
+
+#: Up to four changes: the place, modulo a number of bytes, and the new byte.
+CHANGES = strategies.lists(
+    strategies.tuples(strategies.integers(0), strategies.integers(0, 255)), min_size=1, max_size=4
+)
+#: Files are small, so there can be many examples.
+many = settings(
+    max_examples=examples(250),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)

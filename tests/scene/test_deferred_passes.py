@@ -9,15 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.core.dependencies import (
-    COLOR_OUTPUT,
-    FRAGMENT_SHADER,
-    READ_BEFORE_WRITE,
-    WRITE_BEFORE_READ,
-)
-from tests.planned import dependencies, rows, scene_plan
-from tests.scene.deferred_frames import BLURRED, GBUFFER, LIT, SIZE, deferred, rgb
-from vkbloom import Renderer, Scene, Separable, Settings, _core, presets
+from tests.screens import BLURRED, LIT, SIZE, deferred, rgb
+from vkbloom import Renderer, Scene, Separable, presets
 
 # Passes
 
@@ -78,40 +71,3 @@ def test_shadings_take_turns(renderer: Renderer, scene: Scene) -> None:
         np.testing.assert_array_equal(array, again[name], err_msg=name)
     for name, array in renderer.render(scene, None, SIZE).items():
         np.testing.assert_array_equal(array, forward[name], err_msg=name)
-
-
-# The graph
-
-
-def describe(settings: Settings) -> _core.Plan:
-    return scene_plan(settings, shading="deferred")
-
-
-def test_the_passes() -> None:
-    passes = rows(describe(Separable()))
-    # A render pass is timed under the name of the first image that it writes.
-    assert [row[:4] for row in passes] == [
-        ("glow", "glow_frag", (), ("glow", "glow_depth")),
-        ("albedo", "gbuffer_sky_frag", (), tuple(GBUFFER)),
-        ("albedo", "gbuffer_body_frag", (), tuple(GBUFFER)),
-        ("albedo", "gbuffer_glow_frag", ("glow",), tuple(GBUFFER)),
-        ("blur_vertical", "blur_frag", ("brightness",), ("blur_vertical",)),
-        ("bloom", "blur_frag", ("blur_vertical",), ("bloom",)),
-        ("scene", "lighting_frag", tuple(GBUFFER[:4]), ("scene",)),
-        ("final", "composite_frag", ("scene", "bloom"), ("final",)),
-    ]
-    # One render pass for all of the G-buffer.
-    assert [row.render_pass for row in passes] == [0, 1, 1, 1, 2, 3, 4, 5]
-
-
-def test_the_last_pass_waits_for_the_second_blur() -> None:
-    assert dependencies(describe(presets["deferred"]), "bloom") == [
-        READ_BEFORE_WRITE,
-        WRITE_BEFORE_READ,
-    ]
-
-
-def test_the_blurs_and_the_light_wait_for_the_gbuffer() -> None:
-    after = [row for row in dependencies(describe(Separable()), "albedo") if row[0] == 0]
-    assert len(after) == 1
-    assert after[0][2:4] == (COLOR_OUTPUT, FRAGMENT_SHADER)

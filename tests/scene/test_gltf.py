@@ -19,9 +19,9 @@ from hypothesis import given
 
 from tests.exhaustive import EXHAUSTIVE
 from tests.refusals import assert_refused, rows
-from tests.scene.changed_bytes import CHANGES, many
 from tests.scene.gltf_documents import (
     BYTE,
+    CHANGES,
     DTYPES,
     FLOAT,
     INT,
@@ -31,6 +31,7 @@ from tests.scene.gltf_documents import (
     Document,
     at,
     load_or_refuse,
+    many,
     nested,
     places,
     refusals,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import by_turns
 from tests.screens import noise, screen
 from vkbloom import Camera, Renderer, Scene, Separable, reference
 from vkbloom._scene import Mesh
@@ -130,11 +128,6 @@ def test_without_bloom(renderer: Renderer, scene: Scene) -> None:
     assert list(frames) == ["scene", "depth", "final"]
     np.testing.assert_array_equal(frames["scene"], with_bloom["scene"])
     np.testing.assert_array_equal(frames["final"], frames["scene"])
-
-
-def test_direct_has_no_vertical_pass(renderer: Renderer, scene: Scene) -> None:
-    frames = renderer.render(scene, Separable(direct=True), SIZE)
-    assert list(frames) == [name for name in FORWARD if name != "blur_vertical"]
 
 
 def test_the_saucer_fills_the_framebuffers(renderer: Renderer, scene: Scene) -> None:
@@ -304,19 +297,11 @@ def test_the_soft_threshold(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize(
     ("settings", "turns"),
-    by_turns(
-        [
-            Separable(),
-            Separable(blur_scale=0.6, blur_strength=0.7),
-            Separable(blur_strength=8.0),
-            Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))),
-            Separable(first_tap=0, texel="x", bloom_size=(200, 50)),
-            Separable(direct=True, bloom_scale=0.25),
-            Separable(format="rgba16float", bloom_scale=0.5),
-            Separable(format="rgba32float"),
-        ],
-        turns=[0.0, 0.37, 0.81],
-    ),
+    [
+        (Separable(blur_scale=0.6, blur_strength=8.0), 0.37),
+        (Separable(layers=((1.0, 1.0), (2.0, 0.5), (4.0, 0.25))), 0.81),
+        (Separable(format="rgba16float", direct=True, bloom_scale=0.5), 0.0),
+    ],
 )
 def test_final_is_scene_plus_bloom(
     renderer: Renderer, scene: Scene, settings: Separable, turns: float
@@ -338,25 +323,6 @@ def test_tone_maps_without_bloom(renderer: Renderer, scene: Scene) -> None:
 # Framebuffers, arrays to fill, what else comes back
 
 
-def test_framebuffers_are_what_was_wanted(renderer: Renderer, scene: Scene) -> None:
-    everything = renderer.render(scene, None, SIZE)
-    some = renderer.render(scene, None, SIZE, framebuffers=("final", "glow"))
-    assert list(some) == ["glow", "final"]
-    for name, array in some.items():
-        np.testing.assert_array_equal(array, everything[name])
-    assert list(renderer.render(scene, None, SIZE, framebuffers="depth")) == ["depth"]
-    assert list(renderer.render(scene, None, SIZE, framebuffers=())) == []
-
-
-def test_arrays_are_filled_in_place(renderer: Renderer, scene: Scene) -> None:
-    expected = renderer.render(scene, None, SIZE)
-    out = {name: np.full_like(array, 77) for name, array in expected.items()}
-    frames = renderer.render(scene, None, SIZE, out=out)
-    for name, array in frames.items():
-        assert array is out[name]
-        np.testing.assert_array_equal(array, expected[name])
-
-
 def test_arrays_that_are_not_given_are_allocated(renderer: Renderer, scene: Scene) -> None:
     # A part of a larger array, as long as it is contiguous.
     large = np.zeros((3, SIZE[1], SIZE[0], 4), np.uint8)
@@ -366,15 +332,6 @@ def test_arrays_that_are_not_given_are_allocated(renderer: Renderer, scene: Scen
     np.testing.assert_array_equal(large[1], renderer.render(scene, None, SIZE)["final"])
     assert not large[0].any()
     assert not large[2].any()
-
-
-def test_timings_are_times_of_the_device(renderer: Renderer, scene: Scene) -> None:
-    begin = time.perf_counter()
-    frames = renderer.render(scene, None, (640, 360), time=0.123)
-    elapsed = time.perf_counter() - begin
-    assert list(frames.timings) == ["glow", "blur_vertical", "bloom", "scene", "final"]
-    assert all(math.isfinite(seconds) and seconds > 0 for seconds in frames.timings.values())
-    assert sum(frames.timings.values()) < elapsed
 
 
 def test_the_time_of_a_pass_follows_its_work(renderer: Renderer, scene: Scene) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tests.framebuffers import write_image
 from tests.refusals import assert_refused, rows
-from tests.scene.changed_bytes import CHANGES, many
+from tests.scene.gltf_documents import CHANGES, many
 from vkbloom._scene import ktx, skybox
 from vkbloom._scene.skybox import Cubemap
 

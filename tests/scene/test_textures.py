@@ -13,8 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.refusals import assert_refused, rows
-from tests.scene.deferred_frames import rgb
-from tests.screens import CAMERA, NOTHING, SQUARE, panel, screen
+from tests.screens import CAMERA, NOTHING, SQUARE, panel, rgb, screen
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
 from vkbloom._renderer.requests import new_arrays
 from vkbloom._scene import Mesh

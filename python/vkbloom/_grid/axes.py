@@ -49,8 +49,9 @@ class Axis:
         described = {"long_name": self.name, "units": self.unit, "description": self.description}
         if self.name == "preset":
             # The settings of these names at the time of rendering.
-            found = {name: presets[name].to_dict() for name in self.values}
-            described["settings"] = json.dumps(found)
+            described["settings"] = json.dumps(
+                {name: presets[name].to_dict() for name in self.values}
+            )
         return {name: text for name, text in described.items() if text}
 
     @property
@@ -67,17 +68,9 @@ class Axis:
             return np.array([math.nan if v is None else v for v in self.values])
         return np.array([_text(value) for value in self.values])
 
-    def find(self, value: Any) -> int:
-        """Return the index of a value on the axis."""
-        known = tuple(value) if isinstance(value, list) else value
-        if known not in self.values:
-            held = ", ".join(map(_text, self.values[:8])) + ", ..." * (len(self.values) > 8)
-            raise ValueError(f"{self.name}: {value!r} is not a value of the axis; it has {held}")
-        return self.values.index(known)
-
-    def label(self, place: int) -> str:
+    def label(self, index: int) -> str:
         """Return a value as a short text."""
-        value = self.values[place]
+        value = self.values[index]
         return f"{value:.4g}" if isinstance(value, float) else _text(value)
 
 
@@ -91,17 +84,17 @@ def _whole_axis(name: str, values: object) -> Axis:
     """Check an axis of presets or of settings."""
     listed = _sequence(name, values)
     if name == "preset":
-        for one in listed:
+        for value in listed:
             try:
-                presets[one]
+                presets[value]
             except KeyError as error:
                 raise ValueError(f"axes: preset: {error.args[0]}") from None
             except TypeError:
-                raise TypeError(f"axes: preset: {one!r} is not a name") from None
+                raise TypeError(f"axes: preset: {value!r} is not a name") from None
         return Axis(name, tuple(listed), "preset", "", "The name of the settings")
-    for one in listed:
-        if not isinstance(one, Settings):
-            raise TypeError(f"axes: settings: {one!r} is not Settings")
+    for value in listed:
+        if not isinstance(value, Settings):
+            raise TypeError(f"axes: settings: {value!r} is not Settings")
     return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 
@@ -134,14 +127,14 @@ def read_axes(
     bases = [one for axis in whole.values() for one in settings_of(axis)] or [
         check_settings(settings, of_image=not has_time)
     ]
-    found: list[Axis] = []
+    read: list[Axis] = []
     for name, values in axes.items():
         if name in whole:
-            found.append(whole[name])
+            read.append(whole[name])
             continue
         if name == "time" and has_time:
             times = tuple(check_time(value) for value in _sequence(name, values))
-            found.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
+            read.append(Axis(name, times, "time", "turn", _TIME_DESCRIPTION))
             continue
         for base in bases:
             fields = fields_of(type(base))
@@ -153,13 +146,13 @@ def read_axes(
                 )
         # `replace` checks each value and converts it to the type that the settings store.
         listed = _sequence(name, values)
-        own = [
+        converted = [
             tuple(base.replace(**{name: value}).value_of(name) for value in listed)
             for base in bases
         ]
         info = field_info(bases[0], name)
-        found.append(Axis(name, own[0], "settings", info.unit, info.help))
-    return tuple(found)
+        read.append(Axis(name, converted[0], "settings", info.unit, info.help))
+    return tuple(read)
 
 
 def settings_of(axis: Axis) -> tuple[Settings, ...]:

@@ -159,10 +159,10 @@ class GridStore:
             if self.keys.read(key) != content:
                 self.keys.write(key, content)
         self.keys.flush(expected)
-        self._find_done(held)
+        self._mark_complete(held)
 
-    def _find_done(self, held: set[str]) -> None:
-        """Find the completed points, and remove the marks of damaged ones."""
+    def _mark_complete(self, held: set[str]) -> None:
+        """Mark the completed points, and remove the marks of damaged ones."""
         unmarked = []
         for block in self.blocks() if held else ():
             marked = self._chunks.marked(block, held)

@@ -198,13 +198,6 @@ def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
     return right - min(spec.x, spec.full_x), bottom - min(spec.y, spec.full_y)
 
 
-def size_of(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
-    """Return the width and the height of what `load` returns, before it is turned."""
-    if spec.get_int_attribute("Orientation", 1) != 1:
-        return spec.full_width, spec.full_height
-    return _covered(spec)
-
-
 def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None) -> StoredImage:
     """Return an image with a layer's channels alone, by their names in it; None: all."""
     if layer is None:

@@ -32,7 +32,7 @@ _STEADY: Final = 0.25
 _FRAMES: Final = 60
 _FEW_FRAMES: Final = 8
 # Accuracy of a threshold, and the lowest value that is tried, as a share of the probe's.
-_ACCURACY: Final = 1.05
+_ACCURACY: Final = 1.1
 _LEAST: Final = 2.0**-12
 
 
@@ -106,7 +106,7 @@ def assert_jitter(
             lights += [_light(bloom, small, frame) for frame in frames[8:]]
             flickers["16 positions"] = _flicker(lights)
         where = f"{len(lights)} positions, after TAA"
-        resolved = list(_taa(frames[: len(lights)], feedback))[:: 1 + len(lights) // 3]
+        resolved = list(_taa(frames[: len(lights)], feedback))[:: len(lights) // 2]
         flickers[where] = _flicker([_light(bloom, small, frame) for frame in resolved])
         for place, off in flickers.items():
             figure(f"{name}, {place}", off)
