@@ -73,7 +73,8 @@ static uint64_t struct_bytes(const struct vkb_module *module, const uint32_t *ty
 static uint64_t type_bytes(const struct vkb_module *module, uint32_t id, int depth)
 {
     enum { MAX_DEPTH = 16 };  // a faulty module may name a type within itself
-    const uint32_t *type = vkb_declared(module, id), *length;
+    const uint32_t *type = id < module->bound ? module->at[id] : NULL;
+    uint32_t length;
 
     if (!type || depth > MAX_DEPTH)
         return 0;
@@ -87,11 +88,8 @@ static uint64_t type_bytes(const struct vkb_module *module, uint32_t id, int dep
     case SPV_TYPE_MATRIX:
         return type_bytes(module, type[2], depth + 1) * type[3];
     case SPV_TYPE_ARRAY:
-        length = vkb_declared(module, type[3]);
-        return length
-                    && (vkb_opcode(length) == SPV_CONSTANT
-                        || vkb_opcode(length) == SPV_SPEC_CONSTANT)
-                 ? type_bytes(module, type[2], depth + 1) * length[3]
+        return module->at[type[3]] && vkb_constant(module, module->at[type[3]], &length)
+                 ? type_bytes(module, type[2], depth + 1) * length
                  : 0;
     case SPV_TYPE_STRUCT:
         return struct_bytes(module, type, depth + 1);
@@ -114,8 +112,9 @@ static bool check_workgroup(const struct vkb_device *device, const struct vkb_pa
         if (vkb_opcode(at) == SPV_EXECUTION_MODE && vkb_word_count(at) == 6
             && at[2] == SPV_LOCAL_SIZE)
             memcpy(threads, at + 3, sizeof threads);
-        else if (vkb_opcode(at) == SPV_VARIABLE && at[3] == SPV_WORKGROUP) {
-            const uint32_t *pointer = vkb_declared(&module, at[1]);
+        else if (vkb_opcode(at) == SPV_VARIABLE && vkb_word_count(at) >= 4
+                 && at[3] == SPV_WORKGROUP) {
+            const uint32_t *pointer = at[1] < module.bound ? module.at[at[1]] : NULL;
             shared += pointer && vkb_opcode(pointer) == SPV_TYPE_POINTER
                         ? type_bytes(&module, pointer[3], 0)
                         : 0;

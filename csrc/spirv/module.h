@@ -1,65 +1,54 @@
-// Declarations of a module of SPIR-V: a header of five words, then instructions, whose first word
-// is their number of words and their opcode.
+// Modules of SPIR-V: one that is read, and code that is written.
 #ifndef VKB_MODULE_H
 #define VKB_MODULE_H
 
 #include "graph/shader.h"
+#include "spirv/instructions.h"
 #include "vulkan/error.h"
 
-enum vkb_spirv {
-    SPV_MAGIC = 0x07230203,
-    SPV_BOUND = 3,  // the word of the header that all ids are below
-    SPV_HEADER_WORDS = 5,
-    SPV_MAX_BOUND = 0x3fffff,
-    SPV_LOCAL_SIZE = 17,  // an execution mode
-    SPV_WORKGROUP = 4,    // a storage class
-};
-
-enum vkb_opcode {
-    SPV_EXECUTION_MODE = 16,
-    SPV_TYPE_VOID = 19,
-    SPV_TYPE_BOOL,
-    SPV_TYPE_INT,
-    SPV_TYPE_FLOAT,
-    SPV_TYPE_VECTOR,
-    SPV_TYPE_MATRIX,
-    SPV_TYPE_ARRAY = 28,
-    SPV_TYPE_STRUCT = 30,
-    SPV_TYPE_POINTER = 32,
-    SPV_CONSTANT = 43,
-    SPV_SPEC_CONSTANT = 50,
-    SPV_FUNCTION = 54,
-    SPV_VARIABLE = 59,
-};
-
-static inline uint32_t vkb_opcode(const uint32_t *at)
-{
-    return at[0] & 0xffff;
-}
-
-static inline uint32_t vkb_word_count(const uint32_t *at)
-{
-    return at[0] >> 16;
-}
-
-static inline const uint32_t *vkb_next(const uint32_t *at)
-{
-    return at + vkb_word_count(at);
-}
-
 struct vkb_module {
-    const uint32_t *first, *functions;  // declarations; the first instruction after them
-    uint32_t bound;                     // above all ids
-    const uint32_t **at;                // by id: the type, constant or variable; NULL: none
+    const uint32_t *first, *functions, *end;  // instructions; the first one of the first function
+    uint32_t bound;                           // above all ids
+    const uint32_t **at;                      // by id: what defines it; NULL: nothing
 };
 
-// Fails if the shader is not SPIR-V whose declarations lie within it. Types, constants and
-// variables have the words that their opcodes need. Either way the caller frees `module->at` with
-// vkb_free.
+// Fails if the shader is not well-formed SPIR-V, so that what follows reads within it: instructions
+// have the words that their opcodes need, ids are below the bound and defined once, branches lead
+// to labels, and functions are made of blocks. An id that is used may have no definition, as those
+// of opcodes that vkb_result does not know. Either way the caller frees `module->at` with vkb_free.
 bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
                      struct vkb_error *error);
 
-// What declares the id; NULL: nothing.
-const uint32_t *vkb_declared(const struct vkb_module *module, uint32_t id);
+// Whether a type is that of a bool or a 32-bit integer.
+bool vkb_is_word(const struct vkb_module *module, uint32_t type);
+
+// Whether an instruction declares a constant of such a type; `*value` is then its value or its
+// default.
+bool vkb_constant(const struct vkb_module *module, const uint32_t *at, uint32_t *value);
+
+// Once writing has failed, nothing is written any more.
+struct vkb_code {
+    uint32_t *words;
+    size_t count, capacity;
+    bool failed;
+    struct vkb_error *error;
+};
+
+void vkb_write(struct vkb_code *code, const uint32_t *words, size_t count);
+
+// Writes an instruction with these operands.
+#define VKB_WRITE(code, opcode, ...) \
+    vkb_write( \
+        code, \
+        (const uint32_t[]){(uint32_t)(opcode) | (VKB_WORDS(0, __VA_ARGS__) << 16), __VA_ARGS__}, \
+        VKB_WORDS(0, __VA_ARGS__))
+#define VKB_WORDS(...) (uint32_t)(sizeof((const uint32_t[]){__VA_ARGS__}) / sizeof(uint32_t))
+
+// Makes one instruction of the words from number `first` on, whose first one is its opcode.
+void vkb_end_instruction(struct vkb_code *code, size_t first);
+
+// Writes a constant whose type is that of a bool or a 32-bit integer.
+void vkb_write_constant(struct vkb_code *code, const struct vkb_module *module, uint32_t type,
+                        uint32_t id, uint32_t value);
 
 #endif
