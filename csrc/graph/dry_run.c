@@ -71,11 +71,15 @@ static bool step(struct vkb_dry_run *dry_run, struct vkb_plan_step *planned, boo
         contents[i] = image && fits(image, &graph->images[i]) ? &image->content : NULL;
         if (!vkb_is_given(&graph->images[i]))
             continue;
+        // Pixels are written again to an image that a new usage replaces.
+        if (graph->images[i].input && image && !contents[i])
+            dry_run->source_version = ++dry_run->clock;
         if (!(contents[i] = resolve(dry_run, &graph->images[i], error)))
             return false;
         contents[i]->version =
             graph->images[i].input ? dry_run->source_version : graph->images[i].serial;
     }
+    planned->source = planned->scene = dry_run->source_version;
     if (!vkb_planner_mark(&dry_run->planner, planned, error))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -93,7 +97,6 @@ bool vkb_dry_run_step(struct vkb_dry_run *dry_run, const struct vkb_plan *plan, 
     if (!dry_run->source_version || dry_run->source != source)
         dry_run->source_version = ++dry_run->clock;
     dry_run->source = source;
-    planned.source = planned.scene = dry_run->source_version;
     planned.contents = vkb_alloc(error, plan->graph.image_count, sizeof *planned.contents);
     memset(ran, 0, plan->graph.pass_count * sizeof *ran);
     const bool done = planned.contents && step(dry_run, &planned, ran, error);

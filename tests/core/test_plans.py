@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.exhaustive import examples, some
@@ -239,6 +239,7 @@ CALLS = st.lists(st.tuples(st.integers(0, len(IMAGES) - 1), CHANGES, NAMES), max
 
 
 @given(calls=CALLS)
+@example(calls=[(0, method, None) for method in (Separable(), Separable(bloom=False), Separable())])
 @settings(max_examples=examples(10), deadline=None)
 def test_a_dry_run_of_images_is_what_runs(
     calls: list[tuple[int, Settings, tuple[str, ...] | None]],

@@ -250,7 +250,7 @@ FAULTS: dict[str, Fault] = {
         lambda: lambda a: gaussian(doubled(above_one(halved(a)), a.shape)),
         lambda: lambda a: gaussian(doubled(halved(above_one(a)), a.shape)),
         "jitter",
-        "a lit pixel blooms from 3.94",
+        "a lit pixel blooms from 4",
     ),
     "box instead of tent": Fault(
         lambda: box, lambda: lambda a: box(box(a, 9), 9), "round", "1.37 times as far"

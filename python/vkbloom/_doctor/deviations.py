@@ -125,13 +125,19 @@ def deviation(
 def _slope(image: NDArray[Any], settings: Settings) -> Limit:
     """Return how much of a difference of the bloom, after its intensity, is in `final` at most.
 
-    Godot's screen is s + g - s g / white, of which s may be any number.
+    Godot's screen is s + g - s g / white, of which s may be any number; so may that of soft light,
+    whose g is multiplied by a cubic of the scene where that is dark or negative.
     """
-    if not isinstance(settings, GodotBloom) or settings.composite != "screen":
+    if not isinstance(settings, GodotBloom):
         return 1.0
     scene = real(image) * 2.0**settings.exposure
-    slope: NDArray[np.float64] = np.maximum(1.0, np.abs(1.0 - scene / settings.white))
-    return slope
+    slope = np.ones_like(scene)
+    if settings.composite == "screen":
+        slope = np.abs(1.0 - scene / settings.white)
+    elif settings.composite == "soft_light" and settings.tonemap == "none":
+        slope = np.abs(((16 * scene - 12) * scene + 3) * scene)
+        slope = np.where(scene <= 0.25, slope, 1.0)
+    return np.maximum(1.0, slope)
 
 
 def _is_transform(settings: Settings) -> bool:
