@@ -135,7 +135,8 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     for axes in grid.flat:
         axes.set_ylim(1e-7, 1)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
+        if axes.lines:
+            axes.legend(fontsize=8)
     figure.supxlabel("distance, pixels (+ 0.5)")
     figure.supylabel("share of the light of the point, per pixel")
     figure.savefig(folder / "profiles.png", dpi=110)

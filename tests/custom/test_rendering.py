@@ -66,8 +66,10 @@ def test_the_examples_and_their_twins(renderer: Renderer, name: str, size: tuple
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
     assert set(expected) | {"glow"} == set(frames)
+    # GPUs filter with positions of 8 fractional bits: half a step along each axis, of values to 2.
+    limit = 2e-4 if renderer.info.type == "cpu" else 2 * 2.0**-8
     for framebuffer, array in expected.items():
-        assert difference(frames[framebuffer], array) < 2e-4, framebuffer
+        assert difference(frames[framebuffer], array) < limit, framebuffer
 
 
 def test_a_file_without_bloom_makes_the_picture(renderer: Renderer) -> None:

@@ -223,23 +223,22 @@ def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         Renderer()
 
 
-def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once() -> None:
-    with Renderer("software") as software:
-        plan = software.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
-        linear = has_linear_texels(software)
+def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once(renderer: Renderer) -> None:
+    plan = renderer.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
+    linear = has_linear_texels(renderer)
     (first,) = (one for one in plan.passes if one.name == "down_0")
     assert first.shader.startswith("shrink_linear") == linear
 
 
-def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines() -> None:
+def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines(
+    renderer: Renderer,
+) -> None:
     def stages(size: tuple[int, int]) -> int:
         image = np.zeros((size[1], size[0], 3), np.float32)
-        plan = software.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))
+        plan = renderer.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))
         return sum(one.shader.startswith("fft_linear") for one in plan.passes)
 
-    with Renderer("software") as software:
-        linear = has_linear_texels(software)
-        assert (stages((500, 250)) > stages((500, 270))) == linear
+    assert (stages((500, 250)) > stages((500, 270))) == has_linear_texels(renderer)
 
 
 def test_texels_are_what_fused_passes_take_them_for(renderer: Renderer) -> None:

@@ -137,7 +137,8 @@ def _slope(image: NDArray[Any], settings: Settings) -> Limit:
     elif settings.composite == "soft_light" and settings.tonemap == "none":
         slope = np.abs(((16 * scene - 12) * scene + 3) * scene)
         slope = np.where(scene <= 0.25, slope, 1.0)
-    return np.maximum(1.0, slope)
+    limit: NDArray[np.float64] = np.maximum(1.0, slope)
+    return limit
 
 
 def _is_transform(settings: Settings) -> bool:
