@@ -1,6 +1,5 @@
 # The public names of `vkbloom.testing`; lazy_loader reads them, and imports what is asked for.
 from ._border import assert_border, assert_views, border_energy
-from ._frame_files import read_frame
 from ._judging import Diagnosis, Tolerances, diagnose
 from ._law_report import LawReport, LawRow, report
 from ._laws import (
@@ -69,7 +68,6 @@ __all__ = [
     "flash",
     "flicker",
     "point_spread",
-    "read_frame",
     "report",
     "resolution_response",
     "roundness",
