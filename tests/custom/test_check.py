@@ -416,16 +416,6 @@ def test_changes_of_presets_and_commands(copying: str, tmp_path: Path) -> None:
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
 
 
-@pytest.mark.usefixtures("compiler")
-def test_the_first_infected_framebuffer_is_named(tmp_path: Path) -> None:
-    # GLOW has no NaN, MAIN has.
-    text = chain("return texelFetch(MAIN_raw, ivec2(gl_FragCoord), 0);").replace("GLOW", "MAIN")
-    done, found = of_text(tmp_path, text, "--require", "finite")
-    assert (done.exit_code, found["first_infected"]) == (1, "rows"), found["laws"]["finite"]
-    assert "reaches is rows" in found["laws"]["finite"]["message"]
-    assert of_text(tmp_path, SOUND)[1]["first_infected"] is None
-
-
 # (Without vkbloom, whose import takes longer than the rest.)
 VIEWS = """\
 import sys, numpy as np, OpenImageIO as oiio

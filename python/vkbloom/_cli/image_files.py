@@ -87,7 +87,6 @@ def read_picture(
     colour: Colour | None,
     *,
     layer: str | None = None,
-    raw: bool = False,
     expand: float | None = None,
     is_blended: bool = True,
 ) -> Picture:
@@ -95,11 +94,7 @@ def read_picture(
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     source = shown(source)
-    if raw and stored.pixels.dtype != np.uint8:
-        raise click.UsageError(
-            f"--raw: {source} has {stored.numbers[0]}, not 8-bit integers; leave out --raw"
-        )
-    picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
+    picture = image_reading.decode_file(stored, source, colour, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
     counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))

@@ -13,7 +13,6 @@ from typing import Any, Final, NoReturn
 
 import click
 from click.core import ParameterSource
-from click.shell_completion import CompletionItem
 
 import vkbloom
 from vkbloom._cli import terminal
@@ -84,16 +83,6 @@ class Program(click.Group):
         """Write what the commands do, without an import of them."""
         with formatter.section("Commands"):
             formatter.write_dl([*COMMANDS.items()])
-
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the commands that begin with some letters, without an import of them."""
-        results = [
-            CompletionItem(name, help=summary)
-            for name, summary in COMMANDS.items()
-            if name.startswith(incomplete)
-        ]
-        # Not the group's own: it would list the commands again.
-        return [*results, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any

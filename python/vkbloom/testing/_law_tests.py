@@ -207,13 +207,11 @@ def finite(subject: Subject, limit: float) -> None:
             reached[y, x] = False
             count = int(reached.sum())
             if not is_within(law, count, limit, name):
-                first = subject.first_infected
-                where = f"; the first framebuffer that it reaches is {first}" if first else ""
                 fail(
                     "assert_finite",
                     law,
                     f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
-                    f"{limit:g} allowed{where}",
+                    f"{limit:g} allowed",
                 )
 
 

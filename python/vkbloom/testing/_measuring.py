@@ -112,7 +112,6 @@ def of_settings(
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=lambda: differences(renderer, used),
-        frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
         keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom

@@ -106,7 +106,6 @@ def as_values(measured: Measured) -> dict[str, Any]:
                 name: getattr(response, name) for name in ("sizes", "r50", "r90", "peak")
             },
             "veiling_glare_index": measured.veiling_glare_index,
-            "first_infected": measured.subject.first_infected,
             "reference": measured.subject.reference or None,
             "nearest_preset": {
                 "name": measured.nearest[0] or None,
