@@ -22,7 +22,7 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.glow_options import accompanying, uploaded
 from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.streams import PIPE, is_stream
-from vkbloom._cli.terminal import detail, hides_progress, note, say
+from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import Saved
@@ -166,7 +166,7 @@ class Run:
                 yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
 
     def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
-        """Print notes about the bloom of a file, and its time."""
+        """Print a note about the bloom of a file."""
         name, target = pair
         text = ""
         if no_bloom.is_without(frames):
@@ -176,7 +176,6 @@ class Run:
             text = no_bloom.hidden(frames["final"], frames.settings)
         if text:
             note(f"{name}: {text}" if self._several else text)
-        detail(f"{name}: {1e3 * sum(frames.timings.values()):.2f} ms on the device")
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
         file = of_format(target, self._options.pipe_format)

@@ -23,7 +23,7 @@ from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
-from vkbloom._cli.terminal import detail_device, is_quiet, note, say
+from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
@@ -177,7 +177,6 @@ def command(
     _check_choice(file, program, reference, against, page)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
-        detail_device(renderer)
         if reference is not None:
             _add_reference(settings, reference)
         preset = click.get_current_context().params["preset"]

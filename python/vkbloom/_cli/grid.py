@@ -122,7 +122,6 @@ def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
     # A renderer of its own, so that the passes of the grid are counted from the first.
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
-        terminal.detail_device(renderer)
         frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
     if lit and all(map(no_bloom.is_without, frames)):
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")

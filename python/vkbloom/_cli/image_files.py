@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom._cli.program import given
 from vkbloom._cli.streams import as_file, shown
-from vkbloom._cli.terminal import detail, note
+from vkbloom._cli.terminal import note
 from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes
 from vkbloom._io.array_files import has_straight
@@ -100,8 +100,6 @@ def read_picture(
     counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
-    height, width = picture.pixels.shape[:2]
-    detail(f"{source}: {width} x {height}, {picture.numbers}")
     hidden = 0.0 if is_blended else picture.hidden
     for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
         note(f"{source}: {text}")
