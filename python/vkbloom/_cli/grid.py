@@ -27,7 +27,7 @@ from vkbloom._settings.settings import SHADINGS
 
 @click.command(cls=fields.Command)
 @click.argument("images", metavar="[IMAGE]...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, a URL, or a folder")
+@click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, or a folder")
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
 @click.option("--time", default=0.0, help="Time of a scene's animation; its period is 1.")
@@ -58,7 +58,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
 
     Other processes may render other parts at the same time.
     """
-    is_store = out.endswith(".zarr") or "://" in out
+    is_store = out.endswith(".zarr")
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +14,7 @@ import numpy as np
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
+from vkbloom._io.containers import HEIF_ADVICE, is_heif, orientation_of, padded, upright
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
@@ -236,7 +235,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
-            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
+            for attribute in spec.extra_attribs
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
@@ -245,18 +244,6 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         notes=tuple(notes),
     )
     return replace(found, parts=tuple(_parts(reader)))
-
-
-def _late_attributes(kind: str, name: str) -> Iterator[Any]:
-    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
-    if kind != "png" or (exif := late_exif(name)) is None:
-        return
-    with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        file.write(exif)
-        file.flush()
-        # Damaged metadata do not matter to the pixels.
-        with suppress(ValueError), opened(file.name, "Reading images") as reader:
-            yield from reader.spec().extra_attribs
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
