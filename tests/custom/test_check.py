@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.resources
 import json
 import math
-import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -414,40 +413,6 @@ def test_changes_of_presets_and_commands(copying: str, tmp_path: Path) -> None:
     assert "| symmetric | yes | " in page.read_text()
     refused = CliRunner().invoke(program, ["check", *words[:2], "--against", "tutoral"])
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
-
-
-# (Without vkbloom, whose import takes longer than the rest.)
-VIEWS = """\
-import sys, numpy as np, OpenImageIO as oiio
-image = oiio.ImageBuf(sys.argv[1]).get_pixels(oiio.FLOAT)
-x, y, width, height = map(int, sys.argv[3].split(","))
-if sys.argv[4] == "leak":
-    image = image + 0.01 * image.mean((0, 1))
-view = image[y : y + height, x : x + width]
-shade = 1 + 0.5 * (int(sys.argv[5]) % 2) if len(sys.argv) > 5 else 1
-oiio.ImageBuf(np.ascontiguousarray(view * shade, np.float32)).write(sys.argv[2])
-"""
-
-
-@pytest.mark.parametrize(
-    ("words", "broken", "untaken"),
-    [
-        ("keep", set(), ("time",)),
-        ("leak", {"views"}, ("time",)),
-        ("keep {frame}", {"history"}, ()),
-    ],
-)
-def test_regions_and_frames_of_a_program(
-    tmp_path: Path, words: str, broken: set[str], untaken: tuple[str, ...]
-) -> None:
-    script = tmp_path / "views.py"
-    script.write_text(VIEWS)
-    argv = shlex.split(f"{sys.executable} {script} {{input}} {{output}} {{region}} {words}")
-    laws = ["history" if "frame" in words else "views"]
-    found = testing.report(testing.command(argv), size=(16, 16), laws=laws)
-    assert found.untaken == untaken
-    assert {row.name for row in found.rows if not row.held} == broken
-    assert ("takes no time" in str(found)) == (untaken == ("time",))
 
 
 def test_what_a_program_does_not_take_is_not_tested() -> None:
