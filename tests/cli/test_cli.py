@@ -170,15 +170,8 @@ def test_every_preset_is_there() -> None:
             {"glare": vkbloom.Ghosts(scales=(1, -2), tints=((1, 0, 0), (0, 1, 0)), falloff=3)},
         ),
         (
-            "--glare streaks:directions=4,fade=0.5 --streaks 6 --ghosts --halo",
-            {
-                "glare": (
-                    vkbloom.Streaks(directions=4, fade=0.5),
-                    vkbloom.Streaks(directions=6),
-                    vkbloom.Ghosts(),
-                    vkbloom.Halo(),
-                )
-            },
+            "--glare streaks:directions=4,fade=0.5+halo",
+            {"glare": (vkbloom.Streaks(directions=4, fade=0.5), vkbloom.Halo())},
         ),
     ],
 )

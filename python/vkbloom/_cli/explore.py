@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.glow_options import accompanying, glow_options, note_step, refuse_glow_of_scene
+from vkbloom._cli.glow_options import accompanying, glow_options, refuse_glow_of_scene
 from vkbloom._cli.interrupts import INTERRUPTED
 from vkbloom._cli.live_options import live_options
 from vkbloom._cli.program import as_wrong_use, given
@@ -75,7 +75,6 @@ def command(
     if image is not None:
         looked_at = image
         glow = accompanying(mask, emission)(image)
-        note_step(settings, mask, emission)
     else:
         refuse_glow_of_scene(mask, emission)
         looked_at = scene()

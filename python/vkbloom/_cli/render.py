@@ -16,7 +16,7 @@ from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
-from vkbloom._cli.terminal import detail, hides_progress, note, say, tell_device
+from vkbloom._cli.terminal import hides_progress, note, say, tell_device
 from vkbloom._settings.settings import SHADINGS, Shading
 
 
@@ -71,7 +71,6 @@ def command(
     seconds: dict[str, list[float]] = {}
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
         tell_device(renderer)
-        detail(f"{size[0]} x {size[1]}, {shading}, {settings!r}")
         disable = True if count is None else hides_progress()
         turn = tqdm(range(count or 1), unit="frame", leave=False, disable=disable)
         for index in turn:
