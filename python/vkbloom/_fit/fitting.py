@@ -173,19 +173,19 @@ def fit(
     if is_all:
         spaces = spaces_of_all(candidates, names, *limits)
     else:
-        spaces = [space_of(one, names, *limits) for one in candidates]
+        spaces = [space_of(each, names, *limits) for each in candidates]
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
     renderer = renderer or default_renderer()
     stages = _stages(renderer, image, pixels, measure)
     # All of them before the first is searched: the most likely failures come at once.
     priced = [_priced(renderer, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
-    found = []
+    results = []
     for space, cost in priced:
         if not space.axes:
             continue
         with _bar(progress, space.start.method, max_calls) as on_loss:
-            one = _fitted(
+            fitted = _fitted(
                 renderer,
                 stages,
                 space,
@@ -195,9 +195,9 @@ def fit(
                 on_loss=on_loss,
                 gradient=gradient,
             )
-            found.append(one)
-    found.sort(key=lambda one: one.loss)
-    return found[0] if isinstance(settings, Settings) else found
+            results.append(fitted)
+    results.sort(key=lambda item: item.loss)
+    return results[0] if isinstance(settings, Settings) else results
 
 
 def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]:
@@ -207,7 +207,7 @@ def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]
     some: list[Any] = [settings] if isinstance(settings, Settings | str) else list(settings)
     if not some:
         raise ValueError("settings: there are none; give at least one")
-    return [check_settings(one) for one in some]
+    return [check_settings(item) for item in some]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -279,11 +279,11 @@ def _cost(image: Image, space: Space, index: int, framebuffer: str) -> int:
     """Return how many passes run after a change of one varied field."""
     steps = []
     # From several places: at one of them a field may be without effect.
-    for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
+    for coordinate in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
         point = space.origin.copy()
-        point[index] = place
-        one = space.settings(point)
-        steps.append((image_source(image), _core.plan(image_source(image), one, (framebuffer,))))
+        point[index] = coordinate
+        plan = _core.plan(image_source(image), space.settings(point), (framebuffer,))
+        steps.append((image_source(image), plan))
     return max(map(len, _core.dry_run(tuple(steps))[1:]))
 
 
@@ -412,11 +412,11 @@ def _derivatives(
     def back(cotangent: NDArray[np.float64]) -> Any:
         whole = np.zeros((*cotangent.shape[:2], channels))
         whole[..., :3] = cotangent
-        found = pullback({framebuffer: whole})
-        if stage.factor == 1 or "blur_scale" not in found:
-            return found
+        gradients = pullback({framebuffer: whole})
+        if stage.factor == 1 or "blur_scale" not in gradients:
+            return gradients
         # `_smaller` has divided the scale.
-        return {**found, "blur_scale": found["blur_scale"] / np.float32(stage.factor)}
+        return {**gradients, "blur_scale": gradients["blur_scale"] / np.float32(stage.factor)}
 
     return back
 

@@ -137,7 +137,7 @@ class Search:
         units = qmc.Halton(len(low), scramble=False).random((turn + 1) * count + 1)[-count:]
         # Levels make a valley rough, so that least squares do not reach its end.
         enough = self._close if self._measure.is_rounded else min(_NEAR, self.loss / 2)
-        found = optimize.differential_evolution(
+        result = optimize.differential_evolution(
             self._loss,
             np.stack([low, high], axis=1),
             init=np.clip([self.best, *(low + (high - low) * units)], low, high),
@@ -147,8 +147,8 @@ class Search:
             rng=turn,
             callback=lambda intermediate_result: self.loss <= enough,
         )
-        order = np.argsort(found.population_energies, kind="stable")
-        for start in [self._space.origin, *found.population[order]][:_STARTS]:
+        order = np.argsort(result.population_energies, kind="stable")
+        for start in [self._space.origin, *result.population[order]][:_STARTS]:
             self._descend(start, STEPS[0], most=5)
             if self.loss <= self._close:
                 return
@@ -182,8 +182,8 @@ class Search:
 
         def remembered(part: Point) -> NDArray[np.float64]:
             known.clear()
-            known[part.tobytes()] = found = residual(part)
-            return found
+            known[part.tobytes()] = result = residual(part)
+            return result
 
         optimize.least_squares(
             remembered,

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from vkbloom._checks import check_number
-from vkbloom._views.comparison import USUAL_METRICS, Comparison, Metric
+from vkbloom._views.comparison import METRICS, Comparison, Metric
 
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
 
@@ -92,7 +92,7 @@ class Tolerances:
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The metrics that have a limit, which `compare` must compute."""
-        return tuple(name for name in USUAL_METRICS if getattr(self, name) is not None)
+        return tuple(name for name in METRICS if getattr(self, name) is not None)
 
 
 def failures(
