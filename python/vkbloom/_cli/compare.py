@@ -37,7 +37,6 @@ def tolerances_of(
     *,
     max_error: float | None = None,
     min_ssim: float | None = None,
-    min_psnr: float | None = None,
     max_flip: float | None = None,
     fail_percent: float | None = None,
 ) -> Tolerances:
@@ -49,14 +48,13 @@ def tolerances_of(
         atol, hard_fail = max_error or 0.0, None
     else:
         atol, hard_fail = 0.0, max_error
-        has_none = (max_error, min_ssim, min_psnr, max_flip) == (None, None, None, None)
+        has_none = (max_error, min_ssim, max_flip) == (None, None, None)
         fail_percent = 0.0 if has_none else 100.0
     return Tolerances(
         atol=atol,
         fail_percent=fail_percent,
         hard_fail=hard_fail,
         ssim=min_ssim,
-        psnr=min_psnr,
         flip=max_flip,
     )
 
@@ -80,7 +78,6 @@ def tolerances_of(
 @subimage_option
 @_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
 @_limit("min_ssim", "Smallest allowed structural similarity, -1 to 1")
-@_limit("min_psnr", "Smallest allowed peak signal-to-noise ratio, in dB")
 @_limit("max_flip", "Largest allowed mean FLIP, 0 to 1")
 @_limit(
     "fail_percent",

@@ -41,7 +41,6 @@ class Search:
 
     - `render`: Takes settings, returns the framebuffer as float64 (H, W, 3).
     - `max_calls`: How often it may be called.
-    - `costs`: Passes that run after a change of each varied field alone.
     - `on_loss`: Is called with the loss of each call.
     - `close`: Below this loss the search only polishes.
     """
@@ -53,7 +52,6 @@ class Search:
         render: Callable[[Any], NDArray[np.float64]],
         *,
         max_calls: int,
-        costs: NDArray[np.int_],
         on_loss: Callable[[float], None],
         close: float = CLOSE,
     ) -> None:
@@ -61,7 +59,6 @@ class Search:
         self._measure = measure
         self._render = render
         self._left = max_calls
-        self._costs = costs
         self._on_loss = on_loss
         self._close = close
         self.best = space.origin
@@ -162,13 +159,11 @@ class Search:
             self._simplex(point, step, most)
             return
         optimize = import_extra("scipy.optimize", "fit", "Fitting")
-        # Cheap fields first: the render for the next field also resets the field before it.
-        order = free[np.argsort(self._costs[free], kind="stable")]
         known: dict[bytes, NDArray[np.float64]] = {}
 
         def residual(part: Point) -> NDArray[np.float64]:
             whole = point.copy()
-            whole[order] = part
+            whole[free] = part
             return self._measure.residual(self._values(whole))
 
         def jacobian(part: Point) -> NDArray[np.float64]:
@@ -187,7 +182,7 @@ class Search:
 
         optimize.least_squares(
             remembered,
-            np.clip(point[order], 1e-9, 1 - 1e-9),
+            np.clip(point[free], 1e-9, 1 - 1e-9),
             jacobian,
             bounds=(0.0, 1.0),
             x_scale="jac",
