@@ -44,7 +44,7 @@ struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct v
 {
     struct vkb_exports *exports;
 
-    if (!device->exports) {
+    if (!device->exports || !device->dispatch) {
         vkb_fail(error, VKB_ERROR_VALUE,
                  "device: the adapter %s cannot share memory with CUDA; use arrays on the host",
                  device->adapter.name);
