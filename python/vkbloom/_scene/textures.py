@@ -65,6 +65,11 @@ class Surface:
     base: Texture = WHITE
     emission: Texture = WHITE
 
+    @property
+    def textures(self) -> tuple[Texture, Texture]:
+        """Both textures."""
+        return self.base, self.emission
+
 
 def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
     """Make all mip levels of a picture.
