@@ -25,10 +25,7 @@ SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
 
 def done(*words: object) -> Result:
     result = run(*words)
-    # The settings mix, and notes say what follows: see test_cli_photo.py and below.
-    notes = ("darkens the highlights", "step at the mask's edge")
-    lines = [one for one in result.stderr.splitlines() if not any(note in one for note in notes)]
-    assert (result.exit_code, lines) == (0, [])
+    assert (result.exit_code, result.stderr) == (0, "")
     return result
 
 
@@ -55,22 +52,6 @@ def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
     done("apply", source, out, *PYRAMID, "--mask", mask, "--emission", glow)
     both = expected(image, SETTINGS, mask=levels, emission=emission)
     assert_array_equal(vkbloom.read(out), both)
-
-
-def test_a_mask_of_a_mix_says_that_its_edge_is_seen(tmp_path: Path) -> None:
-    source = stored(tmp_path / "a.exr", np.full((16, 24, 3), 0.425, np.float32))
-    mask = np.zeros((16, 24), np.uint8)
-    mask[:, :12] = 255
-    words = ("apply", source, tmp_path / "o.exr", "--mask", stored(tmp_path / "m.png", mask))
-    note = (
-        "vkbloom: note: the composite mix takes light from what the mask lets glow, which is seen "
-        "as a step at the mask's edge; --composite add or --preset photo adds the bloom without\n"
-    )
-    assert note in done(*words, *PYRAMID).stderr
-    # Without settings a picture of floats is mixed, too.
-    assert note in run(*words).stderr
-    assert note not in run(*words, "--composite", "add").stderr
-    assert note not in run(*words, "--preset", "kino").stderr
 
 
 def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:

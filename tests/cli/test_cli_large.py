@@ -35,15 +35,14 @@ def test_half_floats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By choice, and for large pictures of 8 bits."""
     path = stored(tmp_path / "a.png", 50, 41)
     made = []
-    for limit, words in ((1 << 26, ()), (1 << 26, ("--half",)), (1, ()), (1, ("--no-half",))):
+    for limit, words in ((1 << 26, ()), (1 << 26, ("--half",)), (1, ())):
         monkeypatch.setattr(applied, "_HALVED", limit)
         target = tmp_path / "b.exr"
         assert run(path, target, "--exposure", -1, *words).exit_code == 0
         made.append(vkbloom.read(target))
-    single, half, large, chosen = made
+    single, half, large = made
     assert 0 < abs(half.astype(float) - single).max() < 2e-3
     assert np.array_equal(half, large)
-    assert np.array_equal(single, chosen)
 
 
 @pytest.mark.parametrize("size", [(1, 161), (161, 1)])

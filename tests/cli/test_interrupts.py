@@ -67,7 +67,7 @@ def test_at_any_time(tmp_path: Path, words: tuple[str, ...]) -> None:
             time.sleep(chosen.uniform(0.05, 1.0))
             process.send_signal(signal.SIGINT)
             _, stderr = process.communicate()
-        left = [line for line in stderr.splitlines() if "darkens" not in line]
+        left = stderr.splitlines()
         # What was done before the signal came is a success.
         assert (process.returncode, left) in [(130, ["vkbloom: interrupted"]), (0, [])], stderr
         assert {file.name for file in tmp_path.iterdir()} <= {"a.exr", "b.exr"}

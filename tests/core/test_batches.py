@@ -355,19 +355,11 @@ def run_failing(
     return results, None
 
 
-@pytest.mark.parametrize("place", [0, 1, 2, 3, 6, 20, 99])
-def test_a_setting_that_the_device_cannot_run(place: int) -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
-    blame = _core.OutOfMemoryError("no memory")
-    results, error = run_failing(settings, {settings[place]: blame})
-    assert error is blame
-    assert [point for point, _ in results] == settings[:place]
-    timed = [list(timings) for _, (_, timings, _) in results]
-    assert timed == [[str(one.exposure)] for one in settings[:place]]
-
-
-@pytest.mark.parametrize("kind", [_core.ValidationError, _core.DeviceLostError, ValueError])
-def test_error_of_the_device_names_no_setting(
+@pytest.mark.parametrize(
+    "kind",
+    [_core.OutOfMemoryError, _core.ValidationError, _core.DeviceLostError, ValueError],
+)
+def test_an_error_of_the_device_loses_the_frames_of_its_submission(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Batches double up to the largest size, however slow the machine is.
@@ -376,16 +368,8 @@ def test_error_of_the_device_names_no_setting(
     blame = kind("all")
     results, error = run_failing(settings, {settings[50]: blame})
     assert error is blame
-    # Only the frames of its batch, which begins after 1 + 2 + 4 + 8 + 16, are lost.
+    # Only the frames of its submission, which begins after 1 + 2 + 4 + 8 + 16, are lost.
     assert [point for point, _ in results] == settings[:31]
-
-
-def test_of_two_errors_the_first_is_raised() -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(6)]
-    first, second = _core.OutOfMemoryError("first"), _core.OutOfMemoryError("second")
-    results, error = run_failing(settings, {settings[4]: first, settings[5]: second})
-    assert error is first
-    assert len(results) == 4
 
 
 # The core's own types

@@ -22,7 +22,7 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.glow_options import accompanying, uploaded
 from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.streams import PIPE, is_stream
-from vkbloom._cli.terminal import detail, hides_progress, note, say
+from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import Saved
@@ -49,10 +49,9 @@ class Options:
     subimage: int
     layer: str | None
     input_colour: Colour | None
-    raw: bool
+    half: bool
     mask: str | None
     emission: str | None
-    half: bool | None
     output_colour: SavedColour | None
     primaries: str
     view: str | None
@@ -167,14 +166,16 @@ class Run:
                 yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
 
     def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
-        """Print notes about the bloom of a file, and its time."""
+        """Print a note about the bloom of a file."""
         name, target = pair
-        texts = [*no_bloom.notes(frames, picture.pixels)]
-        if not no_bloom.is_without(frames) and self._is_straight(picture, target):
-            texts.append(no_bloom.hidden(frames["final"], frames.settings))
-        for text in filter(None, texts):
+        text = ""
+        if no_bloom.is_without(frames):
+            brightest = no_bloom.brightest_of(picture.pixels)
+            text = no_bloom.reason(frames.settings, brightest)
+        elif self._is_straight(picture, target):
+            text = no_bloom.hidden(frames["final"], frames.settings)
+        if text:
             note(f"{name}: {text}" if self._several else text)
-        detail(f"{name}: {1e3 * sum(frames.timings.values()):.2f} ms on the device")
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
         file = of_format(target, self._options.pipe_format)
@@ -187,15 +188,13 @@ class Run:
             options.subimage,
             options.input_colour,
             layer=options.layer,
-            raw=options.raw,
             expand=expand,
             is_blended=is_blended,
         )
         picture = premultiplied(picture) if is_blended else picture
-        pixels, is_half = picture.pixels, options.half
-        if is_half is None:
-            is_half = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
-        if is_half and pixels.dtype == np.float32:
+        pixels = picture.pixels
+        is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
+        if (options.half or is_large) and pixels.dtype == np.float32:
             picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
         return picture
 
@@ -206,7 +205,6 @@ class Run:
             options.mask,
             options.emission,
             options.input_colour,
-            raw=options.raw,
             is_blended=is_blended,
         )
 

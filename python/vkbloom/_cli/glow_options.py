@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom._cli.image_files import read_picture
-from vkbloom._cli.terminal import note
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour
@@ -39,15 +38,6 @@ def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _MASK(_EMISSION(command))
 
 
-def note_step(settings: vkbloom.Settings | None, mask: str | None, emission: str | None) -> None:
-    """Print a note that a mask's edge is seen in a mix. None: settings that are not known."""
-    if mask and not emission and settings and settings.bloom and settings.composite == "mix":
-        note(
-            "the composite mix takes light from what the mask lets glow, which is seen as a step "
-            "at the mask's edge; --composite add or --preset photo adds the bloom without"
-        )
-
-
 def refuse_glow_of_scene(mask: str | None, emission: str | None) -> None:
     """Raise a UsageError if a scene is given a mask or an emission."""
     if mask or emission:
@@ -59,14 +49,13 @@ def accompanying(
     emission: str | None,
     colour: Colour | None = None,
     *,
-    raw: bool = False,
     is_blended: bool = False,
 ) -> Callable[[Array], dict[str, Any]]:
     """Read both files, and return a function from an image to its `mask` and `emission`."""
     values = None if mask is None else grey_mask(read_picture(mask, 0, "linear").pixels, mask)
     glow = None
     if emission is not None:
-        read = read_picture(emission, 0, colour, raw=raw)
+        read = read_picture(emission, 0, colour)
         glow = (premultiplied(read) if is_blended else read).pixels
 
     def arguments(image: Array) -> dict[str, Array]:

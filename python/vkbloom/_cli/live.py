@@ -17,7 +17,6 @@ Left, Right    strength
 1 ... 9        the framebuffer that is shown
 P              the next preset
 Space          pauses the animation
-S              writes all framebuffers to files
 Q, Escape      close\
 """
 
@@ -35,7 +34,6 @@ class Live:
     - `shading`: Of a scene.
     - `framebuffer`: Name of the framebuffer that is shown.
     - `time`: Time of the animation, in periods.
-    - `screenshot`: Whether to write a screenshot after the next frame.
     """
 
     settings: Settings
@@ -45,7 +43,6 @@ class Live:
     time: float = 0.0
     paused: bool = False
     closed: bool = False
-    screenshot: bool = False
 
     def press(self, key: str, names: list[str]) -> None:
         """Do what a key stands for; `names` are the framebuffers that there are."""
@@ -66,8 +63,6 @@ class Live:
             self.settings = known[(shown + 1) % len(known)]
         elif key == "space":
             self.paused = not self.paused
-        elif key == "s":
-            self.screenshot = True
         elif key in ("q", "escape"):
             self.closed = True
 

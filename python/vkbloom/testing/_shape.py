@@ -31,19 +31,11 @@ _SMALL: Final = 144
 _SIZES: Final = "the bloom of a square does not depend on whether the size is a multiple of 16"
 
 
-@checked
-def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
-    """Return how far from circles the contours of the point spread are.
+def _roundness(bloom: Bloom, probe: Probe) -> dict[float, float]:
+    """Return the greatest distance of contours from the centroid, divided by the smallest.
 
-    For each of 1/2, 1/10 and 1/100 of the peak: the greatest distance of the contour from the
-    centroid, divided by the smallest. 1 is a circle, 1.41 a square. Distances below three pixels
-    count as three. Contours that are nearer everywhere, or that leave the image, are not in the
-    result.
-
-    Returns
-    -------
-    dict of float to float
-        Greatest over smallest distance, by the share of the peak.
+    By the share of the peak: 1/2, 1/10 and 1/100. Distances below three pixels count as three.
+    Contours that are nearer everywhere, or that leave the image, are not in the result.
     """
     __tracebackhide__ = True
     plane = point_spread(bloom, probe).mean(axis=2)
@@ -90,7 +82,7 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     """
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
-    ratios = roundness(bloom, probe)
+    ratios = _roundness(bloom, probe)
     if not ratios:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
