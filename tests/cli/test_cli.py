@@ -333,7 +333,7 @@ def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
     )
     assert result.exit_code == 0
     expected = rendered(
-        scene=Scene.ufo().with_camera(Camera(position=(0, 0, -14), fov=30)),
+        scene=dataclasses.replace(Scene.ufo(), camera=Camera(position=(0, 0, -14), fov=30)),
         settings=SMALL_SETTINGS.replace(blur_strength=3.0),
         time=0.25,
     )
