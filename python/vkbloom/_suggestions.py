@@ -29,10 +29,10 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     return plain[near[0]] if near else None
 
 
-def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
+def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" with the nearest known name; "" if none is near."""
     near = nearest(name, known)
-    return f"; did you mean {form.format(near)}?" if near is not None else ""
+    return f"; did you mean {near!r}?" if near is not None else ""
 
 
 def lacking(

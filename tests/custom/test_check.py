@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.resources
 import json
 import math
-import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -411,42 +410,6 @@ def test_changes_of_presets_and_commands(copying: str, tmp_path: Path) -> None:
     assert "| symmetric | yes | " in page.read_text()
     refused = CliRunner().invoke(program, ["check", *words[:2], "--against", "tutoral"])
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
-
-
-# (Without vkbloom, whose import takes longer than the rest.)
-VIEWS = """\
-import sys, numpy as np, OpenImageIO as oiio
-image = oiio.ImageBuf(sys.argv[1]).get_pixels(oiio.FLOAT)
-x, y, width, height = map(int, sys.argv[3].split(","))
-if sys.argv[4] == "leak":
-    image = image + 0.01 * image.mean((0, 1))
-view = image[y : y + height, x : x + width]
-oiio.ImageBuf(np.ascontiguousarray(view, np.float32)).write(sys.argv[2])
-"""
-# Each other frame is another image, whatever the input is.
-FRAMES = 'if test $(($3 % 2)) = 1; then cp other.exr "$2"; else cp "$1" "$2"; fi'
-
-
-@pytest.mark.parametrize(
-    ("words", "broken", "untaken"),
-    [
-        ("{python} views.py {{input}} {{output}} {{region}} keep", "", ("time",)),
-        ("{python} views.py {{input}} {{output}} {{region}} leak", "views", ("time",)),
-        ("bash -c '{frames}' - {{input}} {{output}} {{frame}} {{region}}", "history", ()),
-    ],
-    ids=["regions", "a leak between regions", "frames"],
-)
-def test_regions_and_frames_of_a_program(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, broken: str, untaken: tuple[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("views.py").write_text(VIEWS)
-    vkbloom.write("other.exr", np.full((16, 16, 3), 0.5, np.float32))
-    argv = shlex.split(words.format(python=sys.executable, frames=FRAMES))
-    found = testing.report(testing.command(argv), size=(16, 16), laws=[broken or "views"])
-    assert found.untaken == untaken
-    assert [row.name for row in found.rows if not row.held] == ([broken] if broken else [])
-    assert ("takes no time" in str(found)) == (untaken == ("time",))
 
 
 def test_what_a_program_does_not_take_is_not_tested() -> None:

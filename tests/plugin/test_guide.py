@@ -59,6 +59,6 @@ def test_a_wrong_weight(
     result.stdout.fnmatch_lines(
         [
             "*the first framebuffer that differs is blur_vertical (glow: right)",
-            f"*reference: {software.name}*; now: the engine,*",
+            f"*reference: {software.name}*; now: the engine",
         ]
     )

@@ -9,7 +9,6 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.plugin.projects import ONE, PROJECT, edit, references, run, write
-from vkbloom.testing._references import cpu_vendor
 from vkbloom.testing._regression import name_of_test
 
 pytest.importorskip("xdist")
@@ -48,7 +47,6 @@ class TestReferences:
         reference = json.loads(file.read_text())
         assert reference["origin"]["adapter"] == "An <engine>"
         assert reference["origin"]["driver"] == "7"
-        assert reference["origin"]["cpu_vendor"] == cpu_vendor()
         assert [each["name"] for each in reference["framebuffers"]] == ["glow", "bloom", "final"]
 
     def test_update_leaves_alone_what_passes(
@@ -341,8 +339,8 @@ def test_unnamed(frame_regression):
         result.assert_outcomes(passed=1, failed=2)
         # In any order of the tests.
         for name, adapters in (
-            ("other", f"Mesa 25, {cpu_vendor()}; now: My engine, {cpu_vendor()}"),
-            ("unnamed", "arrays without an adapter, *; now: arrays without an adapter, *"),
+            ("other", "Mesa 25; now: My engine"),
+            ("unnamed", "arrays without an adapter; now: arrays without an adapter"),
         ):
             result.stdout.fnmatch_lines(
                 [

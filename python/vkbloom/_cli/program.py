@@ -22,7 +22,7 @@ from vkbloom._suggestions import did_you_mean
 
 #: What the commands do, by the modules of this package that have a click command `command`.
 COMMANDS: Final = {
-    "render": "Render a scene or its animation to image files",
+    "render": "Render a scene to image files",
     "apply": "Add bloom to an image file",
     "view": "Show the bloom of a scene or an image in a window",
     "explore": "Explore the bloom of an image or a scene in a browser",

@@ -22,12 +22,6 @@ from vkbloom._doctor.deviations import Deviation
 
 PROGRAM = ("-m", "vkbloom._doctor.self_test")
 _MARK: Final = "vkbloom-case "
-#: What the tests have drawn with, by parts of the driver's name and of its version.
-DRAWN: Final = {
-    "llvmpipe": ("Mesa 22.3.6", "Mesa 25.0.7"),
-    "SwiftShader": ("SwiftShader",),
-    "NVIDIA": ("580.",),
-}
 
 
 def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
@@ -51,9 +45,7 @@ def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
 
 def report(adapter: str, result: list[dict[str, Any]], seconds: float) -> dict[str, Any]:
     """Return what `run` yielded as one object, to be written as JSON."""
-    device: dict[str, Any] = next(
-        (one for one in result if "device" in one), {"device": None, "unknown": []}
-    )
+    device: dict[str, Any] = next((one for one in result if "device" in one), {"device": None})
     done = [one for one in result if "device" not in one]
     groups = []
     for name in dict.fromkeys(one["group"] for one in done):
@@ -77,26 +69,12 @@ def report(adapter: str, result: list[dict[str, Any]], seconds: float) -> dict[s
         "platform": platform.platform(),
         "adapter": adapter,
         "device": device["device"],
-        "unknown": device["unknown"],
         "passed": bool(done) and not wrong,
         "cases": len(done),
         "seconds": seconds,
         "groups": groups,
         "wrong": wrong,
     }
-
-
-def unknown(info: vkbloom.AdapterInfo) -> list[str]:
-    """Return what no test of vkbloom has drawn with before."""
-    versions = next(
-        (known for name, known in DRAWN.items() if name in f"{info.driver} {info.name}"), ()
-    )
-    if not versions:
-        return [f"driver: {info.driver or info.name} has not been tried; {', '.join(DRAWN)} have"]
-    if any(version in f"{info.driver_info} {info.driver}" for version in versions):
-        return []
-    tried = " and ".join(versions)
-    return [f"driver: version {info.driver_info} has not been tried; {tried} have"]
 
 
 class _Renderers(contextlib.ExitStack):
@@ -155,7 +133,7 @@ def main() -> None:
         except (vkbloom.Error, ValueError, OSError) as error:
             _tell(group="device", name=adapter, wrong=f"{type(error).__name__}: {error}")
             return
-        _tell(device=dataclasses.asdict(info), unknown=unknown(info), count=len(chosen))
+        _tell(device=dataclasses.asdict(info), count=len(chosen))
         for case in chosen:
             _tell(next={"group": case.group, "name": case.name})
             _tell(**judge(case, renderers.get(case.variant)))

@@ -195,10 +195,8 @@ def as_code(settings: Settings) -> str:
 
 def _maker(kind: Any) -> str:
     """Return Python code of the class."""
-    if not METHODS.is_added(kind.method):
-        return f"vkbloom.{kind.__name__}"
     if not isinstance(kind, CustomType):
-        return str(kind.__name__)
+        return f"vkbloom.{kind.__name__}"
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
     name = "" if identifier_of(Path(path).stem) == kind.method else f', name="{kind.method}"'

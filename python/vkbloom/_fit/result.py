@@ -61,7 +61,7 @@ class FitResult:
         pixel's colour explains, such as brightness or contrast.
     cause : str
         What the likely cause is if the verdict is not good: no bloom in the target; a target that
-        is clipped, encoded or turned; or another method.
+        is clipped or encoded; or another method.
     """
 
     settings: Settings

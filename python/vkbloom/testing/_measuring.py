@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
 from typing import Any, Final
@@ -128,14 +127,8 @@ def of_program(
     if program.bits is not None:
         probe = Probe(size=size, atol=COARSE_ERROR)
 
-    @functools.wraps(program)
-    def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
-        result = program(image, **options)[..., :3]
-        x, y, *_ = options.get("region") or (0, 0)
-        if result.shape[:2] == image.shape[:2]:
-            x, y = 0, 0
-        height, width = result.shape[:2]
-        return np.asarray(result - image[y : y + height, x : x + width, :3])
+    def difference(image: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(program(image)[..., :3] - image[..., :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(

@@ -7,8 +7,6 @@ A folder contains, for each name, ``<name>.json`` and the images that it lists:
 from __future__ import annotations
 
 import json
-import os
-import platform
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -41,20 +39,18 @@ class Origin:
     """The adapter, machine and version that made images.
 
     - `adapter`, `driver`: None if they are not known.
-    - `cpu_vendor`: Vendor of the machine's CPU; software renderers round differently by vendor.
     - `version`: Version of vkbloom.
     """
 
     adapter: str | None
     driver: str | None
-    cpu_vendor: str
     version: str
 
     @property
     def summary(self) -> str:
         """All fields except the version on one line."""
         made_by = [text for text in (self.adapter, self.driver) if text]
-        return ", ".join([*(made_by or ["arrays without an adapter"]), self.cpu_vendor])
+        return ", ".join(made_by) or "arrays without an adapter"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -180,18 +176,6 @@ def check_name(name: str) -> None:
             f"name: {name!r} cannot name a reference; up to 100 letters, digits and _+,=.- are "
             "needed, the first a letter, a digit or _"
         )
-
-
-def cpu_vendor() -> str:
-    """Return the vendor of this machine's CPU, as the CPU reports it."""
-    try:
-        information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        information = ""
-    match = re.search(r"^(?:vendor_id|CPU implementer)\s*:\s*(\S+)", information, re.MULTILINE)
-    if match:
-        return match[1]
-    return os.environ.get("PROCESSOR_IDENTIFIER") or platform.processor() or platform.machine()
 
 
 def _check_image(framebuffer: str, image: NDArray[Any]) -> None:

@@ -17,7 +17,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing._judging import Verdict, first_failure, judge
-from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name, cpu_vendor
+from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name
 
 
 class Limits(TypedDict, total=False):
@@ -230,7 +230,6 @@ def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
     return Origin(
         adapter=known.get("adapter"),
         driver=known.get("driver"),
-        cpu_vendor=cpu_vendor(),
         version=installed_version(),
     )
 

@@ -15,7 +15,6 @@ from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
-from vkbloom.testing._programs import RATE
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
@@ -28,6 +27,8 @@ HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 # 8 positions decide if they change the light by at most this share of the limit, or break the law.
 # In all presets, 16 change it by at most 2.8 times as much.
 _STEADY: Final = 0.25
+# Frames a second, by which a bloom is given the time.
+_RATE: Final = 60.0
 # Frames after a jump: of a bloom that is given the time, and of any other.
 _FRAMES: Final = 60
 _FEW_FRAMES: Final = 8
@@ -230,7 +231,7 @@ def assert_history(
     clock = iter(range(1 << 30))
 
     def at(image: Image) -> Image:
-        options: dict[str, Any] = {"time": next(clock) / RATE} if takes(bloom, "time") else {}
+        options: dict[str, Any] = {"time": next(clock) / _RATE} if takes(bloom, "time") else {}
         return probe.apply(lambda given: bloom(given, **options), image)[0]
 
     x, y = probe.centre
