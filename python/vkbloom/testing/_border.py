@@ -137,7 +137,7 @@ def _at_the_border(
 ) -> Iterator[Measured]:
     """Measure lights in the outermost pixels."""
     __tracebackhide__ = True
-    for name, at in _places(lights.probe).items():
+    for name, at in _positions(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
         inside = float(expected.sum()) / energy
@@ -243,7 +243,7 @@ def takes(bloom: object, name: str) -> bool:
     )
 
 
-def _places(probe: Probe) -> dict[str, tuple[int, int]]:
+def _positions(probe: Probe) -> dict[str, tuple[int, int]]:
     x, y = probe.centre
     return {"left": (0, y), "top": (x, 0), "corner": (0, 0)}
 

@@ -200,7 +200,7 @@ def _square_figures(
 
 def _bilinear(plane: Image, x: Image, y: Image) -> Image:
     """Return the values between pixels, for positions inside of the image."""
-    left, top = (np.floor(places).astype(np.intp) for places in (x, y))
+    left, top = (np.floor(positions).astype(np.intp) for positions in (x, y))
     right, below = (
         np.minimum(first + 1, side - 1)
         for first, side in zip((left, top), plane.shape[::-1], strict=True)

@@ -109,12 +109,12 @@ def assert_jitter(
         where = f"{len(lights)} positions, after TAA"
         resolved = list(_taa(frames[: len(lights)], feedback))[:: len(lights) // 2]
         flickers[where] = _flicker([_light(bloom, small, frame) for frame in resolved])
-        for place, off in flickers.items():
-            figure(f"{name}, {place}", off)
-            kind = "resolved" if place == where else "flicker"
+        for label, off in flickers.items():
+            figure(f"{name}, {label}", off)
+            kind = "resolved" if label == where else "flicker"
             if not is_within(law, off, allowed[kind], kind):
                 reasons.append(
-                    f"{name}, {place}: the light changes by {off:.3g} of its mean, "
+                    f"{name}, {label}: the light changes by {off:.3g} of its mean, "
                     f"{allowed[kind]:g} allowed"
                 )
     ratio = _threshold_ratio(bloom, small)
@@ -149,8 +149,8 @@ def _angled(probe: Probe, x: float, y: float) -> Image:
     )
     columns, rows = (
         np.diff(np.clip(np.arange(count + 1) - 0.5, at - side / 2, at + side / 2))
-        for places, count, side in squares
-        for at in (places[:, np.newaxis],)
+        for positions, count, side in squares
+        for at in (positions[:, np.newaxis],)
     )
     total: Image = rows.T @ columns
     return total
