@@ -35,6 +35,18 @@ def test_laws_that_need_more_than_an_image_say_so() -> None:
     testing.report(lambda image: image, size=SIZE).assert_held()
 
 
+def test_laws_share_images_and_render_few() -> None:
+    """For border 11, sizes 8, round and flat images 4, alpha 2, jitter 15, history 16."""
+    images = []
+
+    def bloom(image: Any) -> Any:
+        images.append(image)
+        return FAULTS["wraps around"].twin()(image)
+
+    testing.report(bloom, size=SIZE, laws=NEW)
+    assert len(images) <= 60
+
+
 def test_each_law_has_a_limit() -> None:
     assert {name for name in NEW if not LAWS[name].limit} == set()
 
