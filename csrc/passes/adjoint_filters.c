@@ -167,8 +167,6 @@ bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
     filter.kernels = (uint32_t)constants->kernels;
     filter.gain = (double)params->coarse / params->divisor;
-    filter.exact = constants->exact;
-    memcpy(filter.up, params->taps[0], sizeof filter.up);
     set_taps(params->taps_x, constants->taps, (enum vkb_mode)constants->upsample, &filter.x);
     set_taps(params->taps_y, constants->taps, (enum vkb_mode)constants->upsample, &filter.y);
     if (!vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[0], error))

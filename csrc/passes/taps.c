@@ -27,7 +27,6 @@ void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
     begin_axis(source->height, target->height, &filter->y);
     filter->kernels = 1;
     filter->gain = 1.0;
-    filter->exact = 0;
 }
 
 void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin)

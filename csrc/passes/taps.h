@@ -62,10 +62,6 @@ struct vkb_filter {
     struct vkb_axis x, y;
     uint32_t kernels;
     double gain;
-    // Of EXACT_*, also told without axes: 0 for any other filter. `up` are the taps of
-    // EXACT_DOUBLE.
-    int32_t exact;
-    float up[4];
 };
 
 // Makes both axes those of a pass that reads `from` and writes `to`, each with one tap at the

@@ -99,19 +99,7 @@ static struct vkb_exports *use_exports(struct vkb_renderer *renderer, struct vkb
 // Takes memory for a new object, whose `exports` it uses.
 static bool take_memory(struct exported_object *self, Py_ssize_t size, struct vkb_error *error)
 {
-    bool settled = true;
-
     VKB_LOCK(vkb_memory);
-    const uint64_t unmarked = vkb_exports_unmarked(self->exports);
-    VKB_UNLOCK(vkb_memory);
-    if (unmarked) {
-        Py_BEGIN_ALLOW_THREADS
-        settled = vkb_cuda_settle(self->exports->cuda);
-        Py_END_ALLOW_THREADS
-    }
-    VKB_LOCK(vkb_memory);
-    if (settled)
-        vkb_exports_set_settled(self->exports, unmarked);
     if (self->exports->device)
         self->run = vkb_exports_take(self->exports, (uint64_t)size, error);
     else

@@ -58,12 +58,7 @@ static PyMethodDef functions[] = {
      "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
      "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
-     "scene_source(scene, camera, size, shading, time, glow_intensity) -> Source"},
-    {"resource", vkb_make_resource, METH_VARARGS,
-     "Make a texture or a buffer that passes of run time bind."},
-    {"shader", vkb_make_shader, METH_VARARGS,
-     "shader(name, spirv, dispatch=None) -> Shader. `dispatch` is the same pass as a compute "
-     "shader."},
+     "scene_source(block, pictures, arrays) -> Source. As scene_blocks.py packs it."},
     {"plan", vkb_any_plan, METH_VARARGS,
      "plan(source, settings, names, variants=\"fragment\") -> Plan. For no renderer: what one with "
      "those variants would do; by default it draws every pass as its method defines it."},
@@ -227,8 +222,6 @@ static int execute(PyObject *module)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)
-                && add_type(module, &vkb_shader_spec, "Shader", &state->shader_type)
-                && add_type(module, &vkb_resource_spec, "Resource", &state->resource_type)
                 && add_type(module, &vkb_exported_spec, "Exported", &state->exported_type)
                 && add_steal(module, "VALUES", value_table(vkb_value_rows, vkb_value_row_count))
                 && add_steal(module, "GLARE_VALUES",
@@ -256,8 +249,6 @@ static int traverse(PyObject *module, visitproc visit, void *arg)
     Py_VISIT(state->plan_type);
     Py_VISIT(state->submission_type);
     Py_VISIT(state->pages_type);
-    Py_VISIT(state->shader_type);
-    Py_VISIT(state->resource_type);
     Py_VISIT(state->exported_type);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_VISIT(state->errors[i]);
@@ -273,8 +264,6 @@ static int clear(PyObject *module)
     Py_CLEAR(state->plan_type);
     Py_CLEAR(state->submission_type);
     Py_CLEAR(state->pages_type);
-    Py_CLEAR(state->shader_type);
-    Py_CLEAR(state->resource_type);
     Py_CLEAR(state->exported_type);
     for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
         Py_CLEAR(state->errors[i]);

@@ -288,11 +288,10 @@ static PyObject *get_cached(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names) -> Plan. Makes no device call; names None: all framebuffers."},
-    {"adjoint", vkb_renderer_adjoint, METH_VARARGS,
-     "adjoint(source, settings, names, sums) -> Plan, or None: a pass has no adjoint. Of the "
-     "derivatives that cotangents of framebuffers, which are the source's levels, give, by images "
-     "or by fields: methods/adjoint.h."},
+     "plan(source, settings, names, cotangents=None, sums=False) -> Plan. Makes no device call; "
+     "names None: all framebuffers. With cotangents, the names of framebuffers whose cotangents "
+     "are the source's levels: of the derivatives by images or, with `sums`, by fields "
+     "(methods/adjoint.h); None if a pass has no adjoint."},
     {"run", vkb_renderer_run, METH_VARARGS,
      "run(source, plans, arrays, in_place=False) -> Submission. Submits plans with the same "
      "images; arrays has a tuple for each plan, in the order of its outputs. `in_place`: the "

@@ -46,28 +46,6 @@ static VkDeviceSize scene_size(const struct vkb_scene_data *data)
     return size;
 }
 
-static void join(float out[4], const float given[3], float emission)
-{
-    memcpy(out, given, 3 * sizeof *given);
-    out[3] = emission;
-}
-
-static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb_mesh_data *data)
-{
-    static const float none[3];
-    VkDeviceSize offset;
-    struct vkb_vertex *vertices = vkb_stage(staging, vertex_bytes(data), &offset);
-
-    for (size_t i = 0; i < data->vertex_count; ++i) {
-        const float *given = data->vertices + VKB_GIVEN_FLOATS * i;
-        const float *emission = data->emission ? data->emission + 3 * i : none;
-        join(vertices[i].position, given, emission[0]);
-        join(vertices[i].normal, given + 3, emission[1]);
-        join(vertices[i].colour, given + 6, emission[2]);
-    }
-    return offset;
-}
-
 static VkDeviceSize stage_bytes(struct vkb_staging *staging, const void *data, size_t size)
 {
     VkDeviceSize offset;
@@ -101,7 +79,7 @@ static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
     mesh->plain_count = data->index_count;
     if (data->index_count == 0)
         return true;
-    const VkDeviceSize vertices = stage_vertices(staging, data);
+    const VkDeviceSize vertices = stage_bytes(staging, data->vertices, vertex_bytes(data));
     const VkDeviceSize indices = stage_bytes(staging, data->indices, index_bytes(data));
     return vkb_staging_load_buffer(device, commands, staging, vertices, vertex_bytes(data),
                                    VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)

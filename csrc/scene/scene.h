@@ -17,7 +17,6 @@ enum {
     VKB_VERTEX_ATTRIBUTES = 3,
     VKB_TEXTURED_ATTRIBUTES = 4,
     VKB_VERTEX_BINDINGS = 2,
-    VKB_GIVEN_FLOATS = 9,
     VKB_TEXCOORDS = 4,
 };
 extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES];
@@ -32,11 +31,10 @@ struct vkb_surface {
 // Host memory that the caller keeps alive. No vertices: there is no such mesh. The last indices are
 // those of the surfaces, in order.
 struct vkb_mesh_data {
-    const float *vertices;   // position, normal and colour of each vertex
-    const float *emission;   // three floats for each vertex; NULL: no emission
+    const struct vkb_vertex *vertices;
     const float *texcoords;  // four for each: base colour, emission; NULL: no surfaces
     const uint32_t *indices;
-    struct vkb_surface *surfaces;
+    const struct vkb_surface *surfaces;
     uint32_t vertex_count, index_count, surface_count;
 };
 

@@ -95,7 +95,7 @@ MAPPING = Kind(
 
 #: The kind of a parameter by its name. What is not here is left to the function.
 _KINDS: dict[str, Kind] = {
-    **dict.fromkeys(("direct", "gradient", "is_light", "premultiplied", "progress", "raw"), FLAG),
+    **dict.fromkeys(("direct", "gradient", "premultiplied", "progress", "raw"), FLAG),
     **dict.fromkeys(("half", "resume", "temporal", "validation", "verify"), FLAG),
     **dict.fromkeys(("bits", "border", "levels", "max_calls", "most", "period"), INTEGER),
     **dict.fromkeys(("quality", "settle", "subimage", "texel", "width"), INTEGER),

@@ -29,10 +29,10 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     return plain[near[0]] if near else None
 
 
-def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
+def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" with the nearest known name; "" if none is near."""
     near = nearest(name, known)
-    return f"; did you mean {form.format(near)}?" if near is not None else ""
+    return f"; did you mean {near!r}?" if near is not None else ""
 
 
 def lacking(
@@ -54,6 +54,20 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
     known = list(known)
     near = did_you_mean(name, known) or ";"
     return f"{what} {name!r}{near} available: {', '.join(known) or 'none'}"
+
+
+def wanted(names: object, known: tuple[str, ...]) -> bytes:
+    """Return for each framebuffer that a plan has whether it is among the names: the core asks.
+
+    Raises ValueError for a name that is unknown.
+    """
+    if not isinstance(names, tuple):
+        raise TypeError(f"framebuffers: a tuple is needed, not {names!r}")
+    for name in names:
+        if name not in known:
+            raise ValueError(unknown("framebuffers: unknown framebuffer", name, known))
+    # Not a comprehension: CPython 3.11 leaks arguments of a call if it cannot allocate a cell.
+    return bytes(map(names.__contains__, known))
 
 
 class Named(Mapping[str, T]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate, rounded
@@ -13,13 +13,11 @@ from vkbloom._custom.file import CustomFile
 from vkbloom._custom.names import GLOW, HOOKED, LONGEST, RESIZING, STAGES
 from vkbloom._custom.passes import CustomPass, Expression
 from vkbloom._custom.resources import Resources
+from vkbloom._custom.rows import Row
 from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
 from vkbloom._custom.textures import Texture
 
 Size = tuple[int, int]
-#: Of `core_passes`: name, shader, size, format, reads, shown, parameters, block, resources, turn.
-Row = tuple[Any, ...]
-
 #: A pass that changes a resource has another turn in each request.
 TURNS: Final = itertools.count(1)
 #: What the core calls the finished picture and the bloom.
@@ -172,9 +170,9 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
         blocks: list[Texture | Buffer] = [*shader.textures, *shader.buffers]
         bound = tuple(request.resources[one.name] for one in blocks)
         turn = next(TURNS) if any(one.storage for one in blocks) else 0
-        row = (name, core_shader, step.image.size, None, reads, shown, params, block)
-        rows.append((*row, bound, turn))
-    written = {row[0] for row in rows}
+        size = step.image.size
+        rows.append(Row(name, core_shader, size, reads, shown, params, block, bound, turn))
+    written = {row.name for row in rows}
     frame = request.frame
     if file.saves_bloom and BLOOM_IMAGE not in written:
         rows.append(package_row(BLACK, BLOOM_IMAGE, frame, ()))
@@ -187,7 +185,7 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
 
 def package_row(shader: int, name: str, size: Size, reads: tuple[str, ...]) -> Row:
     """Return the row of one of the package's passes."""
-    return (name, package_shader(shader), size, None, reads, name == BLOOM_IMAGE, b"", None)
+    return Row(name, package_shader(shader), size, reads, name == BLOOM_IMAGE)
 
 
 def framebuffers(file: CustomFile, steps: list[Step]) -> dict[str, str]:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
-from vkbloom import _core
 from vkbloom._custom.compiler import cached_code, compile_shader
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.glsl import Shader, write_shader
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.resources import made_resources
+from vkbloom._custom.rows import CoreShader
 from vkbloom._custom.source import Source
 
 #: Passes that the package adds: a copy, the difference of two pictures, and black.
@@ -42,11 +43,11 @@ class Shaders:
         self._name = name
         self._file = file
         self.resources = made_resources(file, storage=False)
-        self._compiled: dict[tuple[Any, ...], tuple[Shader, _core.Shader]] = {}
+        self._compiled: dict[tuple[Any, ...], tuple[Shader, CoreShader]] = {}
 
     def of(
         self, one: CustomPass, stage: str, values: Mapping[str, float]
-    ) -> tuple[Shader, _core.Shader]:
+    ) -> tuple[Shader, CoreShader]:
         """Return the shader of a pass at a stage, for the values that the compiler must know."""
         key = self._key(one, stage, values)
         found = self._compiled.get(key)
@@ -79,14 +80,15 @@ class Shaders:
 
     def _keep(
         self, key: tuple[Any, ...], one: CustomPass, shader: Shader, code: bytes
-    ) -> tuple[Shader, _core.Shader]:
-        found = shader, _core.shader(f"{self._name}_{one.line}", code)
+    ) -> tuple[Shader, CoreShader]:
+        digest = hashlib.sha256(code).digest()[:16]
+        found = shader, CoreShader(f"{self._name}_{one.line}", code, digest)
         self._compiled[key] = found
         return found
 
 
 @functools.cache
-def package_shader(place: int) -> _core.Shader:
+def package_shader(place: int) -> CoreShader:
     """Return the shader of one of the package's passes."""
     file = read_file(Source("vkbloom", PACKAGE_PASSES))
     return Shaders("own", file).of(file.passes[place], "MAIN", {})[1]

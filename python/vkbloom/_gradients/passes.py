@@ -96,7 +96,7 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        plan = core.adjoint(source, self.settings, tuple(self.cotangents), sums)
+        plan = core.plan(source, self.settings, None, tuple(self.cotangents), sums)
         if plan is None:
             return None
         place: Destination = "host" if sums else self.place

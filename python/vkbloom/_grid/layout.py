@@ -6,13 +6,13 @@ import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._checks import check_framebuffers
+from vkbloom._checks import check_framebuffers, import_extra
 from vkbloom._framebuffers import dimensions, leading
 from vkbloom._grid.axes import Axis, image_axis, read_axes, settings_of
 from vkbloom._grid.order import Index, ranking_of, walk
@@ -22,6 +22,9 @@ from vkbloom._renderer.plans import Framebuffer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, check_settings
 from vkbloom._version import installed_version
+
+if TYPE_CHECKING:
+    import xarray
 
 Reduce = Mapping[str, Callable[[Frames], Any]]
 
@@ -349,14 +352,30 @@ def checked_value(name: str, value: Any) -> NDArray[Any]:
     return array.astype(widest)
 
 
-def attributes_of(grid: Grid, layout: Layout) -> dict[str, Any]:
-    """Return the attributes of the grid's Dataset."""
-    facts = {key: value for key, value in grid.source.description.items() if key != "images"}
-    return {
-        "adapter": layout.adapter,
-        "driver": layout.driver,
-        "version": layout.version,
-        "axes": json.dumps([axis.name for axis in grid.axes]),
-        "settings": json.dumps(grid.remaining_settings),
-        "source": json.dumps({key: value for key, value in facts.items() if key != "sha256"}),
-    }
+def made_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarray.Dataset:
+    """Return the grid's Dataset with these arrays."""
+    xr = import_extra("xarray", "grid", "grid")
+    dims = tuple(axis.name for axis in grid.axes)
+    facts = {k: v for k, v in grid.source.description.items() if k not in ("images", "sha256")}
+    dataset: xarray.Dataset = xr.Dataset(
+        {
+            name: ((*dims, *variable.dims), arrays[name], dict(variable.attributes))
+            for name, variable in layout.variables.items()
+        },
+        coords={
+            **{axis.name: ((axis.name,), axis.coordinate, axis.attributes) for axis in grid.axes},
+            **{
+                name: ((name,), values, dict(attributes))
+                for name, (values, attributes) in layout.coordinates.items()
+            },
+        },
+        attrs={
+            "adapter": layout.adapter,
+            "driver": layout.driver,
+            "version": layout.version,
+            "axes": json.dumps(dims),
+            "settings": json.dumps(grid.remaining_settings),
+            "source": json.dumps(facts),
+        },
+    )
+    return dataset

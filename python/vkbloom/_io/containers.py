@@ -174,31 +174,6 @@ def _of_png(stream: BinaryIO) -> int | None:
     return by_xmp
 
 
-def late_exif(path: str | os.PathLike[str]) -> bytes | None:
-    """Return a PNG file of one pixel with the Exif chunk that follows another's pixels, if any."""
-    is_late, exif = False, None
-    with open(path, "rb") as stream:
-        for kind, content in png_chunks(stream, (b"eXIf",)):
-            is_late |= kind == b"IDAT"
-            if is_late and content is not None:
-                exif = content
-    if exif is None:
-        return None
-    chunks = (
-        (b"IHDR", b"\0\0\0\1\0\0\0\1\x08\0\0\0\0"),
-        (b"eXIf", exif),
-        (b"IDAT", zlib.compress(bytes(2))),
-        (b"IEND", b""),
-    )
-    return _PNG_SIGNATURE + b"".join(
-        len(content).to_bytes(4, "big")
-        + kind
-        + content
-        + zlib.crc32(kind + content).to_bytes(4, "big")
-        for kind, content in chunks
-    )
-
-
 def is_heif(path: str | os.PathLike[str]) -> bool:
     """Return whether a file is AVIF or HEIF."""
     with open(path, "rb") as stream:

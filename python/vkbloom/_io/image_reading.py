@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +14,7 @@ import numpy as np
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
+from vkbloom._io.containers import HEIF_ADVICE, is_heif, orientation_of, padded, upright
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
@@ -236,7 +235,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
-            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
+            for attribute in spec.extra_attribs
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
@@ -245,18 +244,6 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         notes=tuple(notes),
     )
     return replace(found, parts=tuple(_parts(reader)))
-
-
-def _late_attributes(kind: str, name: str) -> Iterator[Any]:
-    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
-    if kind != "png" or (exif := late_exif(name)) is None:
-        return
-    with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        file.write(exif)
-        file.flush()
-        # Damaged metadata do not matter to the pixels.
-        with suppress(ValueError), opened(file.name, "Reading images") as reader:
-            yield from reader.spec().extra_attribs
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
@@ -349,18 +336,13 @@ def decode(
     stored: StoredImage,
     colour: Colour | None = None,
     *,
-    raw: bool = False,
     expand: float | None = None,
 ) -> Picture:
     """Decode a stored image to a picture of linear values."""
-    if raw and colour is not None:
-        raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
     numbers = kinds.pop() if len(kinds) == 1 else "float"
-    if raw and numbers != "uint8":
-        raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
         # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
@@ -371,25 +353,23 @@ def decode(
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     has_alpha = values.shape[2] == 4
-    taken_as = ""
-    if not raw:
-        if stored.associated and has_alpha and values.dtype.kind == "u":
-            # 16 bits hold the quotients of 8 bits.
-            scale = 65535 // np.iinfo(values.dtype).max
-            values = divided(values.astype(np.uint16) * np.uint16(scale))
-            stored = replace(stored, associated=False)
-        taken_as, values, said = linear(values, stored, colour)
-        notes += said
-        is_hdr = colour is None and has_hdr_curve(stored.code_points)
-        if numbers in ("uint8", "uint16") and not is_hdr:
-            values = expanded(values, expand)
-        stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
+    if stored.associated and has_alpha and values.dtype.kind == "u":
+        # 16 bits hold the quotients of 8 bits.
+        scale = 65535 // np.iinfo(values.dtype).max
+        values = divided(values.astype(np.uint16) * np.uint16(scale))
+        stored = replace(stored, associated=False)
+    taken_as, values, said = linear(values, stored, colour)
+    notes += said
+    is_hdr = colour is None and has_hdr_curve(stored.code_points)
+    if numbers in ("uint8", "uint16") and not is_hdr:
+        values = expanded(values, expand)
+    stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     hidden = visible = 0.0
     if has_alpha and not stored.associated:
         hidden, visible = light_of(values)
     return Picture(
         pixels=np.ascontiguousarray(values),
-        encoding=None if raw else "linear",
+        encoding="linear",
         numbers=numbers,
         grey=grey,
         stored=stored,
@@ -405,12 +385,11 @@ def decode_file(
     file: str,
     colour: Colour | None,
     *,
-    raw: bool = False,
     expand: float | None = None,
 ) -> Picture:
     """Decode an image as `decode` does; a ValueError names the file."""
     try:
-        return decode(stored, colour, raw=raw, expand=expand)
+        return decode(stored, colour, expand=expand)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 

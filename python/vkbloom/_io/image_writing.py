@@ -266,7 +266,8 @@ def chosen_layout(
             if safe_writing.holds(oiio, target.suffix, values.shape[2], numbers):
                 return values.shape[2], numbers
     raise ValueError(
-        f"{target}: {writer.format_name()} cannot hold this picture; use another format"
+        f"{target}: {writer.format_name()} cannot hold {picture.pixels.shape[2]} channels of "
+        f"{' or '.join(wanted)}; use another format, or other channels"
     )
 
 

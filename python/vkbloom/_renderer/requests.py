@@ -238,7 +238,6 @@ class _Requests:
         self._ever = most
         self._place = place
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
-        self._alone = 0  # how many of these are submitted one by one
         self._limit = 1
         self._most = most  # that fit into MAX_SECONDS, as far as is known
         self._ended = False
@@ -246,27 +245,20 @@ class _Requests:
 
     def submit(self) -> _Submitted | None:
         """Submit the next requests. None: there are no more, or the next one failed."""
-        while requests := self._take():
-            plans = tuple(one.plan for one in requests)
-            try:
-                submission = self._core.run(
-                    requests[0].request.source, plans, tuple(one.arrays for one in requests)
-                )
-            except Exception as error:
-                if not self._blames_one(error, requests):
-                    self._fail(error)
-                    return None
-                # The requests before it are still submitted. The error is raised after their
-                # results.
-                self._waiting.extendleft(planned.request for planned in reversed(requests))
-                self._alone = len(requests)
-            else:
-                self._alone = max(0, self._alone - 1)
-                # Double the number, starting with one request. So the first frame waits for no
-                # other, and a caller that stops early wastes little work.
-                self._limit = min(2 * len(requests), MAX_REQUESTS)
-                return _Submitted(submission, requests, time.perf_counter())
-        return None
+        requests = self._take()
+        if not requests:
+            return None
+        plans = tuple(planned.plan for planned in requests)
+        arrays = tuple(planned.arrays for planned in requests)
+        try:
+            submission = self._core.run(requests[0].request.source, plans, arrays)
+        except Exception as error:
+            self._fail(error)
+            return None
+        # Double the number, starting with one request. So the first frame waits for no other, and
+        # a caller that stops early wastes little work.
+        self._limit = min(2 * len(requests), MAX_REQUESTS)
+        return _Submitted(submission, requests, time.perf_counter())
 
     def took(self, seconds: float, count: int) -> None:
         """Update the limit after a submission of `count` requests that took at most `seconds`."""
@@ -277,7 +269,7 @@ class _Requests:
         """Return the requests of the next submission."""
         requests: list[_Planned] = []
         size = 0
-        limit = 1 if self._alone else min(self._limit, self._most)
+        limit = min(self._limit, self._most)
         while len(requests) < limit:
             if requests and size + size // len(requests) > MAX_BYTES:
                 break
@@ -319,14 +311,6 @@ class _Requests:
         self.failure = error
         self._ended = True
         self._waiting.clear()
-
-    @staticmethod
-    def _blames_one(error: Exception, requests: list[_Planned]) -> bool:
-        """Whether one of several requests may have caused the error; then each runs alone."""
-        general = _core.ValidationError, _core.DeviceLostError
-        return (
-            len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
-        )
 
 
 def run(

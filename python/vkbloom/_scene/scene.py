@@ -189,13 +189,6 @@ class Scene:
             glow_intensity=glow_intensity,
         )
 
-    def with_camera(self, camera: Camera) -> Scene:
-        """Return this scene with another camera. They share all other data.
-
-        `dataclasses.replace` does the same for any field.
-        """
-        return dataclasses.replace(self, camera=camera)
-
     def __repr__(self) -> str:
         camera, sky = self.camera, self.skybox
         size = f"{sky.size} x {sky.size} {sky.dtype}, levels: {len(sky.levels)}" if sky else "none"

@@ -259,7 +259,7 @@ def _method(settings: Settings) -> Reference:
     except KeyError:
         raise ValueError(
             f"method: {settings.method!r} has no reference in NumPy; give one when it is loaded, "
-            "load_method(file, reference=function), or registered"
+            "load_method(file, reference=function)"
         ) from None
 
 

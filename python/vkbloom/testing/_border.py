@@ -59,29 +59,6 @@ class _Lights:
 
 
 @checked
-def border_energy(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[str, float]:
-    """Return the energy of a light at the border, divided by that of a light in the middle.
-
-    E(p) / E(c), where E(p) is the sum of the bloom of a square of 3 x 3 pixels from the pixel p on,
-    less that of a black image, and c is the middle.
-
-    Returns
-    -------
-    dict of str to float
-        "edge": the larger of the middle of the left and of the upper edge; "corner": the upper left
-        corner. 1 in a bloom that loses no light and adds none. A bloom that repeats the outermost
-        pixels has more, one that reads black outside less.
-    """
-    __tracebackhide__ = True
-    lights = _Lights(bloom, probe, probe.apply(bloom, probe.flat(0.0))[0])
-    shares = {
-        name: float(lights.spread(at)[0].sum()) / _expected(lights, at)[1]
-        for name, at in _places(probe).items()
-    }
-    return {"edge": max(shares["left"], shares["top"]), "corner": shares["corner"]}
-
-
-@checked
 def assert_border(
     bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
@@ -185,7 +162,7 @@ def _at_the_border(
 ) -> Iterator[Measured]:
     """Measure lights in the outermost pixels."""
     __tracebackhide__ = True
-    for name, at in _places(lights.probe).items():
+    for name, at in _positions(lights.probe).items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
         inside = float(expected.sum()) / energy
@@ -294,7 +271,7 @@ def takes(bloom: object, name: str) -> bool:
     )
 
 
-def _places(probe: Probe) -> dict[str, tuple[int, int]]:
+def _positions(probe: Probe) -> dict[str, tuple[int, int]]:
     x, y = probe.centre
     return {"left": (0, y), "top": (x, 0), "corner": (0, 0)}
 

@@ -33,26 +33,12 @@ _STEPS: Final = (1, -1, 3, -3, 2, -2)
 _SIZES: Final = "the bloom of a square does not depend on whether the size is a multiple of 16"
 
 
-@checked
-def roundness(bloom: Bloom, probe: Probe = _DEFAULT) -> dict[float, float]:
-    """Return how far from circles the contours of the point spread are.
+def _contours(spread: Image) -> dict[float, float]:
+    """Return the greatest distance of contours from the centroid, divided by the smallest.
 
-    For each of 1/2, 1/10 and 1/100 of the peak: the greatest distance of the contour from the
-    centroid, divided by the smallest. 1 is a circle, 1.41 a square. Distances below three pixels
-    count as three. Contours that are nearer everywhere, or that leave the image, are not in the
-    result.
-
-    Returns
-    -------
-    dict of float to float
-        Greatest over smallest distance, by the share of the peak.
+    By the share of the peak: 1/2, 1/10 and 1/100. Distances below three pixels count as three.
+    Contours that are nearer everywhere, or that leave the image, are not in the result.
     """
-    __tracebackhide__ = True
-    return contours(point_spread(bloom, probe))
-
-
-def contours(spread: Image) -> dict[float, float]:
-    """Return greatest over smallest distance of the contours of a point spread."""
     plane = spread.mean(axis=2)
     peak = float(plane.max())
     if not peak > 0:
@@ -103,7 +89,7 @@ def check_round(spread: Image, limit: float) -> None:
     """Raise AssertionError if a contour of a point spread is not round."""
     __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
-    ratios = contours(spread)
+    ratios = _contours(spread)
     if not ratios:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
@@ -237,7 +223,7 @@ def _square_figures(
 
 def _bilinear(plane: Image, x: Image, y: Image) -> Image:
     """Return the values between pixels, for positions inside of the image."""
-    left, top = (np.floor(places).astype(np.intp) for places in (x, y))
+    left, top = (np.floor(positions).astype(np.intp) for positions in (x, y))
     right, below = (
         np.minimum(first + 1, side - 1)
         for first, side in zip((left, top), plane.shape[::-1], strict=True)

@@ -15,7 +15,6 @@ from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
-from vkbloom.testing._programs import RATE
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
@@ -30,6 +29,8 @@ HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 # share of the limit: in all presets, 16 positions have at most 2.2 and 1.2 times as much.
 _ORDER: Final = (0, 6, 7, 11, 3, 8, 13, 15, 1, 2, 4, 5, 9, 10, 12, 14)
 _STEADY: Final = {4: 0.25, 8: 0.5}
+# Frames a second, by which a bloom is given the time.
+_RATE: Final = 60.0
 # Frames after a jump: of a bloom that is given the time, and of any other.
 _FRAMES: Final = 60
 _FEW_FRAMES: Final = 8
@@ -100,11 +101,11 @@ def assert_jitter(
     for name, scene in _SCENES.items():
         if reasons:
             break
-        for place, kind, off in _flickers(bloom, small, scene, allowed, feedback):
-            figure(f"{name}, {place}", off)
+        for label, kind, off in _flickers(bloom, small, scene, allowed, feedback):
+            figure(f"{name}, {label}", off)
             if not is_within(law, off, allowed[kind], kind):
                 words = f"changes by {off:.3g} of its mean" if off < math.inf else "is black"
-                reasons.append(f"{name}, {place}: the light {words}, {allowed[kind]:g} allowed")
+                reasons.append(f"{name}, {label}: the light {words}, {allowed[kind]:g} allowed")
     ratio = _threshold_ratio(bloom, small, allowed["threshold"])
     if not is_within(law, ratio, allowed["threshold"], "threshold"):
         reasons.append(
@@ -165,8 +166,8 @@ def _angled(probe: Probe, x: float, y: float) -> Image:
     )
     columns, rows = (
         np.diff(np.clip(np.arange(count + 1) - 0.5, at - side / 2, at + side / 2))
-        for places, count, side in squares
-        for at in (places[:, np.newaxis],)
+        for positions, count, side in squares
+        for at in (positions[:, np.newaxis],)
     )
     total: Image = rows.T @ columns
     return total
@@ -266,7 +267,7 @@ def assert_history(
     clock = iter(range(1 << 30))
 
     def at(image: Image) -> Image:
-        options: dict[str, Any] = {"time": next(clock) / RATE} if takes(bloom, "time") else {}
+        options: dict[str, Any] = {"time": next(clock) / _RATE} if takes(bloom, "time") else {}
         return probe.apply(lambda given: bloom(given, **options), image)[0]
 
     x, y = probe.centre
