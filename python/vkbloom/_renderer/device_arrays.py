@@ -83,8 +83,8 @@ class DeviceArray:
         return self.shape[0]
 
     def __repr__(self) -> str:
-        place = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
-        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {place}>"
+        owner = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
+        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {owner}>"
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
@@ -227,13 +227,13 @@ def memory_for(core: _core.Renderer, size: int) -> _core.Exported:
 
 
 def placed(
-    array: NDArray[Any], place: Destination, core: _core.Renderer
+    array: NDArray[Any], destination: Destination, core: _core.Renderer
 ) -> NDArray[Any] | DeviceArray:
     """Return an array of the host as if it were a framebuffer at that place."""
-    if place == "host":
+    if destination == "host":
         return array
     memory: _core.Exported | NDArray[Any] = array
-    if place == "cuda":
+    if destination == "cuda":
         memory = memory_for(core, array.nbytes)
         memory.write(np.ascontiguousarray(array))
     return DeviceArray(memory, array.shape, array.dtype.name)
@@ -361,14 +361,14 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     dtype = _check_dtype(name, code, bits, lanes)
     size = np.dtype(dtype).itemsize
     elements = _contiguous(shape) if strides is None else strides
-    if any(abs(one) >= _MAX_ELEMENTS for one in elements):
+    if any(abs(stride) >= _MAX_ELEMENTS for stride in elements):
         # CuPy 14 divides negative strides as if they had no sign.
         if hasattr(image, "__cuda_array_interface__"):
             # The capsule has ordered our stream after the producer's work.
             return _from_interface(image, name)._replace(stream=0)
         raise ValueError(f"{name}: strides {elements} are out of range; make it contiguous")
     # The producer has ordered our stream after its own work.
-    return _Array(capsule, address, shape, tuple(size * one for one in elements), dtype, 0)
+    return _Array(capsule, address, shape, tuple(size * stride for stride in elements), dtype, 0)
 
 
 def _from_interface(image: Any, name: str) -> _Array:
@@ -386,7 +386,7 @@ def _from_interface(image: Any, name: str) -> _Array:
             f"it: {name}.astype('float32')"
         )
     size = np.dtype(dtype).itemsize
-    strides = about.get("strides") or tuple(size * one for one in _contiguous(shape))
+    strides = about.get("strides") or tuple(size * stride for stride in _contiguous(shape))
     stream = about.get("stream")
     # Before version 3 nothing tells of a stream, so the default stream is waited for.
     after = _LEGACY if stream is None and about.get("version", 0) < 3 else stream or 0
@@ -403,7 +403,7 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
             f"and {made.dtype}"
         )
     size = made.dtype.itemsize
-    if array.strides != tuple(size * one for one in _contiguous(made.shape)):
+    if array.strides != tuple(size * stride for stride in _contiguous(made.shape)):
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")

@@ -80,8 +80,7 @@ class Surface:
         """Width and height in pixels; (0, 0) while a window is minimized on some systems."""
         if self._window is None:
             return self._size
-        import glfw  # noqa: PLC0415  an extra
-
+        glfw = import_extra("glfw", "window", "a window")
         size: tuple[int, int] = glfw.get_framebuffer_size(self._window)
         return size
 
