@@ -70,25 +70,6 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
         assert_array_equal(found, wanted)
 
 
-def test_grids(tmp_path: Path) -> None:
-    image, emission = picture(24, 16, 3), picture(24, 16, 3, "float16", seed=1)
-    source, glow = stored(tmp_path / "a.exr", image), stored(tmp_path / "glow.exr", emission)
-    levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)
-    mask = stored(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
-    words = ("--axis", "intensity=0.5,1", "--mask", mask, "--emission", glow)
-    assert run("grid", source, "-o", tmp_path / "g", *PYRAMID, *words).exit_code == 0
-    files = sorted((tmp_path / "g").glob("*.png"))
-    assert len(files) == 2
-    store = ("-o", tmp_path / "g.zarr")
-    assert run("grid", source, *store, *PYRAMID, *words).exit_code == 0
-    grid = xr.open_zarr(tmp_path / "g.zarr")
-    given = {"mask": levels, "emission": emission.astype(np.float32)}
-    assert_array_equal(grid["final"].sel(intensity=1), expected(image, SETTINGS, **given))
-    other = run("grid", source, *store, *PYRAMID, *words[:-2], "--resume")
-    assert other.exit_code == 1
-    assert "source.emission" in other.stderr
-
-
 def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     levels = picture(24, 16, 4, "uint8")
     levels[:, :12, 3] = 0

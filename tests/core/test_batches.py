@@ -14,10 +14,11 @@ import pytest
 import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
+from tests.planned import changed
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
 from vkbloom._renderer.requests import new_arrays
-from vkbloom._renderer.sources import scene_arguments
+from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.
@@ -397,16 +398,14 @@ def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
     # A Scene cannot have them, and the device must never get them.
-    arrays, *others = scene_arguments(scene, SIZE, "forward", 0.0)
-    serial, (vertices, indices, *mesh), *rest = arrays
+    block, pictures, (vertices, indices, *rest) = scene_arguments(scene, SIZE, "forward", 0.0)
     wrong = indices.copy()
     wrong[-1] = len(vertices)
     right = renderer.render(scene, None, SIZE)
-    source = _core.scene_source((2**63, (vertices, wrong, *mesh), *rest), *others)
+    source = _core.scene_source(changed(block, at1=2**31), pictures, (vertices, wrong, *rest))
     with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
         submitted(renderer, source, [Separable()])
     assert_same(renderer.render(scene, None, SIZE), right)
-    assert serial != 2**63
 
 
 def test_a_submission_of_a_closed_renderer() -> None:

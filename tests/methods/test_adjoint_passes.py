@@ -223,7 +223,7 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             check(found, reference.vjp(image, settings)[1](cotangents), "image")
             floats = settings.replace(format="rgba32float")
             source = Inputs(image).source((cotangents["final"],))
-            plan = renderer._core.adjoint(source, floats, ("final",), False)
+            plan = renderer._core.plan(source, floats, None, ("final",), False)
             assert plan
             shaders = [shader for _, shader, *_ in plan.passes]
             tiles = ["tile_mixed_comp", "adjoint_tile_comp"]
@@ -268,7 +268,7 @@ def shaders_of_transpose(
         assert np.array_equal(again["image"], found["image"])
     source = Inputs(image).source((cotangents["final"],))
     floats = settings.replace(format="rgba32float")
-    plan = renderer._core.adjoint(source, floats, ("final",), False)
+    plan = renderer._core.plan(source, floats, None, ("final",), False)
     assert plan
     return [shader for _, shader, *_ in plan.passes]
 
@@ -354,7 +354,7 @@ def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) ->
             found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
             check(found, reference.vjp(image, settings)[1](cotangents), "image")
         source = Inputs(image).source((cotangents["final"],))
-        plan = renderer._core.adjoint(source, settings, ("final",), False)
+        plan = renderer._core.plan(source, settings, None, ("final",), False)
         drawn = variant == "cpu" and not has_linear_texels(renderer)
     assert plan
     linear = {"adjoint_taps_linear_rgba32float"}
@@ -419,7 +419,7 @@ def test_only_what_is_read_is_computed(renderer: Renderer) -> None:
         pullback, cotangents, expected = pulled(own, image, Separable(threshold=0.2, knee=0.5))
         found = pullback(cotangents)
     assert isinstance(found, DeviceGradients)
-    assert [*found._found] == ["image"]
+    assert [*found._known] == ["image"]
     check(found, expected, "knee")
     assert "blur_scale" in found
     assert found.keys() == expected.keys()

@@ -17,7 +17,6 @@ import vkbloom
 from vkbloom._cli.applied import Options, Pair, Run, of_format
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import Command
-from vkbloom._cli.glow_options import glow_options
 from vkbloom._cli.image_files import (
     check_input_colour,
     expand_option,
@@ -97,7 +96,20 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 @expand_option
 @subimage_option
 @layer_option
-@glow_options
+@click.option(
+    "--mask",
+    metavar="FILE",
+    type=click.Path(),
+    help="A grey image of the same size, which multiplies what glows: white keeps it, black "
+    "removes it. Its values are not decoded.",
+)
+@click.option(
+    "--emission",
+    metavar="FILE",
+    type=click.Path(),
+    help="An image of the same size that glows instead of the image, such as a renderer's pass of "
+    "emissive materials. It is decoded like the image.",
+)
 @device_options
 @settings_options_by_file
 def command(

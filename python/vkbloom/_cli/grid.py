@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 import vkbloom
-from vkbloom._cli import fields, glow_options, image_files, no_bloom, program, terminal
+from vkbloom._cli import fields, image_files, no_bloom, program, terminal
 from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
@@ -40,7 +40,6 @@ from vkbloom._settings.settings import SHADINGS
 @image_files.subimage_option
 @image_files.layer_option
 @image_files.expand_option
-@glow_options.glow_options
 @device_options
 @scene_options
 @settings_options
@@ -76,9 +75,9 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
         settings = None
     # The presets of an axis differ in whether they expand.
     expand: float | None = given["expand"] if settings or program.given("expand") else None
-    pictures, source, glow = _source(images, expand, given)
+    pictures, source = _source(images, expand, given)
     names = given["framebuffers"].split(",")
-    shared = {name: given[name] for name in ("size", "shading", "time")} | glow
+    shared = {name: given[name] for name in ("size", "shading", "time")}
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
         grid = layout.ask(source, settings, axes, reduce=None, **shared)
@@ -101,19 +100,17 @@ def _source(
     images: Sequence[str],
     expand: float | None,
     given: Mapping[str, Any],
-) -> tuple[list[Picture], Any, dict[str, Any]]:
-    """Return the pictures, the source of the grid, and the arguments `mask` and `emission`."""
+) -> tuple[list[Picture], Any]:
+    """Return the pictures, and the source of the grid."""
     if not images:
-        glow_options.refuse_glow_of_scene(given["mask"], given["emission"])
-        return [], given["scene"](), {}
+        return [], given["scene"]()
     colour, reading = given["input_colour"], {n: given[n] for n in ("subimage", "layer")}
     reading["expand"] = expand
     pictures = [image_files.read_picture(image, colour=colour, **reading) for image in images]
-    glow = glow_options.accompanying(given["mask"], given["emission"], colour)
     # Labels are the file names, or numbers if a file is given twice.
     labels = images if len(set(images)) == len(images) else range(len(images))
     named = {str(label): item.pixels for label, item in zip(labels, pictures, strict=True)}
-    return pictures, named if len(images) > 1 else pictures[0].pixels, glow(pictures[0].pixels)
+    return pictures, named if len(images) > 1 else pictures[0].pixels
 
 
 def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
@@ -163,7 +160,7 @@ def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **
     with progress.Progress(len(points), done, shown=not terminal.is_quiet()) as bar:
         path = map(grid.point, todo)
         for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
-            picture = pictures[int(grid.point(index).place)] if pictures else None
+            picture = pictures[int(grid.point(index).entry)] if pictures else None
             _save(
                 frames,
                 {name: out / f"{stems[index]}{name}{suffix}" for name in frames},

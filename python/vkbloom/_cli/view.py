@@ -21,7 +21,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
 _LARGEST: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
 _WAIT_SECONDS: Final = 0.1  # while the window is hidden
-_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BPQ", *"123456789")
+_KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")

@@ -100,16 +100,16 @@ def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
     for control in result:
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-        is_own = control["name"] not in shared and control["name"] not in _RARE
-        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_own and slides)
+        is_of_method = control["name"] not in shared and control["name"] not in _RARE
+        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_of_method and slides)
 
-    def place(control: dict[str, Any]) -> tuple[int, ...]:
+    def rank(control: dict[str, Any]) -> tuple[int, ...]:
         name = control["name"]
         if name in _FIRST:
             return 0, _FIRST.index(name)
         return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
 
-    return sorted(result, key=place)
+    return sorted(result, key=rank)
 
 
 def _fields_of_function(function: PSF) -> list[dict[str, Any]]:

@@ -237,7 +237,7 @@ class Viewer:
         size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
         stops = check_number("stops", message.get("stops", 0.0), -32, 32)
         self._looked_at(message)
-        at = None if message.get("at") is None else _place(message["at"])
+        at = None if message.get("at") is None else _position(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
         buffers: list[bytes] = []
@@ -277,19 +277,19 @@ class Viewer:
         return {"sides": sides}, buffers
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
-        at = _place(message.get("at"))
+        at = _position(message.get("at"))
         arrays = self._arrays_of(message.get("view"))
         return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
 
     def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
         """Return the time, shading and glow of a message; missing ones stay as they are."""
-        own = 1.0 if self._scene is None else self._scene.glow_intensity
+        usual = 1.0 if self._scene is None else self._scene.glow_intensity
         time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
         shading, glow = message.get("shading"), message.get("glow")
         return (
             time,
             self._shading if shading is None else check_shading(shading),
-            own if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+            usual if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
         )
 
     def _render(
@@ -362,7 +362,7 @@ def _described(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
-def _place(at: object) -> tuple[float, float]:
+def _position(at: object) -> tuple[float, float]:
     if not (isinstance(at, list | tuple) and len(at) == 2):
         raise TypeError(f"at: {at!r:.80} is not (x, y)")
     for part in at:

@@ -27,9 +27,9 @@ def is_found(target: Array, residual: Array, plain: Array) -> bool:
     """Return whether a bloom explains the target better than a change of each pixel's colour."""
     if np.count_nonzero(target != plain) < _FEW_VALUES:
         return False
-    found = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
+    remaining = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
     changed = float(np.linalg.norm(target - plain))
-    return found < changed and found < _recoloured(plain, target)
+    return remaining < changed and remaining < _recoloured(plain, target)
 
 
 def _recoloured(image: Array, target: Array) -> float:

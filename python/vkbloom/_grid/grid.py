@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, import_extra
+from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.identity import chunk_in
 from vkbloom._grid.layout import Grid, Layout, ask, lay_out
@@ -212,8 +213,6 @@ def _filled_there(
     progress: bool | None,
 ) -> Tally:
     """Let the workers of a cluster render the points of a store that are not done."""
-    from vkbloom._grid import cluster  # noqa: PLC0415  Dask is optional
-
     cluster.check_client(client)
     shared = cluster.shared_grid(client, asked)
     store = prepared(cluster.lay_out_there(client, shared, adapter))

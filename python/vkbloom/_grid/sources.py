@@ -44,7 +44,7 @@ class Point:
 
     index: Index
     settings: Settings
-    place: float
+    entry: float
 
 
 def visit(
@@ -59,7 +59,7 @@ def visit(
     def work() -> Iterator[Request]:
         for point in points:
             drawn.append(point.index)
-            yield Request(source.on(renderer, point.place), point.settings)
+            yield Request(source.on(renderer, point.entry), point.settings)
 
     for frames in renderer._run_requests(work(), check_framebuffers(framebuffers)):
         yield drawn.popleft(), frames
@@ -70,7 +70,7 @@ class ImageSource:
 
     has_time = False
     #: The place of points without an image axis.
-    place = 0.0
+    entry = 0.0
 
     def __init__(
         self,
@@ -90,26 +90,26 @@ class ImageSource:
         # The device is not sent to other processes.
         return type(self), (self.images, self.labels, self.mask, self.emission)
 
-    def on(self, renderer: Renderer, place: float) -> _core.Source:
+    def on(self, renderer: Renderer, entry: float) -> _core.Source:
         """Return an image on a renderer's device. The latest images are kept there."""
-        image = self.images[int(place)]
+        image = self.images[int(entry)]
         if isinstance(image, Image):
-            return self.for_core(place)
+            return self.for_core(entry)
         core, held = self._uploaded
         if core is not renderer._core:
             core, held = self._uploaded = renderer._core, {}
-        if int(place) not in held:
+        if int(entry) not in held:
             spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
-            held[int(place)] = core.upload(self.for_core(place), spare, True)
-        return held[int(place)]
+            held[int(entry)] = core.upload(self.for_core(entry), spare, True)
+        return held[int(entry)]
 
-    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+    def plan(self, renderer: Renderer, settings: Settings, entry: float) -> Plan:
         """Return the plan of an image."""
-        return renderer.plan(self.images[int(place)], settings)
+        return renderer.plan(self.images[int(entry)], settings)
 
-    def for_core(self, place: float) -> _core.Source:
+    def for_core(self, entry: float) -> _core.Source:
         """Return the core's Source of an image."""
-        return image_source(self.images[int(place)], self.mask, self.emission)
+        return image_source(self.images[int(entry)], self.mask, self.emission)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -138,26 +138,26 @@ class SceneSource:
         self.scene = scene
         self.size = size
         self.shading: Shading = shading
-        self.place = time
+        self.entry = time
         self._latest: tuple[float, _core.Source] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.scene, self.size, self.shading, self.place)
+        return type(self), (self.scene, self.size, self.shading, self.entry)
 
-    def on(self, renderer: Renderer, place: float) -> _core.Source:
+    def on(self, renderer: Renderer, entry: float) -> _core.Source:
         """Return the scene at a time. The renderer keeps its data on the device."""
         # One object for each time, so that requests of the same time share submissions.
-        if self._latest is None or self._latest[0] != place:
-            self._latest = place, self.for_core(place)
+        if self._latest is None or self._latest[0] != entry:
+            self._latest = entry, self.for_core(entry)
         return self._latest[1]
 
-    def plan(self, renderer: Renderer, settings: Settings, place: float) -> Plan:
+    def plan(self, renderer: Renderer, settings: Settings, entry: float) -> Plan:
         """Return the plan of the scene."""
         return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 
-    def for_core(self, place: float) -> _core.Source:
+    def for_core(self, entry: float) -> _core.Source:
         """Return the core's Source of the scene at a time."""
-        return scene_source(self.scene, self.size, self.shading, place)
+        return scene_source(self.scene, self.size, self.shading, entry)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -167,7 +167,7 @@ class SceneSource:
             "sha256": digest(self.scene),
             "size": list(self.size),
             "shading": self.shading,
-            "time": self.place,
+            "time": self.entry,
         }
 
 
@@ -238,24 +238,24 @@ def _checked(image: object) -> NDArray[Any] | Image:
 
 def digest(value: object) -> str:
     """Return the SHA-256 of plain values, arrays, and dataclasses and sequences of them."""
-    found = hashlib.sha256()
+    hashed = hashlib.sha256()
 
     def add(part: object) -> None:
         if isinstance(part, np.ndarray):
-            found.update(f"{part.dtype.str}{part.shape}".encode())
-            found.update(np.ascontiguousarray(part).data)
+            hashed.update(f"{part.dtype.str}{part.shape}".encode())
+            hashed.update(np.ascontiguousarray(part).data)
         elif dataclasses.is_dataclass(part):
             for field in dataclasses.fields(part):
                 # Fields that are not arguments, such as a serial number, are not content.
                 if field.init:
-                    found.update(f"{field.name}:".encode())
+                    hashed.update(f"{field.name}:".encode())
                     add(getattr(part, field.name))
         elif isinstance(part, tuple | list):
-            found.update(f"[{len(part)}]".encode())
+            hashed.update(f"[{len(part)}]".encode())
             for item in part:
                 add(item)
         else:
-            found.update(repr(part).encode())
+            hashed.update(repr(part).encode())
 
     add(value)
-    return found.hexdigest()
+    return hashed.hexdigest()

@@ -65,6 +65,11 @@ class Surface:
     base: Texture = WHITE
     emission: Texture = WHITE
 
+    @property
+    def textures(self) -> tuple[Texture, Texture]:
+        """Both textures."""
+        return self.base, self.emission
+
 
 def mip_levels(picture: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Make all mip levels of a picture.

@@ -21,8 +21,8 @@ from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
 from vkbloom.testing._probe import Bloom
 
-_PLACES: Final = ("{input}", "{output}")
-_PLACE: Final = re.compile("|".join(map(re.escape, _PLACES)))
+_PLACEHOLDERS: Final = ("{input}", "{output}")
+_PLACEHOLDER: Final = re.compile("|".join(map(re.escape, _PLACEHOLDERS)))
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
 _BITS: Final = {"uint8": 8, "uint16": 16}
 _COARSE: Final = 8
@@ -71,7 +71,7 @@ class Program:
         if isinstance(argv, str) or not all(isinstance(word, str) for word in argv):
             raise TypeError(f"argv: {argv!r} is not a sequence of str; use shlex.split")
         self._argv = tuple(argv)
-        for placeholder in _PLACES:
+        for placeholder in _PLACEHOLDERS:
             if not any(placeholder in word for word in argv):
                 raise ValueError(f"argv: {' '.join(argv)!r} has no {placeholder}")
         if not suffix.startswith("."):
@@ -87,9 +87,9 @@ class Program:
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
             write(source, np.ascontiguousarray(image, np.float32), premultiplied=True)
-            self._run(dict(zip(_PLACES, (str(source), str(target)), strict=True)))
+            self._run(dict(zip(_PLACEHOLDERS, (str(source), str(target)), strict=True)))
             if not target.exists():
-                raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACES[1]}")
+                raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACEHOLDERS[1]}")
             result = self._read(target)
         if result.shape[1::-1] != (width, height):
             raise ValueError(
@@ -111,7 +111,7 @@ class Program:
 
     def _run(self, values: Mapping[str, str]) -> None:
         __tracebackhide__ = True
-        words = [_PLACE.sub(lambda match: values[match[0]], word) for word in self._argv]
+        words = [_PLACEHOLDER.sub(lambda match: values[match[0]], word) for word in self._argv]
         # A session of its own, so that what the program started ends with it.
         with subprocess.Popen(
             words,

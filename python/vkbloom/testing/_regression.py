@@ -28,7 +28,6 @@ class Limits(TypedDict, total=False):
     fail_percent: float
     hard_fail: float | None
     ssim: float | None
-    psnr: float | None
     flip: float | None
     allow_nan: bool
 
