@@ -110,14 +110,13 @@
 
 // A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size
 // and of the filtered image, whose weights have the sum `divisor`; the taps along rows and along
-// columns. If the target is exactly twice as large, `taps` has the same weights on integer texels.
+// columns.
 #define FILTER_ROWS(B, INPUT, VEC4S) \
     INPUT(B, float, own) \
     INPUT(B, float, coarse) \
     INPUT(B, float, divisor) \
     VEC4S(B, taps_x, MAX_FILTER_TAPS) \
-    VEC4S(B, taps_y, MAX_FILTER_TAPS) \
-    VEC4S(B, taps, 1)
+    VEC4S(B, taps_y, MAX_FILTER_TAPS)
 
 // A pass that filters an image. The threshold is for one that reads the image itself.
 #define FILTER_BLOCK(B, READS, INPUT, VEC4S) \
@@ -231,16 +230,13 @@
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
-// the factor of the colours of what is added. A filter between levels of exactly half and twice the
-// size is of EXACT_*; `taps` are those of an upsampling, as of FILTER_ROWS.
+// the factor of the colours of what is added.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
     INPUT(B, float, gain) \
     INPUT(B, float, share) \
-    INPUT(B, float, limit) \
-    INPUT(B, int, exact) \
-    VEC4S(B, taps, 1)
+    INPUT(B, float, limit)
 
 // The adjoint of a convolution's filter of bright colours (adjoint_bright.frag), as of FFT_BLOCK.
 #define ADJOINT_BRIGHT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -443,11 +439,6 @@
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
-// On an H100, halving 3840 x 2160 of float32 takes 103 us in strips of 1 x 4 by 32 invocations, 140
-// in strips of 4 x 16 by 8, and 109 from tiles in shared memory.
-#define HALVE_INVOCATIONS 32
-#define HALVE_COLUMNS     1
-#define HALVE_ROWS        4
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define HALVE_LINEAR_COLUMNS       8
@@ -467,18 +458,10 @@
 #define TILE_ROWS                  32
 #define TILE_RUNS                  4
 #define TILE_RADIUS                16
-// Tiles of filters: their rows, and those that an invocation adds up. Then those of the transposes
-// of levels of exactly half and twice the size. On an H100 with float32, the tile of four rows of
-// the second transpose takes 85 us to 1920 x 1080, those of 8 and 12 rows 98 and 137; the first
-// transpose takes 139 in one of 32 x 16, 151 in one of 64 x 16.
-#define FILTER_TILE_ROWS       16
-#define FILTER_TILE_RUN        4
-#define ADJOINT_HALVE_COLUMNS  32
-#define ADJOINT_HALVE_ROWS     16
-#define ADJOINT_HALVE_RUNS     4
-#define ADJOINT_DOUBLE_COLUMNS 61
-#define ADJOINT_DOUBLE_ROWS    4
-#define FUSED_VEC4S            5
+// Tiles of filters: their rows, and those that an invocation adds up.
+#define FILTER_TILE_ROWS 16
+#define FILTER_TILE_RUN  4
+#define FUSED_VEC4S      5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
@@ -690,7 +673,6 @@
     NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(STORED_SRGB8, 5, srgb8) \
     NAME(BLOOM_OWN, 0, own_image) \
-    NAME(BLOOM_LINES, 1, lines) \
     NAME(BLOOM_LIT, 2, lit) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
@@ -699,6 +681,8 @@
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
     NAME(UPSAMPLE_CORNERS, 5, corners) \
     NAME(UPSAMPLE_INSIDE, 6, inside) \
+    NAME(UPSAMPLE_LEFT_PAIR, 7, left_pair) \
+    NAME(UPSAMPLE_RIGHT_PAIR, 8, right_pair) \
     NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \

@@ -6,21 +6,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vkbloom import _core
+from vkbloom import Scene, _core
+from vkbloom._scene.blocks import scene_arguments
+from vkbloom._scene.mesh import Mesh
+from vkbloom._scene.skybox import from_array
 
-VERTICES = np.zeros((3, 9), np.float32)
-INDICES = np.arange(3, dtype=np.uint32)
-MESH = (VERTICES, INDICES, None, None, ())
-SKY = (np.zeros((6, 1, 1, 4), np.uint8),)
-CAMERA = ((0.0, 0.0, -10.0), (0.0, 0.0, 0.0), 45.0, 0.1, 256.0)
+MESH = Mesh(np.zeros((3, 9), np.float32), np.arange(3, dtype=np.uint32))
+SKY = from_array(np.zeros((6, 1, 1, 4), np.uint8))
+SCENES = {has_sky: Scene(MESH, MESH, SKY if has_sky else None) for has_sky in (False, True)}
+
+
+def changed(block: bytes, **places: int) -> bytes:
+    """Return a block of the core with other numbers of 32 bits at some places, `at12` and so on."""
+    numbers = np.frombuffer(block, np.uint32).copy()
+    for place, number in places.items():
+        numbers[int(place.removeprefix("at"))] = number
+    return numbers.tobytes()
 
 
 def scene_source(
-    size: Any = (1280, 720), *, has_sky: bool = True, shading: str = "forward", serial: int = 1
+    size: Any = (1280, 720), *, has_sky: bool = True, shading: str = "forward"
 ) -> _core.Source:
     """Return a frame of a triangle."""
-    sky = SKY if has_sky else ()
-    return _core.scene_source((serial, MESH, MESH, sky, ()), CAMERA, size, shading, 0.0, 1.0)
+    return _core.scene_source(*scene_arguments(SCENES[has_sky], size, shading, 0.0))
 
 
 def scene_plan(

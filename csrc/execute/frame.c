@@ -267,17 +267,15 @@ static void find_usages(struct vkb_run *run, const struct vkb_frame_source *sour
             const struct vkb_image_row *row = &plan->graph.images[image];
             const struct vkb_input *input = source->inputs[row->input];
             run->usages[image] |= row->usage;
-            if (row->input && ((input && input->exported) || !run->device->linear_texels))
+            if (row->input && !run->device->linear_texels)
                 run->usages[image] |= vkb_access_usage(VKB_ACCESS_COPY_TARGET);
             if (input && input->exported)
-                run->usages[image] |=
-                    vkb_exported_usage(run->device, row, VKB_ACCESS_DISPATCH_STORED);
+                run->usages[image] |= vkb_access_usage(VKB_ACCESS_DISPATCH_STORED);
         }
         for (uint32_t output = 0; output < plan->output_count; ++output)
             if (requests[i].outputs[output].exported)
                 run->usages[plan->outputs[output]] |=
-                    vkb_exported_usage(run->device, &plan->graph.images[plan->outputs[output]],
-                                       VKB_ACCESS_DISPATCH_SAMPLED);
+                    vkb_exported_usage(plan->graph.images[plan->outputs[output]].format);
     }
 }
 

@@ -4,7 +4,6 @@
 #define VKB_RESOURCE_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
 enum vkb_resource_kind {
@@ -16,16 +15,16 @@ enum vkb_resource_kind {
 };
 
 struct vkb_resource {
-    uint64_t serial;  // no other resource's
-    enum vkb_resource_kind kind;
+    uint64_t serial, size;  // the serial is no other resource's; the size is in bytes
+    uint32_t kind;          // enum vkb_resource_kind
     // Of a texture or an image; the rest is 0 for buffers.
     uint32_t format;      // VkFormat
     uint32_t dimensions;  // 1 to 3; sides beyond are 1
     uint32_t width, height, depth;
-    bool linear;       // the filter
-    uint32_t border;   // VkSamplerAddressMode
+    uint32_t linear;  // the filter
+    uint32_t border;  // VkSamplerAddressMode
+    // Python packs what is before here, as "2Q8I".
     const void *data;  // NULL: zeros
-    size_t size;
 };
 
 static inline bool vkb_resource_is_image(const struct vkb_resource *resource)

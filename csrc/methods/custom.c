@@ -24,8 +24,8 @@ static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
 
     if (vkb_graph_find(graph, name) != VKB_NO_IMAGE)
         return vkb_fail(error, VKB_ERROR_VALUE, "passes: there are two images named %s", name);
-    if (!vkb_add_target(graph, name, pass->format ? pass->format : source->format, size,
-                        pass->framebuffer && name == pass->name, image, error))
+    if (!vkb_add_target(graph, name, source->format, size, pass->framebuffer && name == pass->name,
+                        image, error))
         return false;
     struct vkb_pass_row row = vkb_fullscreen_row(pass->name, pass->shader, *image);
     for (; row.read_count < pass->read_count; ++row.read_count) {

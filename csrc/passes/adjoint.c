@@ -130,9 +130,6 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
     row.block = VKB_BLOCK_adjoint_filter;
     row.params.adjoint_filter.gain = (float)filter->gain;
     row.params.adjoint_filter.share = 1.0f;
-    row.params.adjoint_filter.exact = filter->exact;
-    if (filter->exact == EXACT_DOUBLE)
-        memcpy(row.params.adjoint_filter.taps[0], filter->up, sizeof filter->up);
     return row;
 }
 
@@ -163,7 +160,6 @@ static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filte
     uint32_t start, between;
 
     first.gain = 1.0;
-    first.exact = 0;
     struct vkb_pass_row row =
         filter_row(adjoint, &first, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
     struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;

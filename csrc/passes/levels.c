@@ -104,12 +104,6 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
     row->params.prefilter.step_y = (float)step_y;
 }
 
-static bool is_twice(const struct vkb_graph *graph, uint32_t large, uint32_t small)
-{
-    return graph->images[large].width == 2 * graph->images[small].width
-        && graph->images[large].height == 2 * graph->images[small].height;
-}
-
 bool vkb_levels_box(const struct vkb_levels *levels, uint32_t from, uint32_t to,
                     struct vkb_error *error)
 {
@@ -129,10 +123,6 @@ bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double st
                    (struct vkb_side_taps){2.0 * step_y, 0.25, 0.5});
     vkb_filter_add(&row, 1, (struct vkb_side_taps){step_x, 0.5, 0.0},
                    (struct vkb_side_taps){step_y, 0.5, 0.0});
-    if (is_twice(levels->graph, from, to) && step_x == 1.0 && step_y == 1.0) {
-        row.constants.sampling = SAMPLING_TEXEL;
-        row.constants.exact = EXACT_HALF;
-    }
     return vkb_filter_end(levels, &row, error);
 }
 
@@ -212,25 +202,6 @@ bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
         && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
 }
 
-// The weights of four texels for an upsampling to twice the size, for a pixel a quarter of a texel
-// after the centre of the second one. The outer taps of the tent are up to one texel away. A
-// bilinear sample is a tent with a radius of 0.
-static void find_up_taps(double radius, float taps[4])
-{
-    static const double shares[3] = {0.25, 0.5, 0.25};
-    double sums[4] = {0};
-
-    for (int tap = 0; tap < 3; ++tap) {
-        const double at = 1.25 + (tap - 1) * radius, part = at - floor(at);
-        const int texel = (int)floor(at);
-        sums[texel] += shares[tap] * (1.0 - part);
-        if (part > 0.0)
-            sums[texel + 1] += shares[tap] * part;
-    }
-    for (int i = 0; i < 4; ++i)
-        taps[i] = (float)sums[i];
-}
-
 // How UPSAMPLE_TENT and the others sample a smaller level, with the distances of the taps of a
 // tent, or of its corners alone, in its texels.
 static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double radius_x,
@@ -270,12 +241,6 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     }
     vkb_filter_add_own(&row, own, own_share);
     set_kernel(&row, kernel, x, y);
-    if (is_twice(levels->graph, to, from)
-        && (kernel == UPSAMPLE_LINEAR || (kernel == UPSAMPLE_TENT && x == y && x <= 1.0))) {
-        row.constants.sampling = SAMPLING_TEXEL;
-        row.constants.exact = EXACT_DOUBLE;
-        find_up_taps(kernel == UPSAMPLE_TENT ? x : 0.0, row.params.filter.taps[0]);
-    }
     return vkb_filter_end(levels, &row, error);
 }
 

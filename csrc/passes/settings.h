@@ -75,19 +75,18 @@ struct vkb_stage {
 // A pass of a method that was given at run time (methods/custom.c). The owner of the settings keeps
 // the shader as long as there are rows of it.
 struct vkb_custom_pass {
-    char name[VKB_NAME_SIZE];  // of the image that it writes
-    const struct vkb_shader *shader;
-    uint32_t width, height;
-    enum vkb_format format;  // VKB_FORMAT_NONE: that of the bloom buffers
-    uint32_t block_width,
-        block_height;  // of a compute shader: pixels of a workgroup; 0: a fragment shader
-    bool framebuffer;
-    char reads[VKB_MAX_READS][VKB_NAME_SIZE];
-    uint32_t read_count;
     struct vkb_custom_params params;
+    uint64_t turn;
+    uint32_t width, height;
+    // Of a compute shader: pixels of a workgroup; 0: a fragment shader.
+    uint32_t block_width, block_height;
+    uint32_t framebuffer, read_count;
+    char name[VKB_NAME_SIZE];  // of the image that it writes
+    char reads[VKB_MAX_READS][VKB_NAME_SIZE];
+    // Python packs what is before here, as "1024sQ6I32s512s".
+    const struct vkb_shader *shader;
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;
-    uint64_t turn;
 };
 
 struct vkb_settings {

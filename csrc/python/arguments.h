@@ -32,9 +32,6 @@ void vkb_release_kernel(struct vkb_held_kernel *held);
 // Asks the stage of dirt, if there is one, for its picture.
 bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_settings *settings);
 
-// (position, rotation, fov, near, far), the first two of three numbers each.
-bool vkb_read_camera(PyObject *tuple, struct vkb_camera *camera);
-
 // The arrays of a scene, held until vkb_release_scene. Releasing a zeroed or half-read one is safe.
 struct vkb_held_scene {
     struct vkb_scene_data data;
@@ -42,11 +39,10 @@ struct vkb_held_scene {
     size_t view_count;
 };
 
-// (serial, body, glow or None, sky levels, textures); a mesh is (vertices, indices, emission or
-// None, texcoords or None, surfaces), a surface (index count, base texture, emission texture), a
-// texture (levels, address mode along u, v, magnification, minification, mipmap filter), these as
-// Vulkan numbers them.
-bool vkb_read_scene(PyObject *tuple, struct vkb_held_scene *scene);
+// The arrays: of the body and of the glow vertices, indices and, with surfaces, texture coordinates
+// and surfaces; then the levels of the sky and of the textures.
+bool vkb_read_scene(PyObject *block, PyObject *pictures, PyObject *arrays,
+                    struct vkb_held_scene *scene, struct vkb_source *source);
 void vkb_release_scene(struct vkb_held_scene *scene);
 
 // The pixels of an image, held until vkb_release_image. Releasing a zeroed or half-read one is
@@ -69,10 +65,12 @@ bool vkb_is_exported(PyObject *object);
 struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **exports);
 
 // The passes of a method that was given at run time, held until vkb_release_passes, which may be
-// called on a zeroed one. The tuple keeps their shaders, to which the rows of a graph refer.
+// called on a zeroed one. The tuple keeps their shaders and resources, to which the rows of a graph
+// refer.
 struct vkb_held_passes {
     PyObject *tuple;
     struct vkb_custom_pass *rows;
+    struct vkb_pass_content *content;
 };
 
 // Asks the settings of such a method for its passes.
@@ -80,8 +78,5 @@ bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uin
                      const struct vkb_source *source, struct vkb_held_passes *held,
                      struct vkb_settings *settings);
 void vkb_release_passes(struct vkb_held_passes *held);
-
-// Of a Resource object, which keeps it.
-const struct vkb_resource *vkb_resource_of(PyObject *object);
 
 #endif

@@ -5,19 +5,16 @@
 #include "python/objects.h"
 
 extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec, vkb_shader_spec, vkb_resource_spec, vkb_exported_spec;
+    vkb_pages_spec, vkb_exported_spec;
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
-PyObject *vkb_make_shader(PyObject *module, PyObject *arguments);
-PyObject *vkb_make_resource(PyObject *module, PyObject *arguments);
 PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
 
 // Methods of the Renderer.
-PyObject *vkb_renderer_adjoint(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_show(PyObject *renderer, PyObject *arguments);
@@ -27,7 +24,7 @@ PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_export(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_cuda(PyObject *renderer, PyObject *unused);
-PyObject *vkb_renderer_dlpack(PyObject *renderer, PyObject *array);
+PyObject *vkb_renderer_in_context(PyObject *renderer, PyObject *function);
 PyObject *vkb_renderer_cuda_name(PyObject *renderer, PyObject *ordinal);
 PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
 

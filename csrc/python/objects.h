@@ -9,8 +9,8 @@
 #include "vulkan/adapter.h"
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type, *shader_type,
-        *resource_type, *exported_type;
+    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type,
+        *exported_type;
     PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
 };
 

@@ -7,7 +7,14 @@
 #include "graph/dry_run.h"
 #include "methods/adjoint.h"
 
-#include <string.h>
+#include <stdio.h>
+
+// The derivatives that a plan is of.
+struct portion {
+    const struct vkb_cotangents *cotangents;
+    uint32_t first;    // of the images of derivatives
+    bool is_possible;  // whether all passes have adjoints
+};
 
 // What plans without a renderer are checked against: all that some device can do.
 #define ALL_FEATURES (~(VkFormatFeatureFlags)0)
@@ -34,88 +41,13 @@ static const struct vkb_device any_device = {
     .linear_texels = true,
 };
 
-// Whether the image is wanted: all are where `names` is None. -1 with an exception set.
-static int is_wanted(PyObject *names, const char *name)
-{
-    if (names == Py_None)
-        return 1;
-    PyObject *text = PyUnicode_FromString(name);
-    int wanted = text ? PySequence_Contains(names, text) : -1;
-    Py_XDECREF(text);
-    return wanted;
-}
-
-// Raises ValueError with the framebuffers that there are, and the one that may be meant.
-static void raise_unknown(const struct vkb_graph *graph, PyObject *name)
-{
-    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
-    PyObject *known = module ? PyList_New(0) : NULL;
-    for (uint32_t i = 0; known && i < graph->image_count; ++i) {
-        if (!graph->images[i].framebuffer)
-            continue;
-        PyObject *one = PyUnicode_FromString(graph->images[i].name);
-        if (!one || PyList_Append(known, one))
-            Py_CLEAR(known);
-        Py_XDECREF(one);
-    }
-    PyObject *text = known ? PyObject_CallMethod(module, "unknown", "sOO",
-                                                 "framebuffers: unknown framebuffer", name, known)
-                           : NULL;
-    if (text)
-        PyErr_SetObject(PyExc_ValueError, text);
-    Py_XDECREF(text);
-    Py_XDECREF(known);
-    Py_XDECREF(module);
-}
-
-static bool check_names(const struct vkb_graph *graph, PyObject *names)
-{
-    for (Py_ssize_t i = 0, count = names == Py_None ? 0 : PyTuple_Size(names); i < count; ++i) {
-        PyObject *name = PyTuple_GetItem(names, i);
-        PyObject *text = PyUnicode_Check(name) ? PyUnicode_AsUTF8String(name) : NULL;
-        uint32_t image = text ? vkb_graph_find(graph, PyBytes_AsString(text)) : VKB_NO_IMAGE;
-        bool found = image != VKB_NO_IMAGE && graph->images[image].framebuffer;
-        Py_XDECREF(text);
-        if (found)
-            continue;
-        if (PyErr_Occurred())
-            return false;
-        raise_unknown(graph, name);
-        return false;
-    }
-    return true;
-}
-
-static bool choose_outputs(struct vkb_plan *plan, PyObject *names)
+// The framebuffers from the image `first` on; those with a name among the names, unless that is
+// None.
+static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *names)
 {
     const struct vkb_graph *graph = &plan->graph;
     struct vkb_error error;
-
-    if (names != Py_None && !vkb_require_tuple(names, "framebuffers"))
-        return false;
-    plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
-    if (!plan->outputs) {
-        PyErr_NoMemory();
-        return false;
-    }
-    if (!check_names(graph, names))
-        return false;
-    for (uint32_t i = 0; i < graph->image_count; ++i) {
-        const int wanted =
-            graph->images[i].framebuffer ? is_wanted(names, graph->images[i].name) : 0;
-        if (wanted < 0)
-            return false;
-        if (wanted)
-            plan->outputs[plan->output_count++] = i;
-    }
-    return true;
-}
-
-// The framebuffers from `first` on.
-static bool choose_derivatives(struct vkb_plan *plan, uint32_t first)
-{
-    const struct vkb_graph *graph = &plan->graph;
-    struct vkb_error error;
+    uint32_t count = 0;
 
     plan->outputs = vkb_alloc(&error, graph->image_count, sizeof *plan->outputs);
     if (!plan->outputs) {
@@ -124,8 +56,22 @@ static bool choose_derivatives(struct vkb_plan *plan, uint32_t first)
     }
     for (uint32_t i = first; i < graph->image_count; ++i)
         if (graph->images[i].framebuffer)
-            plan->outputs[plan->output_count++] = i;
-    return true;
+            plan->outputs[count++] = i;
+    if (names == Py_None) {
+        plan->output_count = count;
+        return true;
+    }
+    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
+    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "ON", names,
+                                                   vkb_image_names(graph, plan->outputs, count))
+                             : NULL;
+    const bool done = flags && PyBytes_Check(flags) && PyBytes_Size(flags) == (Py_ssize_t)count;
+    for (uint32_t i = 0; done && i < count; ++i)
+        if (PyBytes_AsString(flags)[i])
+            plan->outputs[plan->output_count++] = plan->outputs[i];
+    Py_XDECREF(flags);
+    Py_XDECREF(module);
+    return done;
 }
 
 static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
@@ -178,8 +124,7 @@ static bool layer_graph(const struct vkb_device *device, struct vkb_graph *graph
 // `portion` may be NULL.
 static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
-                        struct vkb_portion *portion, struct vkb_graph *graph,
-                        struct vkb_error *error)
+                        struct portion *portion, struct vkb_graph *graph, struct vkb_error *error)
 {
     graph->max_width = device->max_side;
     const bool built =
@@ -227,10 +172,11 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     return false;
 }
 
-PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                       enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                       PyObject *settings_object, struct vkb_settings *settings,
-                       struct vkb_portion *portion, PyObject *names)
+// `renderer` is the serial of the plan's renderer, or 0; `portion` may be NULL.
+static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
+                          enum vkb_variants variants, uint64_t renderer, PyObject *source,
+                          PyObject *settings_object, struct vkb_settings *settings,
+                          struct portion *portion, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -256,8 +202,7 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
         vkb_release_kernel(&self->kernel);
         vkb_release_kernel(&self->dirt);
     }
-    if (!(portion ? choose_derivatives(&self->plan, portion->first)
-                  : choose_outputs(&self->plan, names))
+    if (!choose_outputs(&self->plan, portion ? portion->first : 0, names)
         || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;
@@ -271,24 +216,52 @@ PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_de
     return (PyObject *)self;
 }
 
+static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
+{
+    const Py_ssize_t given = PyTuple_Size(tuple);
+
+    if (given > GATHERED_LEVELS) {
+        PyErr_Format(PyExc_ValueError, "names: %zd names are out of range, 0 to %d", given,
+                     GATHERED_LEVELS);
+        return false;
+    }
+    for (cotangents->count = 0; cotangents->count < given; ++cotangents->count) {
+        const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, cotangents->count), NULL);
+        if (!name)
+            return false;
+        snprintf(cotangents->names[cotangents->count], VKB_NAME_SIZE, "%s", name);
+    }
+    return true;
+}
+
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names;
+    PyObject *source, *settings_object, *names, *cotangents = NULL;
+    struct vkb_cotangents given;
+    struct portion portion = {.cotangents = &given, .is_possible = true};
     struct vkb_settings settings;
     struct vkb_error error = {0};
+    int sums = false;
 
-    if (!PyArg_ParseTuple(arguments, "O!OO:plan", state->source_type, &source, &settings_object,
-                          &names)
-        || !vkb_read_settings(settings_object, &settings))
+    if (!PyArg_ParseTuple(arguments, "O!OO|O!p:plan", state->source_type, &source, &settings_object,
+                          &names, &PyTuple_Type, &cotangents, &sums)
+        || !vkb_read_settings(settings_object, &settings)
+        || (cotangents && !read_cotangents(cotangents, &given)))
         return NULL;
+    given.sums = sums;
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
-    return vkb_new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                        settings_object, &settings, NULL, names);
+    PyObject *plan =
+        new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
+                 settings_object, &settings, cotangents ? &portion : NULL, names);
+    if (!plan || portion.is_possible)
+        return plan;
+    Py_DECREF(plan);
+    Py_RETURN_NONE;
 }
 
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
@@ -311,8 +284,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     device.adapter.device_type = variants == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return vkb_new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL,
-                        names);
+    return new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL, names);
 }
 
 // The images that the pass reads, each once; returns how many.
@@ -344,31 +316,6 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
                          pass->variant ? pass->variant : "fragment", group);
 }
 
-// (source subpass, target subpass, source stages, target stages, source access, target access,
-// flags); an external subpass is -1.
-static PyObject *describe_dependency(const VkSubpassDependency *dependency)
-{
-    return Py_BuildValue(
-        "(iikkkkk)", (int)dependency->srcSubpass, (int)dependency->dstSubpass,
-        (unsigned long)dependency->srcStageMask, (unsigned long)dependency->dstStageMask,
-        (unsigned long)dependency->srcAccessMask, (unsigned long)dependency->dstAccessMask,
-        (unsigned long)dependency->dependencyFlags);
-}
-
-static PyObject *describe_dependencies(const struct vkb_graph *graph, uint32_t first, uint32_t end)
-{
-    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
-    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
-    const uint32_t use_count = vkb_graph_target_uses(graph, first, end, uses);
-    const uint32_t count = vkb_subpass_dependencies(uses, use_count, dependencies);
-    PyObject *tuple = PyTuple_New(count);
-
-    for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!vkb_set_item(tuple, i, describe_dependency(&dependencies[i])))
-            Py_CLEAR(tuple);
-    return tuple;
-}
-
 // By pass, whether a group of passes that starts with it runs where nothing has run before; freed
 // by the caller. NULL with an exception set.
 static bool *mark_alone(PyObject *object)
@@ -398,37 +345,21 @@ static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t fi
     return done;
 }
 
-// A list of the passes that run, or of the dependencies of their render passes.
-static PyObject *describe_groups(PyObject *object, bool dependencies)
+static PyObject *get_passes(PyObject *object, void *unused)
 {
     const struct vkb_graph *graph = &((struct vkb_plan_object *)object)->plan.graph;
     bool *ran = mark_alone(object);
     PyObject *list = ran ? PyList_New(0) : NULL;
     uint32_t group = 0;
 
+    (void)unused;
     for (uint32_t first = 0, end; list && first < graph->pass_count; first = end) {
         end = vkb_graph_group_end(graph, first);
-        if (!ran[first])
-            continue;
-        if (dependencies ? !vkb_append_item(list, describe_dependencies(graph, first, end))
-                         : !add_group(list, graph, first, end, group))
+        if (ran[first] && !add_group(list, graph, first, end, group++))
             Py_CLEAR(list);
-        ++group;
     }
     vkb_free(ran);
     return list;
-}
-
-static PyObject *get_passes(PyObject *object, void *unused)
-{
-    (void)unused;
-    return describe_groups(object, false);
-}
-
-static PyObject *get_dependencies(PyObject *object, void *unused)
-{
-    (void)unused;
-    return describe_groups(object, true);
 }
 
 static PyObject *get_outputs(PyObject *object, void *unused)
@@ -521,10 +452,6 @@ static PyGetSetDef attributes[] = {
     {"passes", get_passes, NULL,
      "[(name, shader, reads, writes, variant, number of its render pass), ...] of what runs where "
      "nothing has run before.",
-     NULL},
-    {"dependencies", get_dependencies, NULL,
-     "Of each render pass: ((source subpass, target subpass, source stages, target stages, source "
-     "access, target access, flags), ...)",
      NULL},
     {"size", get_size, NULL, "Bytes of all outputs.", NULL},
     {"image_size", get_image_size, NULL, "Bytes of all images on the device.", NULL},

@@ -34,20 +34,4 @@ size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);
 // Of a batch: bytes from the output of an image to that of the next.
 size_t vkb_layer_stride(const struct vkb_plan *plan, uint32_t output);
 
-struct vkb_cotangents;
-
-// The derivatives that a plan is of.
-struct vkb_portion {
-    const struct vkb_cotangents *cotangents;
-    uint32_t first;    // of the images of derivatives
-    bool is_possible;  // whether all passes have adjoints
-};
-
-// Makes a plan; `renderer` is the serial of its renderer, or 0, and `portion` may be NULL. NULL
-// with an exception set.
-PyObject *vkb_new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                       enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                       PyObject *settings_object, struct vkb_settings *settings,
-                       struct vkb_portion *portion, PyObject *names);
-
 #endif

@@ -3,8 +3,6 @@
 #include "python/plan.h"
 #include "python/values.h"
 
-#include <stdio.h>
-
 // Whether the emission or the mask fits the image. A missing one does.
 static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
 {
@@ -16,11 +14,8 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
             && (kind == VKB_INPUT_MASK
                 || (other->format == image->format && other->channels == image->channels))))
         return true;
-    if (kind == VKB_INPUT_MASK)
-        PyErr_SetString(PyExc_ValueError, "mask: its size differs from the image's");
-    else
-        PyErr_SetString(PyExc_ValueError,
-                        "emission: its shape and dtype are not those of the image");
+    PyErr_Format(PyExc_ValueError, "%s: its size or dtype differs from the image's",
+                 kind == VKB_INPUT_MASK ? "mask" : "emission");
     return false;
 }
 
@@ -84,43 +79,16 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
     return (PyObject *)self;
 }
 
-static bool read_shading(PyObject *object, struct vkb_source *source)
-{
-    PyObject *text = PyUnicode_AsUTF8String(object);
-
-    if (!text)
-        return false;
-    snprintf(source->shading, sizeof source->shading, "%s", PyBytes_AsString(text));
-    Py_DECREF(text);
-    return true;
-}
-
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
 {
-    PyObject *scene_tuple, *camera, *shading;
-    struct vkb_source source = {.kind = VKB_SOURCE_SCENE};
-    struct vkb_scene_source *scene = &source.scene;
+    PyObject *block, *pictures, *arrays;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!(O&O&)Odd:scene_source", &PyTuple_Type, &scene_tuple,
-                          &PyTuple_Type, &camera, vkb_read_uint32, &scene->size.width,
-                          vkb_read_uint32, &scene->size.height, &shading, &scene->time,
-                          &scene->glow_intensity)
-        || !vkb_read_camera(camera, &scene->camera) || !read_shading(shading, &source))
+    if (!PyArg_ParseTuple(arguments, "SSO!:scene_source", &block, &pictures, &PyTuple_Type,
+                          &arrays))
         return NULL;
     struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
-    if (!self)
-        return NULL;
-    if (!vkb_read_scene(scene_tuple, &self->scene)) {
-        Py_DECREF(self);
-        return NULL;
-    }
-    const struct vkb_scene_data *data = &self->scene.data;
-    scene->has_sky = data->sky.level_count > 0;
-    scene->has_glow = data->glow.index_count > 0;
-    scene->has_emission = data->body.emission != NULL;
-    scene->body_textured = data->body.surface_count > 0;
-    scene->glow_textured = data->glow.surface_count > 0;
-    self->source = source;
+    if (self && !vkb_read_scene(block, pictures, arrays, &self->scene, &self->source))
+        Py_CLEAR(self);
     return (PyObject *)self;
 }
 

@@ -46,28 +46,6 @@ static VkDeviceSize scene_size(const struct vkb_scene_data *data)
     return size;
 }
 
-static void join(float out[4], const float given[3], float emission)
-{
-    memcpy(out, given, 3 * sizeof *given);
-    out[3] = emission;
-}
-
-static VkDeviceSize stage_vertices(struct vkb_staging *staging, const struct vkb_mesh_data *data)
-{
-    static const float none[3];
-    VkDeviceSize offset;
-    struct vkb_vertex *vertices = vkb_stage(staging, vertex_bytes(data), &offset);
-
-    for (size_t i = 0; i < data->vertex_count; ++i) {
-        const float *given = data->vertices + VKB_GIVEN_FLOATS * i;
-        const float *emission = data->emission ? data->emission + 3 * i : none;
-        join(vertices[i].position, given, emission[0]);
-        join(vertices[i].normal, given + 3, emission[1]);
-        join(vertices[i].colour, given + 6, emission[2]);
-    }
-    return offset;
-}
-
 static VkDeviceSize stage_bytes(struct vkb_staging *staging, const void *data, size_t size)
 {
     VkDeviceSize offset;
@@ -101,7 +79,7 @@ static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
     mesh->plain_count = data->index_count;
     if (data->index_count == 0)
         return true;
-    const VkDeviceSize vertices = stage_vertices(staging, data);
+    const VkDeviceSize vertices = stage_bytes(staging, data->vertices, vertex_bytes(data));
     const VkDeviceSize indices = stage_bytes(staging, data->indices, index_bytes(data));
     return vkb_staging_load_buffer(device, commands, staging, vertices, vertex_bytes(data),
                                    VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, &mesh->vertices, error)
@@ -196,81 +174,6 @@ void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
         vkb_texture_destroy(device, &scene->textures[i]);
     vkb_free(scene->textures);
     *scene = (struct vkb_scene){0};
-}
-
-// Column-major: m[column][row].
-typedef double matrix[4][4];
-
-static void set_identity(matrix m)
-{
-    memset(m, 0, sizeof(matrix));
-    for (int i = 0; i < 4; ++i)
-        m[i][i] = 1.0;
-}
-
-// m = m * translation
-static void translate(matrix m, double x, double y, double z)
-{
-    for (int row = 0; row < 4; ++row)
-        m[3][row] += m[0][row] * x + m[1][row] * y + m[2][row] * z;
-}
-
-// m = m * rotation by `angle` radians around axis 0, 1 or 2
-static void rotate(matrix m, int axis, double angle)
-{
-    const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-    const double c = cos(angle), s = sin(angle);
-
-    for (int row = 0; row < 4; ++row) {
-        double at_a = m[a][row], at_b = m[b][row];
-        m[a][row] = c * at_a + s * at_b;
-        m[b][row] = c * at_b - s * at_a;
-    }
-}
-
-// out = a * b, without the last row, which is 0 0 0 1.
-static void store_product(matrix a, matrix b, float out[3][4])
-{
-    for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 4; ++column) {
-            double sum = 0.0;
-            for (int i = 0; i < 4; ++i)
-                sum += a[i][row] * b[column][i];
-            out[row][column] = (float)sum;
-        }
-}
-
-void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
-                        struct vkb_mesh_params *params)
-{
-    const double pi = 3.14159265358979323846;
-    const double degree = pi / 180.0, turn = 2.0 * pi;
-    const double focal = 1.0 / tan(camera->fov * degree / 2.0);
-    const double near = camera->near, far = camera->far;
-    matrix view, model;
-
-    // Perspective with y down and depth 0..1 (the forward system's camera).
-    params->projection[0][0] = (float)(focal / aspect);
-    params->projection[0][1] = (float)focal;
-    params->projection[0][2] = (float)(far / (near - far));
-    params->projection[0][3] = (float)(near * far / (near - far));
-
-    set_identity(view);
-    translate(view, camera->position[0], camera->position[1], camera->position[2]);
-    for (int axis = 0; axis < 3; ++axis)
-        rotate(view, axis, camera->rotation[axis] * degree);
-    // The inverse of a rotation is its transpose.
-    for (int axis = 0; axis < 3; ++axis) {
-        params->sky[0][axis] = (float)-view[axis][2];
-        params->sky[1][axis] = (float)(view[axis][0] * aspect / focal);
-        params->sky[2][axis] = (float)(view[axis][1] / focal);
-    }
-
-    set_identity(model);
-    translate(model, 0.25 * sin(turn * time), -1.0, 0.25 * cos(turn * time));
-    rotate(model, 0, -0.15 * sin(turn * time));
-    rotate(model, 1, turn * time);
-    store_product(view, model, params->model_view);
 }
 
 static double length(const float vector[4])

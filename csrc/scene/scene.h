@@ -17,7 +17,6 @@ enum {
     VKB_VERTEX_ATTRIBUTES = 3,
     VKB_TEXTURED_ATTRIBUTES = 4,
     VKB_VERTEX_BINDINGS = 2,
-    VKB_GIVEN_FLOATS = 9,
     VKB_TEXCOORDS = 4,
 };
 extern const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES];
@@ -32,11 +31,10 @@ struct vkb_surface {
 // Host memory that the caller keeps alive. No vertices: there is no such mesh. The last indices are
 // those of the surfaces, in order.
 struct vkb_mesh_data {
-    const float *vertices;   // position, normal and colour of each vertex
-    const float *emission;   // three floats for each vertex; NULL: no emission
+    const struct vkb_vertex *vertices;
     const float *texcoords;  // four for each: base colour, emission; NULL: no surfaces
     const uint32_t *indices;
-    struct vkb_surface *surfaces;
+    const struct vkb_surface *surfaces;
     uint32_t vertex_count, index_count, surface_count;
 };
 
@@ -64,13 +62,6 @@ struct vkb_scene {
     uint32_t texture_count;
 };
 
-struct vkb_camera {
-    double position[3];
-    double rotation[3];  // degrees around x, y, z
-    double fov;          // vertical, degrees
-    double near, far;
-};
-
 // Records the upload of the data, which replaces the scene's content. The device must not use the
 // old content any more. Call vkb_scene_end when the commands have run. On failure the scene is
 // empty or unchanged. An index beyond the vertices is a failure.
@@ -80,10 +71,6 @@ bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *comma
 void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data *data,
                    struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
-
-// Writes the matrices at `time` (in turns).
-void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
-                        struct vkb_mesh_params *params);
 
 // Whether every pixel of a target of that size has less than a texel of the sky, so that no smaller
 // level is read. llvmpipe compiles a view of one level in half the time.

@@ -58,7 +58,6 @@ struct uuid {
     unsigned char bytes[16];
 };
 
-// Those in the second list may be missing.
 #define FUNCTIONS(NAME) \
     NAME(cuInit, "cuInit", (unsigned)) \
     NAME(cuGetErrorName, "cuGetErrorName", (result, const char **)) \
@@ -100,15 +99,13 @@ struct uuid {
          (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
     NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *)) \
     NAME(cuMemcpyHtoDAsync, "cuMemcpyHtoDAsync_v2", \
-         (vkb_cuda_address, const void *, size_t, void *))
-#define LATER_FUNCTIONS(NAME) \
+         (vkb_cuda_address, const void *, size_t, void *)) \
     NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *)) \
     NAME(cuCtxWaitEvent, "cuCtxWaitEvent", (void *, void *))
 
 struct vkb_cuda {
 #define MEMBER(name, symbol, arguments) result(*name) arguments;
     FUNCTIONS(MEMBER)
-    LATER_FUNCTIONS(MEMBER)
 #undef MEMBER
     int device, ordinal;
     void *context, *stream;
@@ -147,18 +144,14 @@ static bool load(struct vkb_cuda *cuda, struct vkb_error *error)
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "CUDA: libcuda.so.1 does not open; arrays on the device need NVIDIA's "
                         "driver");
-#define LATER_LOAD(member, symbol, arguments) \
-    function = dlsym(library, symbol); \
-    memcpy(&cuda->member, &function, sizeof function);
 #define LOAD(member, symbol, arguments) \
-    LATER_LOAD(member, symbol, arguments) \
+    function = dlsym(library, symbol); \
+    memcpy(&cuda->member, &function, sizeof function); \
     if (!function) \
         return vkb_fail(error, VKB_ERROR_GENERAL, \
-                        "CUDA: libcuda.so.1 has no %s; a newer driver is needed", symbol);
+                        "CUDA: libcuda.so.1 has no %s; CUDA 12.5 or newer is needed", symbol);
     FUNCTIONS(LOAD)
-    LATER_FUNCTIONS(LATER_LOAD)
 #undef LOAD
-#undef LATER_LOAD
     return true;
 }
 
@@ -488,7 +481,7 @@ bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to
 {
     struct vkb_error ignored;
 
-    return cuda->cuCtxWaitEvent && enter(cuda, &ignored)
+    return enter(cuda, &ignored)
         && leave(cuda, cuda->cuCtxWaitEvent(cuda->context, to->event) == 0);
 }
 
@@ -514,17 +507,12 @@ bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 
-bool vkb_cuda_can_mark(const struct vkb_cuda *cuda)
-{
-    return cuda->cuCtxRecordEvent != NULL;
-}
-
 bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
 {
     struct vkb_error ignored;
 
     // Of all streams, since nothing tells on which ones the memory was used.
-    return vkb_cuda_can_mark(cuda) && enter(cuda, &ignored)
+    return enter(cuda, &ignored)
         && leave(cuda, cuda->cuCtxRecordEvent(cuda->context, memory->event) == 0);
 }
 

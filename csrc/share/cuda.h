@@ -77,8 +77,8 @@ bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error);
 // Makes all work that the context gets from now on wait for the copy, so that its source can be
-// freed or overwritten: nothing tells which stream would do that. False where drivers are too old,
-// or while a graph is captured, which becomes invalid; then the host has to wait.
+// freed or overwritten: nothing tells which stream would do that. False while a graph is captured,
+// which becomes invalid; then the host has to wait.
 bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to);
 bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
@@ -86,9 +86,7 @@ bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from
                     struct vkb_error *error);
 
 // Remembers the work that the context has got so far, which may use the memory; and whether it is
-// over. Older drivers cannot mark it, nor is it possible while a stream is captured into a graph,
-// which becomes invalid.
-bool vkb_cuda_can_mark(const struct vkb_cuda *cuda);
+// over. It is not possible while a stream is captured into a graph, which becomes invalid.
 bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 

@@ -4,9 +4,8 @@
 
 #include "execute/record.h"
 
-// The usage that an image needs for the dispatch between it and exported memory, if there is one.
-VkImageUsageFlags vkb_exported_usage(const struct vkb_device *device,
-                                     const struct vkb_image_row *row, enum vkb_access access);
+// The usage of an image of that format whose pixels go to exported memory.
+VkImageUsageFlags vkb_exported_usage(enum vkb_format format);
 
 // Fails with a value error if a dispatch cannot read the image: its rows are too far apart.
 bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input *input,

@@ -44,7 +44,7 @@ struct vkb_exports *vkb_exports_create(const struct vkb_device *device, struct v
 {
     struct vkb_exports *exports;
 
-    if (!device->exports) {
+    if (!device->exports || !device->dispatch) {
         vkb_fail(error, VKB_ERROR_VALUE,
                  "device: the adapter %s cannot share memory with CUDA; use arrays on the host",
                  device->adapter.name);
@@ -97,17 +97,8 @@ static struct vkb_export *create_export(struct vkb_exports *exports, uint64_t si
     return NULL;
 }
 
-// Memory whose last use is not known to be over is never used again.
-static bool is_unused(struct vkb_export *one)
-{
-    const struct vkb_exports *exports = one->exports;
-
-    if (one->given_back <= exports->settled)
-        return true;
-    return one->marked && vkb_cuda_passed(exports->cuda, &one->memory);
-}
-
-// The smallest that is up to an eighth too large and that no stream uses any more.
+// The smallest that is up to an eighth too large and that no stream uses any more. Memory whose
+// last use is not known to be over is never used again.
 static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t size)
 {
     struct vkb_export *found = NULL;
@@ -117,7 +108,8 @@ static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t 
         one->marked = one->marked || vkb_cuda_mark(exports->cuda, &one->memory);
     for (struct vkb_export *one = exports->idle; one; one = one->next)
         if (one->size >= size && one->size - size <= size / 8 + GRANULE
-            && (!found || one->size < found->size) && is_unused(one))
+            && (!found || one->size < found->size) && one->marked
+            && vkb_cuda_passed(exports->cuda, &one->memory))
             found = one;
     return found;
 }
@@ -211,21 +203,6 @@ void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
     VKB_UNLINK(&exports->taken, one);
     VKB_PUSH(&exports->idle, one);
     exports->idle_size += one->size;
-    one->given_back = ++exports->last_given_back;
-}
-
-uint64_t vkb_exports_unmarked(const struct vkb_exports *exports)
-{
-    return !vkb_cuda_can_mark(exports->cuda) && exports->idle
-                && exports->last_given_back > exports->settled
-             ? exports->last_given_back
-             : 0;
-}
-
-void vkb_exports_set_settled(struct vkb_exports *exports, uint64_t given_back)
-{
-    if (given_back > exports->settled)
-        exports->settled = given_back;
 }
 
 struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports)
@@ -244,16 +221,6 @@ void vkb_exports_remove(struct vkb_export *one)
 {
     VKB_UNLINK(&one->exports->taken, one);
     destroy_export(one);
-}
-
-void vkb_exports_begin_use(struct vkb_exports *exports)
-{
-    ++exports->users;
-}
-
-bool vkb_exports_end_use(struct vkb_exports *exports)
-{
-    return --exports->users == 0;
 }
 
 void vkb_exports_free(struct vkb_exports *exports)

@@ -14,9 +14,8 @@ struct vkb_export {
     struct vkb_cuda_memory memory;
     uint64_t size;
     struct vkb_exports *exports;
-    bool filling;         // CUDA may still copy to it, and no point tells when it is filled
-    bool marked;          // of an idle one: its event tells when its last use is over
-    uint64_t given_back;  // the number of the return that made it idle
+    bool filling;  // CUDA may still copy to it, and no point tells when it is filled
+    bool marked;   // of an idle one: its event tells when its last use is over
     // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
     uint64_t filled, drawn;
 };
@@ -34,8 +33,6 @@ struct vkb_exports {
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
     uint64_t idle_size;
-    // Numbers of returns: of the last one, and of the last one before CUDA finished all work.
-    uint64_t last_given_back, settled;
     // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
     struct vkb_shared_timeline filled, drawn;
 };
@@ -48,8 +45,6 @@ void vkb_exports_close(struct vkb_exports *exports, bool settled);
 
 // Each taken memory has a user, and so has each call that leaves the lock. The last one of closed
 // exports frees them with vkb_exports_free, without the lock: true.
-void vkb_exports_begin_use(struct vkb_exports *exports);
-bool vkb_exports_end_use(struct vkb_exports *exports);
 void vkb_exports_free(struct vkb_exports *exports);
 
 // Takes at least `size` bytes, of undefined content.
@@ -77,11 +72,6 @@ bool vkb_exports_settle(const struct vkb_exports *exports);
 // The device must have finished all work on it, and CUDA a copy to it. What CUDA's streams have got
 // so far may still use it.
 void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one);
-// Where drivers are too old to mark what was given back, the host has to wait with vkb_cuda_settle
-// before vkb_exports_take can use it again: the number to tell vkb_exports_set_settled afterwards,
-// or 0.
-uint64_t vkb_exports_unmarked(const struct vkb_exports *exports);
-void vkb_exports_set_settled(struct vkb_exports *exports, uint64_t given_back);
 
 // Idle memory that is not kept, taken; NULL: none. The caller frees its `memory` with
 // vkb_cuda_free, which waits and so needs no lock, and then removes it.

@@ -6,7 +6,7 @@
 enum {
     BINDINGS = 3,
     GROUP_SIZE = 128,  // of strided_copy.glsl
-    TILE_WIDTH = 16,   // of the pixels of a group, if it writes to an image
+    TILE_WIDTH = 16,   // of the pixels of a group that writes to an image
     TILE_HEIGHT = GROUP_SIZE / TILE_WIDTH,
     MAX_GROUPS = 0xffff,  // along x, which every device can do
 };
@@ -17,7 +17,6 @@ static const struct kind {
     const struct vkb_shader *shader;
     VkDescriptorType types[BINDINGS];
 } kinds[VKB_STRIDED_COPY_COUNT] = {
-    [VKB_STRIDED_COPY_BUFFER] = {&vkb_shader_strided_copy_buffer_comp, {BUFFER, BUFFER, BUFFER}},
     [VKB_STRIDED_COPY_TO_IMAGE] = {&vkb_shader_strided_copy_to_image_comp,
                                    {BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, BUFFER}},
     [VKB_STRIDED_COPY_FROM_IMAGE] = {&vkb_shader_strided_copy_from_image_comp,

@@ -1,5 +1,5 @@
-// A dispatch outside of the graph: moves elements between images and buffers with any strides, and
-// counts NaN and infinity among them.
+// A dispatch outside of the graph: moves pixels from a buffer with any strides to an image, and
+// counts NaN and infinity among them, or from an image to a dense buffer.
 #ifndef VKB_STRIDED_COPY_H
 #define VKB_STRIDED_COPY_H
 
@@ -7,7 +7,6 @@
 #include "vulkan/memory.h"
 
 enum vkb_strided_copy_kind {
-    VKB_STRIDED_COPY_BUFFER,
     VKB_STRIDED_COPY_TO_IMAGE,
     VKB_STRIDED_COPY_FROM_IMAGE,
     VKB_STRIDED_COPY_TO_LAYERS,
@@ -29,12 +28,13 @@ bool vkb_strided_copy_create(const struct vkb_device *device, VkPipelineCache ca
                              struct vkb_error *error);
 void vkb_strided_copy_destroy(const struct vkb_device *device, struct vkb_strided_copies *copies);
 
-// The push constants of strided_copy.comp: strides in bytes, `one` for channels that are not there.
+// The push constants of strided_copy.glsl: the layout of the buffer, strides in bytes. A copy from
+// an image is dense.
 struct vkb_strided_copy_layout {
     int32_t offset, row_stride, pixel_stride, channel_stride;
-    uint32_t width, height, channels, from_channels;
-    uint32_t size, one, stores, is_float;
-    int32_t layer_stride;  // in the buffer; there, a multiple of 16
+    uint32_t width, height, channels;
+    uint32_t size, stores;
+    int32_t layer_stride;  // a multiple of 16 where a copy is from images
     uint32_t aligned;      // pixels of four channels that begin with words, without gaps
 };
 

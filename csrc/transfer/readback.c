@@ -25,7 +25,6 @@ void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *
 {
     vkb_readback_release(device, readback);
     vkb_buffer_destroy(device, &readback->staging);
-    vkb_buffer_destroy(device, &readback->scratch);
     vkb_buffer_destroy(device, &readback->counts);
     vkb_free(readback->imports);
     *readback = (struct vkb_readback){0};

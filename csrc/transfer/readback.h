@@ -44,9 +44,7 @@ struct vkb_readback {
     VkDeviceSize used;           // bytes of the staging memory
     struct vkb_buffer *imports;  // of the callers' memory, until vkb_readback_release
     size_t import_count, import_capacity;
-    // Between images and exported memory: of the device, for one image at a time; and of the host,
-    // the counts of NaN and infinity of each request.
-    struct vkb_buffer scratch, counts;
+    struct vkb_buffer counts;  // of NaN and infinity of each request, where CUDA shares memory
     bool counted;
 };
 

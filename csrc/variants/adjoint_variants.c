@@ -1,4 +1,4 @@
-// Variants of adjoint passes: transposed filters in blocks of texels.
+// Variants of adjoint passes: transposed filters in blocks of texels and in tiles.
 #include "variants/variant.h"
 
 #include "passes/taps.h"
@@ -141,19 +141,18 @@ static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb
     return vkb_table_end(&table, graph, pass->reads[1], error);
 }
 
-// The most weights that an invocation keeps along an axis, in vec4s. More than GPUs have registers
-// for, or LLVM, would be slower than the plain pass.
-enum { MAX_LINEAR = 24, MAX_REGISTERS = 16 };
+// The most weights that an invocation keeps along an axis, in vec4s. More than there are registers
+// for LLVM would be slower than the plain pass.
+enum { MAX_LINEAR = 24 };
 
-static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                       uint32_t most)
+static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
     const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
     const uint32_t kernels = x.kernels ? (uint32_t)x.kernels : 1;
 
-    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x) <= most)
-        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y) <= most);
+    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x) <= MAX_LINEAR)
+        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y) <= MAX_LINEAR);
 }
 
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
@@ -214,7 +213,7 @@ bool vkb_add_adjoint_linear(const struct vkb_variant_choice *choice,
 {
     struct vkb_pass_row row;
 
-    *fits = pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass, MAX_LINEAR)
+    *fits = pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass)
          && vkb_are_floats(choice, pass);
     if (!*fits)
         return true;
@@ -244,52 +243,124 @@ bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// Between levels of exactly half and twice the size, in tiles: along both axes at once, also where
-// the plain passes are one for each axis, of which this is the last one.
-bool vkb_add_adjoint_levels(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+static uint32_t readers_of_image(const struct vkb_graph *graph, uint32_t image)
 {
-    const bool filter = pass->block == VKB_BLOCK_adjoint_filter;
-    const int32_t exact = filter ? pass->params.adjoint_filter.exact : 0;
-    struct vkb_pass_row row;
+    uint32_t readers = 0;
 
-    *fits = exact != 0;
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    if (row.constants.direction != DIRECTION_BOTH) {
-        const struct vkb_pass_row *first = vkb_writer_of(&choice->plain, row.reads[0]);
-        replace_read(&row, row.reads[0], first->reads[0]);
-    }
-    row.constants.direction = 0;
-    row.constants.levels = 0;
-    row.gains_if_finite = true;
-    read_composite(&choice->plain, &row);
-    if (exact == EXACT_HALF)
-        vkb_make_dispatch(&row, &vkb_shader_adjoint_halve_comp, ADJOINT_HALVE_COLUMNS,
-                          ADJOINT_HALVE_ROWS);
-    else
-        vkb_make_dispatch(&row, &vkb_shader_adjoint_double_comp, ADJOINT_DOUBLE_COLUMNS,
-                          ADJOINT_DOUBLE_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        readers += graph->passes[i].block == VKB_BLOCK_adjoint_filter
+                && graph->passes[i].reads[0] == image;
+    return readers;
 }
 
-// On a GPU, blocks are faster where a filter has several kernels, of which each texel needs all
-// pixels. With one, most texels are in a cache.
+// The pass along the other axis that only this one reads; NULL: there is none.
+static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
+                                             const struct vkb_pass_row *pass)
+{
+    const struct vkb_pass_row *first = vkb_writer_of(graph, pass->reads[0]);
+
+    return pass->constants.direction != DIRECTION_BOTH && first
+                && first->block == VKB_BLOCK_adjoint_filter && !first->constants.add_own
+                && !first->constants.from_image
+                && first->constants.direction == !pass->constants.direction
+                && readers_of_image(graph, pass->reads[0]) == 1
+             ? first
+             : NULL;
+}
+
+// The texel of the source at or before the position of a row of the target.
+static int32_t row_before(int32_t ratio, int32_t row)
+{
+    return ratio == EXACT_HALF ? 2 * row : ratio == EXACT_SAME ? row : (row + 1) / 2 - 1;
+}
+
+// Gives `row` the window of columns, from their first reader on, and of rows, which begin there or,
+// if their ratio is simple, as those of a filter.
+static void set_windows(const struct axis *x, const struct axis *y, int32_t ratio,
+                        struct vkb_pass_row *row)
+{
+    struct vkb_constants *constants = &row->constants;
+    int32_t columns = 1, rows = 1, around = 1;
+
+    for (uint32_t texel = 0; texel < x->size; ++texel)
+        columns = (int32_t)fmaxf((float)columns, entry_of(x, texel)[1]);
+    for (uint32_t texel = 0; texel < y->size; ++texel) {
+        const int32_t count = (int32_t)entry_of(y, texel)[1];
+        const int32_t before = row_before(ratio, (int32_t)texel) - (int32_t)entry_of(y, texel)[0];
+        rows = rows > count ? rows : count;
+        around = around > before + 1 ? around : before + 1;
+        around = around > count - 1 - before ? around : count - 1 - before;
+    }
+    constants->exact_rows = ratio && 2 * around <= MAX_WINDOW ? ratio : 0;
+    rows = constants->exact_rows ? 2 * around : rows;
+    constants->window = columns > rows ? columns : rows;
+    constants->taken_x = constants->taken_y = 0;
+    for (int32_t kernel = 0; columns < constants->window && kernel < constants->kernels; ++kernel)
+        constants->taken_x |= ((1 << columns) - 1) << MAX_WINDOW * kernel;
+}
+
+// The most rows that a tile reads; 0: the readers of a row begin above those of the row before.
+static uint32_t tile_rows(const struct axis *y, const struct vkb_constants *constants)
+{
+    const int32_t ratio = constants->exact_rows;
+    int32_t most = 0;
+
+    for (uint32_t texel = 0; texel + 1 < y->size && !ratio; ++texel)
+        if (entry_of(y, texel)[0] > entry_of(y, texel + 1)[0])
+            return 0;
+    for (uint32_t texel = 0; texel < y->size; texel += FILTER_TILE_ROWS) {
+        const uint32_t last = texel + FILTER_TILE_ROWS - 1;
+        const int32_t rows =
+            ratio ? row_before(ratio, (int32_t)last) - row_before(ratio, (int32_t)texel)
+                  : (int32_t)(entry_of(y, last)[0] - entry_of(y, texel)[0]);
+        most = rows > most ? rows : most;
+    }
+    return (uint32_t)(most + constants->window);
+}
+
+// Makes `row` tiles along both axes at once, also where the plain passes are one for each axis, of
+// which `pass` is the last one. False: few readers at positions that differ from row to row, most
+// of which are in a cache, or windows that are too large.
+static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       struct vkb_pass_row *row)
+{
+    const struct vkb_graph *graph = choice->graph;
+    const struct vkb_pass_row *other = other_axis(&choice->plain, pass);
+    const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
+
+    if (!other && pass->constants.direction != DIRECTION_BOTH)
+        return false;
+    const struct axis x = axis_of(graph, other && vertical ? other : pass, false);
+    const struct axis y = axis_of(graph, other && !vertical ? other : pass, true);
+    if (other)
+        replace_read(row, pass->reads[0], other->reads[0]);
+    row->params.adjoint_filter.start_x = (int32_t)x.start;
+    row->params.adjoint_filter.start_y = (int32_t)y.start;
+    row->params.adjoint_filter.gain *= other ? other->params.adjoint_filter.gain : 1.0f;
+    row->constants.direction = 0;
+    row->constants.kernels = pass->constants.levels ? pass->constants.levels : 1;
+    const int32_t ratio = vkb_ratio_of(graph->images[row->reads[0]].height, y.size);
+    if (!other && !ratio && pass->constants.levels < 2)
+        return false;
+    set_windows(&x, &y, ratio, row);
+    const uint32_t source_rows = tile_rows(&y, &row->constants);
+    return row->constants.window <= MAX_WINDOW && source_rows > 0
+        && vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, source_rows, row);
+}
+
 bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
-    struct vkb_pass_row row;
+    struct vkb_pass_row row, tiles;
 
     *fits = pass->block == VKB_BLOCK_adjoint_filter;
     if (!*fits)
         return true;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    read_composite(&choice->plain, &row);
-    if (pass->constants.levels < 2 || !fits_lists(choice->graph, pass, MAX_REGISTERS))
-        return vkb_add_fullscreen(choice, &row, error);
-    vkb_make_dispatch(&row, &vkb_shader_adjoint_taps_comp_rgba32float,
-                      ADJOINT_SIDE * PIXEL_INVOCATIONS, ADJOINT_SIDE * PIXEL_INVOCATIONS);
-    return add_tables(choice, pass, &row, error) && vkb_graph_add_pass(choice->graph, &row, error);
+    memcpy(&tiles, &row, sizeof tiles);
+    const bool fits_tiles = make_tiles(choice, pass, &tiles);
+    read_composite(&choice->plain, fits_tiles ? &tiles : &row);
+    return fits_tiles ? vkb_graph_add_pass(choice->graph, &tiles, error)
+                      : vkb_add_fullscreen(choice, &row, error);
 }

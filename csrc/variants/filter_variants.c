@@ -8,7 +8,6 @@
 
 static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter);
-static const struct vkb_shader *const halved_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(filter_comp);
 static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter_final);
 static const struct vkb_shader *const mixed_shaders[VKB_FORMAT_COUNT] = {
@@ -105,15 +104,6 @@ static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row
         && (!pass->constants.add_own || vkb_has_format_of(graph, pass->reads[1], pass->targets[0]));
 }
 
-// Whether sides are in a simple ratio: EXACT_*; 0: they are not.
-static int32_t ratio_of(uint32_t source, uint32_t target)
-{
-    return source == 2 * target ? EXACT_HALF
-         : source == target     ? EXACT_SAME
-         : 2 * source == target ? EXACT_DOUBLE
-                                : 0;
-}
-
 // Whether the weights of a position depend on the ratio of sizes alone, not on how far away the
 // edges are.
 static bool has_phases(const struct vkb_pass_row *pass)
@@ -137,8 +127,8 @@ static void take_filter(const struct vkb_variant_choice *choice, const struct vk
     row->constants.window = pass->constants.window;
     row->constants.taken_x = pass->constants.taken_x;
     row->constants.taken_y = pass->constants.taken_y;
-    row->constants.exact = ratio_of(source->width, target->width);
-    row->constants.exact_rows = has_phases(pass) ? ratio_of(source->height, target->height) : 0;
+    row->constants.exact = vkb_ratio_of(source->width, target->width);
+    row->constants.exact_rows = has_phases(pass) ? vkb_ratio_of(source->height, target->height) : 0;
 }
 
 // Makes `row` the strips of the filter `pass`.
@@ -168,27 +158,6 @@ bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_
         && vkb_add_from_image(choice, pass, &row, error);
 }
 
-// On a GPU, strips are faster than tiles where the source has twice the size.
-bool vkb_add_halved(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
-{
-    struct vkb_pass_row row;
-
-    *fits = has_window(pass) && !pass->constants.add_own;
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    take_filter(choice, pass, &row);
-    *fits = row.constants.exact == EXACT_HALF && row.constants.exact_rows == EXACT_HALF;
-    if (!*fits)
-        return true;
-    vkb_make_dispatch(&row, halved_shaders[choice->plain.images[pass->reads[0]].format],
-                      HALVE_INVOCATIONS * HALVE_COLUMNS, HALVE_ROWS);
-    row.reading = VKB_READING_LOADED;
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_from_image(choice, pass, &row, error);
-}
-
 // The most rows of its source that a tile of a filter reads.
 static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
@@ -197,24 +166,6 @@ static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_r
 
     return (uint32_t)(((FILTER_TILE_ROWS - 1) * source + target - 1) / target) + 1
          + (uint32_t)pass->constants.window;
-}
-
-// The columns of a tile; 0: none fits. Wide tiles compute fewer weights, but a workgroup of more
-// than 24 KiB leaves processors idle.
-static uint32_t tile_columns(const struct vkb_variant_choice *choice,
-                             const struct vkb_pass_row *pass)
-{
-    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 24 << 10, VEC4 = 4 * sizeof(float) };
-    const uint32_t limit = choice->device->limits.maxComputeSharedMemorySize;
-    const uint32_t window = (uint32_t)pass->constants.window;
-    const uint32_t sums = (uint32_t)pass->constants.kernels * tile_rows(&choice->plain, pass);
-    uint32_t columns = WIDEST;
-
-    while (columns >= NARROWEST
-           && VEC4 * ((window + 2) * (columns + FILTER_TILE_ROWS) + (sums + 1) * (columns + 1))
-                  > (limit < FASTEST ? limit : FASTEST))
-        columns /= 2;
-    return columns < NARROWEST ? 0 : columns;
 }
 
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
@@ -281,15 +232,8 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
 static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        struct vkb_pass_row *row, const struct vkb_shader *shader)
 {
-    const uint32_t columns = tile_columns(choice, pass);
-
-    if (!columns)
-        return false;
     take_filter(choice, pass, row);
-    row->constants.source_rows = (int32_t)tile_rows(&choice->plain, pass);
-    row->constants.group_width = (int32_t)columns;
-    vkb_make_dispatch(row, shader, columns, FILTER_TILE_ROWS);
-    return true;
+    return vkb_make_tiles(choice, shader, tile_rows(&choice->plain, pass), row);
 }
 
 bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -302,7 +246,9 @@ bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct 
         return true;
     memcpy(&row, pass, sizeof row);
     *fits = make_tiles(choice, pass, &row, &vkb_shader_filter_tile_comp);
-    return !*fits || vkb_graph_add_pass(choice->graph, &row, error);
+    return !*fits
+        || (vkb_graph_add_pass(choice->graph, &row, error)
+            && vkb_add_from_image(choice, pass, &row, error));
 }
 
 bool vkb_add_filter_tiles_final(const struct vkb_variant_choice *choice,

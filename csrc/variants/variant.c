@@ -34,6 +34,36 @@ void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, 
     row->reading = VKB_READING_LINEAR_TEXELS;
 }
 
+int32_t vkb_ratio_of(uint32_t source, uint32_t target)
+{
+    return source == 2 * target ? EXACT_HALF
+         : source == target     ? EXACT_SAME
+         : 2 * source == target ? EXACT_DOUBLE
+                                : 0;
+}
+
+bool vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
+                    uint32_t source_rows, struct vkb_pass_row *row)
+{
+    // Wide tiles compute fewer weights, but a workgroup of more than 24 KiB leaves processors idle.
+    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 24 << 10, VEC4 = 4 * sizeof(float) };
+    const uint32_t limit = choice->device->limits.maxComputeSharedMemorySize;
+    const uint32_t window = (uint32_t)row->constants.window;
+    const uint32_t sums = (uint32_t)row->constants.kernels * source_rows;
+    uint32_t columns = WIDEST;
+
+    while (columns >= NARROWEST
+           && VEC4 * ((window + 2) * (columns + FILTER_TILE_ROWS) + (sums + 1) * (columns + 1))
+                  > (limit < FASTEST ? limit : FASTEST))
+        columns /= 2;
+    if (columns < NARROWEST)
+        return false;
+    row->constants.source_rows = (int32_t)source_rows;
+    row->constants.group_width = (int32_t)columns;
+    vkb_make_dispatch(row, shader, columns, FILTER_TILE_ROWS);
+    return true;
+}
+
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     bool fits = choice->device->linear_texels;

@@ -23,7 +23,7 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_tiles;
 // For derivatives of these by the image.
 vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
 // Levels of exactly half the size, with taps that are weighted by brightness.
@@ -38,16 +38,14 @@ vkb_variant_add vkb_add_nine;
 // Filters in strips and in tiles, also fused with the composite; the sum of several levels that are
 // filtered.
 vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_filter_tiles,
-    vkb_add_filter_tiles_final, vkb_add_halved, vkb_add_gathered;
+    vkb_add_filter_tiles_final, vkb_add_gathered;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.
 vkb_variant_add vkb_add_lines, vkb_add_transform;
-// Adjoint passes: of images with linear texels; transposed filters, in blocks of texels or fused
-// with the composite's.
+// Adjoint passes: of images with linear texels; of groups of taps; transposed filters in tiles,
+// fused with the composite's.
 vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
-// Transposed filters between levels of exactly half and twice the size, in tiles.
-vkb_variant_add vkb_add_adjoint_levels;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;
 
@@ -86,6 +84,14 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height);
+// Whether sides are in a simple ratio: EXACT_*; 0: they are not.
+int32_t vkb_ratio_of(uint32_t source, uint32_t target);
+
+// Turns a pass with the constants of a filter into its tiles, which read at most `source_rows`
+// rows. False: no tile fits.
+bool vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
+                    uint32_t source_rows, struct vkb_pass_row *row);
+
 // Turns a pass into a dispatch that accesses its images with linear texels. Each of the
 // ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.
 void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,

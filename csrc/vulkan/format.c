@@ -79,11 +79,3 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
             .aspect = VK_IMAGE_ASPECT_DEPTH_BIT,
         },
 };
-
-enum vkb_format vkb_format_by_name(const char *name)
-{
-    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
-        if (strcmp(vkb_formats[format].name, name) == 0)
-            return (enum vkb_format)format;
-    return VKB_FORMAT_NONE;
-}

@@ -56,7 +56,4 @@ static inline bool vkb_is_rounded(enum vkb_format format)
     return format == VKB_FORMAT_RG11B10_UFLOAT || format == VKB_FORMAT_RGBA8_SRGB;
 }
 
-// The format of that name; VKB_FORMAT_NONE if there is none.
-enum vkb_format vkb_format_by_name(const char *name);
-
 #endif

@@ -20,7 +20,7 @@ def frames(picture: Image) -> dict[str, Image]:
     """Return the engine's buffers, in the order in which it writes them.
 
     With frames of your own engine, this is
-    ``{name: vkbloom.testing.read_frame(f"{name}.exr") for name in ("glow", ...)}``.
+    ``{name: vkbloom.read(f"{name}.exr") for name in ("glow", ...)}``.
     """
     luminance = picture @ np.array([0.2126, 0.7152, 0.0722], np.float32)
     glow = np.where(luminance[..., np.newaxis] > THRESHOLD, picture, np.float32(0))

@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from typing import Any, NoReturn, final
+from typing import Any, NoReturn, final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,18 +23,7 @@ _ExportedImage = (
     tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str]
     | tuple[Exported, int, tuple[int, int, int], tuple[int, int, int], str, int, int]
 )
-_Camera = tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]
-_Texture = tuple[tuple[_Array, ...], str, str, str, str, str]
-_Mesh = tuple[
-    NDArray[np.float32],
-    NDArray[np.uint32],
-    NDArray[np.float32] | None,
-    NDArray[np.float32] | None,
-    tuple[tuple[int, int, int], ...],
-]
-_Scene = tuple[int, _Mesh, _Mesh | None, tuple[_Array, ...], tuple[_Texture, ...]]
 _Pass = tuple[str, str, tuple[str, ...], tuple[str, ...], str, int]
-_Dependency = tuple[int, int, int, int, int, int, int]
 
 class Error(Exception):
     vk_call: str | None
@@ -55,30 +44,10 @@ def image_source(
     levels: tuple[_Array | _ExportedImage, ...] = (),
     /,
 ) -> Source: ...
-def scene_source(
-    scene: _Scene,
-    camera: _Camera,
-    size: tuple[int, int],
-    shading: str,
-    time: float,
-    glow_intensity: float,
-    /,
-) -> Source: ...
+def scene_source(block: bytes, pictures: bytes, arrays: tuple[NDArray[Any], ...], /) -> Source: ...
 def plan(
     source: Source, settings: object, names: tuple[str, ...] | None, variants: str = "fragment", /
 ) -> Plan: ...
-def shader(name: str, spirv: bytes, dispatch: bytes | None = None, /) -> Shader: ...
-def resource(
-    serial: int,
-    kind: int,
-    format: int,
-    sides: tuple[int, int, int, int],
-    linear: bool,
-    border: int,
-    size: int,
-    data: bytes | None,
-    /,
-) -> Resource: ...
 def read_dlpack(
     capsule: object, /
 ) -> tuple[int, tuple[int, int], tuple[int, int, int], tuple[int, ...], tuple[int, ...] | None]: ...
@@ -108,15 +77,17 @@ class Renderer:
     def cached(self) -> tuple[int, int, int]: ...
     def close(self) -> None: ...
     def pipeline_cache(self) -> bytes: ...
+    @overload
+    def plan(self, source: Source, settings: object, names: tuple[str, ...] | None, /) -> Plan: ...
+    @overload
     def plan(
         self,
         source: Source,
         settings: object,
-        names: tuple[str, ...] | None,
+        names: None,
+        cotangents: tuple[str, ...],
+        sums: bool,
         /,
-    ) -> Plan: ...
-    def adjoint(
-        self, source: Source, settings: object, names: tuple[str, ...], sums: bool, /
     ) -> Plan | None: ...
     def run(
         self,
@@ -129,7 +100,7 @@ class Renderer:
     def upload(self, source: Source, spare: Source | None, recycled: bool, /) -> Source: ...
     @property
     def instance(self) -> int: ...
-    def open_screen(self, surface: int, mailbox: bool, /) -> int: ...
+    def open_screen(self, surface: int, /) -> int: ...
     def close_screen(self, screen: int, /) -> None: ...
     def show(
         self,
@@ -144,7 +115,7 @@ class Renderer:
     def pages(self, size: int, /) -> Pages: ...
     def cuda(self) -> tuple[int, int]: ...
     def cuda_name(self, ordinal: int, /) -> str: ...
-    def dlpack(self, array: Any, /) -> Any: ...
+    def in_context(self, function: Callable[[], Any], /) -> Any: ...
     def export(self, size: int, /) -> Exported: ...
     def snapshot(
         self, what: str, address: int, size: int, stream: int, waits: bool, /
@@ -166,23 +137,11 @@ class Plan:
     @property
     def passes(self) -> list[_Pass]: ...
     @property
-    def dependencies(self) -> list[tuple[_Dependency, ...]]: ...
-    @property
     def size(self) -> int: ...
     @property
     def image_size(self) -> int: ...
     def shares_images(self, other: Plan, /) -> bool: ...
     def is_of_image(self, source: Source, /) -> bool: ...
-
-@final
-class Resource: ...
-
-@final
-class Shader:
-    @property
-    def name(self) -> str: ...
-    @property
-    def hash(self) -> str: ...
 
 @final
 class Submission:

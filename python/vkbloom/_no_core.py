@@ -38,7 +38,7 @@ def stand_in(reason: ImportError) -> ModuleType:
             "x86-64 and aarch64; elsewhere, or for a newer core, build it from the source"
         )
 
-    types = ("Renderer", "Source", "Plan", "Resource", "Shader", "Submission", "Exported", "Pages")
+    types = ("Renderer", "Source", "Plan", "Submission", "Exported", "Pages")
     for name in types:
         setattr(module, name, type(name, (), {"__module__": "vkbloom._core", "__new__": refuse}))
     # All else are functions.
@@ -50,5 +50,5 @@ def stand_in(reason: ImportError) -> ModuleType:
 
 def _as_tuples(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _as_tuples(one) for name, one in value.items()}
+        return {name: _as_tuples(part) for name, part in value.items()}
     return tuple(map(_as_tuples, value)) if isinstance(value, list) else value

@@ -21,32 +21,32 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     """
     import difflib  # noqa: PLC0415  costs start-up time
 
-    plain = {one.lower().replace("-", "_").strip("_"): one for one in known}
+    plain = {word.lower().replace("-", "_").strip("_"): word for word in known}
     asked = str(name).lower().replace("-", "_").strip("_")
     near = difflib.get_close_matches(asked, plain, 1, _MIN_RATIO)
     if not near and len(asked) >= _MIN_LETTERS:
-        near = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
+        near = [word for word in plain if asked in word.split("_") or word in asked.split("_")]
     return plain[near[0]] if near else None
 
 
-def did_you_mean(name: object, known: Iterable[str], form: str = "{!r}") -> str:
+def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" with the nearest known name; "" if none is near."""
     near = nearest(name, known)
-    return f"; did you mean {form.format(near)}?" if near is not None else ""
+    return f"; did you mean {near!r}?" if near is not None else ""
 
 
 def lacking(
-    owner: str, names: Sequence[str], own: Iterable[str], others: Mapping[str, Iterable[str]]
+    owner: str, names: Sequence[str], known: Iterable[str], others: Mapping[str, Iterable[str]]
 ) -> str:
     """Return a text that something lacks fields: what was meant, or what has them."""
-    own = list(own)
+    known = list(known)
     text = f"{owner} has no {', '.join(map(repr, names))}"
-    if near := did_you_mean(names[0], own):
+    if near := did_you_mean(names[0], known):
         return text + near
     having = [other for other, fields in others.items() if set(names) <= set(fields)]
     if having:
         return f"{text}, which {', '.join(having)} {'has' if len(having) == 1 else 'have'}"
-    return f"{text}; it has {', '.join(own)}"
+    return f"{text}; it has {', '.join(known)}"
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
@@ -54,6 +54,20 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
     known = list(known)
     near = did_you_mean(name, known) or ";"
     return f"{what} {name!r}{near} available: {', '.join(known) or 'none'}"
+
+
+def wanted(names: object, known: tuple[str, ...]) -> bytes:
+    """Return for each framebuffer that a plan has whether it is among the names: the core asks.
+
+    Raises ValueError for a name that is unknown.
+    """
+    if not isinstance(names, tuple):
+        raise TypeError(f"framebuffers: a tuple is needed, not {names!r}")
+    for name in names:
+        if name not in known:
+            raise ValueError(unknown("framebuffers: unknown framebuffer", name, known))
+    # Not a comprehension: CPython 3.11 leaks arguments of a call if it cannot allocate a cell.
+    return bytes(map(names.__contains__, known))
 
 
 class Named(Mapping[str, T]):
@@ -114,7 +128,7 @@ class Named(Mapping[str, T]):
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the name of each entry, what it is, and whose."""
-        return [(name, one.what, one.whose) for name, one in self._entries.items()]
+        return [(name, entry.what, entry.whose) for name, entry in self._entries.items()]
 
     def __repr__(self) -> str:
         width = max(map(len, self), default=0)

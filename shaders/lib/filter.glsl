@@ -7,6 +7,8 @@
 // left out, which changes no bits. Include sampling.glsl before this file. The including shader has FILTER_ROWS
 // in its block, or defines FILTER_X(i) and FILTER_Y(i), the tap of number i along an axis: offset and weights.
 
+#include "lib/window.glsl"
+
 #ifndef FILTER_X
 #define FILTER_X(i) params.taps_x[i]
 #define FILTER_Y(i) params.taps_y[i]
@@ -47,18 +49,6 @@ Axis settled(Axis axis)
     axis = within_border(axis);
     int moved = int(floor(axis.part));
     return Axis(axis.texel + moved, axis.part - float(moved), axis.size, axis.ratio);
-}
-
-// Adjacent texels, of which `first` is the first one, and their weights in each kernel.
-struct Window {
-    int first;
-    vec3 weights[MAX_WINDOW + 2];
-};
-
-// Whether a texel of a window may have a weight in a kernel, by TAKEN_X or TAKEN_Y.
-bool has_weight(int taken, int at, int kernel)
-{
-    return taken == 0 || (taken >> (MAX_WINDOW * kernel + at) & 1) != 0;
 }
 
 // The weights of a cubic B-spline whose control points are the texels.
@@ -124,10 +114,14 @@ Window window_of(Axis axis, int count, bool along_x)
     return window;
 }
 
-vec4 sum_of(vec4 sums[3])
+// The window of a pixel of the target along one axis of an image of this size.
+Window window_in(ivec2 size, ivec2 pixel, bool along_x)
 {
-    vec4 sum = sums[0];
-    [[unroll]] for (int kernel = 1; kernel < KERNELS; ++kernel)
-        sum += sums[kernel];
-    return sum;
+    ivec2 target_size = ivec2(params.target_width, params.target_height);
+    Place place = place_in_size(size, pixel, target_size);
+    vec2 ratio = vec2(size) / vec2(target_size);
+    Axis axis = axis_x(place, size, ratio);
+    if (!along_x)
+        axis = axis_y(place, size, ratio);
+    return window_of(settled(axis), WINDOW, along_x);
 }

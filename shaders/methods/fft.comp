@@ -18,7 +18,12 @@ UNIFORM_BLOCK(FFT_BLOCK);
 #ifndef TARGET_BYTES
 #define TARGET_BYTES 4
 #endif
+#ifdef LINEAR_TEXELS
 #include "variants/pixels.glsl"
+#else
+#define READ_IMAGE(number, name) \
+    layout(set = 0, binding = number, SOURCE_FORMAT) uniform readonly image2D name
+#endif
 #include "lib/fourier.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;

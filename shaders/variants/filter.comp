@@ -1,7 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#pragma compile images
 // A filter, and the share of an image of the target's size. With FROM_IMAGE it reads the image itself in
 // place of the threshold pass's result.
 #include "lib/block.glsl"

@@ -5,13 +5,7 @@
 // and defines seen(), by which texels are changed.
 #include "lib/filter.glsl"
 
-#ifdef LINEAR_TEXELS
 const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES), ROWS = WINDOW_ROWS;
-#define PIXEL_AT(x, y) raw_pixel(source, read_shapes[0], x, y)
-#else
-const int COLUMNS = HALVE_COLUMNS, ROWS = HALVE_ROWS;
-#define PIXEL_AT(x, y) floatBitsToUint(imageLoad(source, ivec2(x, y)))
-#endif
 // The rows and columns that a pixel needs. At HDRP's border their place differs from the position's.
 const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
@@ -67,7 +61,8 @@ void filter_row(int row, int first)
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
             uvec4 texel = EXACT != 0 ? raw[texel_in_run(i) + 1 - KEPT / 2 + at]
-                                      : PIXEL_AT(clamp(windows[i % PHASES].first + at, 0, last.x), line);
+                                      : raw_pixel(source, read_shapes[0], clamp(windows[i % PHASES].first + at, 0, last.x),
+                                                  line);
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 if (has_weight(TAKEN_X, at, kernel))
                     sums[kernel] += windows[i % PHASES].weights[at][kernel] * seen(texel);

@@ -1,13 +1,18 @@
-// A filter for GPUs. A workgroup computes the weights of its columns and rows once, and filters each row of the
-// source that it needs along x once, into shared memory. From there an invocation adds up some rows of a column:
-// where the ratio of heights is simple (EXACT_ROWS) it loads what these share once. The including shader includes
-// sampling.glsl, declares `source`, `own` and `target`, and defines HAS_OWN, whether `own` is read, and shade(),
-// which makes a pixel of that of `own` and of the filtered one.
-#include "lib/filter.glsl"
+// A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once, and adds up
+// each row of the source that it needs along x once, into shared memory. From there an invocation adds up some rows
+// of a column: where the ratio of heights is simple (EXACT_ROWS) it loads what these share once. The including
+// shader declares `target`, includes lib/window.glsl, and defines the functions below.
 
 const int RUN = FILTER_TILE_RUN;
 
 layout(local_size_x_id = 34, local_size_y = FILTER_TILE_ROWS / FILTER_TILE_RUN) in;
+
+// Defined by the including shader: the texels of the source that a pixel adds up, a texel there or the nearest one in
+// the image, what is added to a pixel, and the pixel that is stored.
+Window window_at(ivec2 pixel, bool along_x);
+vec4 texel_at(ivec2 texel);
+vec4 own_at(ivec2 pixel);
+vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
 
 // Columns, then rows: the first texel of the window, and the weights. A constant's default is 0, which is
 // no size of an array.
@@ -17,14 +22,7 @@ shared vec4 sums[KERNELS * SOURCE_ROWS + 1][GROUP_WIDTH + 1];
 
 void keep_window(int number, ivec2 pixel)
 {
-    ivec2 size = textureSize(source, 0);
-    vec2 target_size = vec2(params.target_width, params.target_height);
-    Place place = place_in(source, pixel, ivec2(target_size));
-    bool along_x = number < GROUP_WIDTH;
-    Axis axis = axis_x(place, size, vec2(size) / target_size);
-    if (!along_x)
-        axis = axis_y(place, size, vec2(size) / target_size);
-    Window window = window_of(settled(axis), WINDOW, along_x);
+    Window window = window_at(pixel, number < GROUP_WIDTH);
     firsts[number] = window.first;
     [[unroll]] for (int i = 0; i < WINDOW; ++i)
         weights[i][number] = window.weights[i];
@@ -34,7 +32,7 @@ void keep_sums(int column, int row, int line)
 {
     vec4 sum[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
-        vec4 texel = fetch_clamped(source, ivec2(firsts[column] + i, line));
+        vec4 texel = texel_at(ivec2(firsts[column] + i, line));
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
             if (has_weight(TAKEN_X, i, kernel))
                 sum[kernel] += weights[i][column][kernel] * texel;
@@ -82,11 +80,11 @@ void main()
     ivec2 first = ivec2(gl_WorkGroupID.xy) * ivec2(GROUP_WIDTH, FILTER_TILE_ROWS), size = imageSize(target);
     int number = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
     int top = RUN * int(gl_LocalInvocationID.y);
-    vec4 level[RUN], of_kernels[RUN][3];
+    vec4 own[RUN], of_kernels[RUN][3];
 
     // First, since they take as long as the tile.
     [[unroll]] for (int i = 0; i < RUN; ++i) {
-        level[i] = HAS_OWN ? texelFetch(own, min(first + ivec2(column, top + i), size - 1), 0) : vec4(0.0);
+        own[i] = own_at(min(first + ivec2(column, top + i), size - 1));
         of_kernels[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     }
     if (number < GROUP_WIDTH)
@@ -105,8 +103,7 @@ void main()
         add_rows(column, top, line, of_kernels);
     [[unroll]] for (int i = 0; i < RUN; ++i) {
         ivec2 pixel = first + ivec2(column, top + i);
-        vec4 sum = params.coarse * (sum_of(of_kernels[i]) / params.divisor);
         if (all(lessThan(pixel, size)))
-            imageStore(target, pixel, shade(level[i], sum, pixel));
+            imageStore(target, pixel, shade(own[i], sum_of(of_kernels[i]), pixel));
     }
 }

@@ -2,7 +2,7 @@
 //
 //   LOAD           its name
 //   LOAD_IMAGE     the image, and LOAD_NUMBER its binding
-//   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4 (default); storage images have 4
+//   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4 (default)
 //   LOAD_FROM      the offset of the run from `first` in pixels, 0 (default) or less
 //   LOAD_COUNT     the number of pixels in the run; default: COLUMNS
 //
@@ -19,7 +19,6 @@
 
 void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
 {
-#ifdef LINEAR_TEXELS
     const int BYTES = LOAD_CHANNELS * CHANNEL_BYTES;
     const int BEFORE = (15 - LOAD_FROM * BYTES) / 16;
     const int COUNT = BEFORE + ((LOAD_FROM + LOAD_COUNT) * BYTES + 15) / 16;
@@ -57,13 +56,6 @@ void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
         raw[i] = first + LOAD_FROM + i < 0 ? raw[i + 1] : raw[i];
     [[unroll]] for (int i = 1; i < LOAD_COUNT; ++i)
         raw[i] = first + LOAD_FROM + i >= shape.x ? raw[i - 1] : raw[i];
-#else
-    ivec2 last = imageSize(LOAD_IMAGE) - 1;
-    [[unroll]] for (int i = 0; i < LOAD_COUNT; ++i) {
-        ivec2 texel = ivec2(clamp(first + LOAD_FROM + i, 0, last.x), row);
-        raw[i] = floatBitsToUint(imageLoad(LOAD_IMAGE, texel));
-    }
-#endif
 }
 
 #undef LOAD

@@ -1,10 +1,6 @@
 // The images of a filter in strips, and what becomes of a filtered pixel: with FINAL the end of a bloom, otherwise
 // a level, to which the share of an image of the target's size is added. HAS_OWN: whether `own` is read.
-#ifdef LINEAR_TEXELS
 layout(local_size_x = ROW_INVOCATIONS) in;
-#else
-layout(local_size_x = HALVE_INVOCATIONS) in;
-#endif
 READ_IMAGE(1, source);
 READ_IMAGE(2, own);
 

@@ -41,8 +41,6 @@
 #define TARGET_CHANNELS 4
 #endif
 
-#ifdef LINEAR_TEXELS
-
 // In 64-bit integers: llvmpipe stores one integer after the other, for one invocation after the
 // other. Runs of 24 and 32 bytes need less of its work for each byte than words.
 #extension GL_ARB_gpu_shader_int64 : require
@@ -82,29 +80,12 @@ uint64_t eighth(uvec2 value)
     RUNS(number, u64vec4, pairs_of_target)
 #define READ_SIZE(name, number) (read_shapes[number - 1].xy)
 #define TARGET_SIZE() (target_shape.xy)
-// The first row of this dispatch, which may cover only some rows of the target.
-#define FIRST_ROW() (target_shape.w)
 
-#else
-
-#define CHANNEL_BYTES 0
-#define READ_IMAGE(number, name) \
-    layout(set = 0, binding = number, SOURCE_FORMAT) uniform readonly image2D name
-#define WRITE_IMAGE(number) layout(set = 0, binding = number) uniform writeonly image2D target
-#define READ_SIZE(name, number) imageSize(name)
-#define TARGET_SIZE() imageSize(target)
-#define FIRST_ROW() 0
-
-void copy_shapes()
-{
-}
-
-#endif
-
-// The first pixel of this invocation's block, in coordinates of the complete target.
+// The first pixel of this invocation's block, in coordinates of the complete target, of which the dispatch may
+// cover only some rows.
 ivec2 first_pixel(ivec2 block)
 {
-    return ivec2(gl_GlobalInvocationID.xy) * block + ivec2(0, FIRST_ROW());
+    return ivec2(gl_GlobalInvocationID.xy) * block + ivec2(0, target_shape.w);
 }
 
 vec4 value_of(uvec4 raw)
@@ -196,8 +177,6 @@ uvec4 finished(uvec4 own, vec4 value)
     return result;
 }
 
-#ifdef LINEAR_TEXELS
-
 // The pixel at this place of a row, from its word.
 uvec4 pixel_of(uvec4 word, int at)
 {
@@ -227,5 +206,3 @@ vec4 load_floats(usamplerBuffer image, ivec4 shape, int x, int row)
 {
     return uintBitsToFloat(texelFetch(image, clamp(row, 0, shape.y - 1) * shape.z + x));
 }
-
-#endif

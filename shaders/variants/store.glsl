@@ -1,8 +1,7 @@
 // Defines the function that stores STORE_COUNT pixels to a row of the target. Pixels have
-// TARGET_CHANNELS channels (4 in a storage image). With four channels the pixels are a multiple of 16
+// TARGET_CHANNELS channels. With four channels the pixels are a multiple of 16
 // bytes, with three of 24.
 
-#ifdef LINEAR_TEXELS
 // Four bytes of the run in memory, from 4 * number on.
 uint quarter_of(uvec4 raw[STORE_COUNT], int number)
 {
@@ -66,17 +65,8 @@ void store_at(int at, int first, uvec4 raw[STORE_COUNT])
             store_run(at + i, STORE_RUN, part);
     }
 }
-#endif
 
 void store(int first, int row, uvec4 raw[STORE_COUNT])
 {
-#ifdef LINEAR_TEXELS
     store_at(run_at(first, row), first, raw);
-#else
-    [[unroll]] for (int i = 0; i < STORE_COUNT; ++i) {
-        ivec2 pixel = ivec2(first + i, row);
-        if (pixel.x < imageSize(target).x)
-            imageStore(target, pixel, uintBitsToFloat(raw[i]));
-    }
-#endif
 }

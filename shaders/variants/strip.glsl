@@ -147,7 +147,7 @@ ivec2 first_of_strip()
     if (DIRECTION == DIRECTION_HORIZONTAL)
         return first_pixel(ivec2(params.columns, ROWS));
     int below = int(gl_WorkGroupID.y * ROW_INVOCATIONS + gl_LocalInvocationID.x);
-    return ivec2(int(gl_WorkGroupID.x) * params.columns, below * ROWS + FIRST_ROW());
+    return ivec2(int(gl_WorkGroupID.x) * params.columns, below * ROWS + target_shape.w);
 }
 
 void main()

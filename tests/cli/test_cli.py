@@ -170,15 +170,8 @@ def test_every_preset_is_there() -> None:
             {"glare": vkbloom.Ghosts(scales=(1, -2), tints=((1, 0, 0), (0, 1, 0)), falloff=3)},
         ),
         (
-            "--glare streaks:directions=4,fade=0.5 --streaks 6 --ghosts --halo",
-            {
-                "glare": (
-                    vkbloom.Streaks(directions=4, fade=0.5),
-                    vkbloom.Streaks(directions=6),
-                    vkbloom.Ghosts(),
-                    vkbloom.Halo(),
-                )
-            },
+            "--glare streaks:directions=4,fade=0.5+halo",
+            {"glare": (vkbloom.Streaks(directions=4, fade=0.5), vkbloom.Halo())},
         ),
     ],
 )
@@ -307,7 +300,7 @@ def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
     with vkbloom.Renderer() as renderer:
         assert stdout.startswith(f"Rendering on {renderer.info.summary}\n")
         assert f"ms on the {'CPU' if renderer.info.type == 'cpu' else 'GPU'}" in stdout
-    times = dict(re.findall(r"^ +(\w+) +(\d+\.\d{3}) +1$", stdout, re.M))
+    times = dict(re.findall(r"^ +(\w+) +(\d+\.\d{3})$", stdout, re.M))
     assert list(times) == list(rendered().timings)
     assert all(0 < float(time) < 60_000 for time in times.values())
     assert stdout.endswith(f"\nwrote {tmp_path / 'out.exr'}\n")
@@ -340,7 +333,7 @@ def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
     )
     assert result.exit_code == 0
     expected = rendered(
-        scene=Scene.ufo().with_camera(Camera(position=(0, 0, -14), fov=30)),
+        scene=dataclasses.replace(Scene.ufo(), camera=Camera(position=(0, 0, -14), fov=30)),
         settings=SMALL_SETTINGS.replace(blur_strength=3.0),
         time=0.25,
     )
@@ -368,24 +361,11 @@ def test_render_loads_scenes(tmp_path: Path) -> None:
         assert (rgb(pixels(out)) == rgb(rendered(scene=scene)["final"])).all()
 
 
-def test_an_animation_is_one_turn_in_numbered_files(tmp_path: Path) -> None:
-    result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--frames", "3", "--time", "0.5")
-    assert (result.exit_code, result.stderr) == (0, "")
-    paths = [tmp_path / f"a_{index:04}.png" for index in range(3)]
-    assert sorted(tmp_path.iterdir()) == paths
-    for index, path in enumerate(paths):
-        expected = rendered(time=0.5 + index / 3)["final"]
-        assert (rgb(pixels(path)) == rgb(expected)).all()
-    assert result.stdout.endswith(f"\nwrote 3 files, {paths[0]} to {paths[2]}\n")
-    assert re.search(r"^ +glow +[\d.]+ +3$", result.stdout, re.M)
-
-
-@pytest.mark.parametrize("words", [(), ("--frames", "2")])
-def test_render_without_bloom_says_so(tmp_path: Path, words: tuple[str, ...]) -> None:
-    result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--threshold", "2", *words)
+def test_render_without_bloom_says_so(tmp_path: Path) -> None:
+    result = vkb("render", "-o", tmp_path / "a.png", *SMALL, "--threshold", "2")
     assert result.exit_code == 0
     assert "no value is above the threshold 2" in result.stderr
-    assert vkb("render", "-o", tmp_path / "a.png", *SMALL, *words).stderr == ""
+    assert vkb("render", "-o", tmp_path / "a.png", *SMALL).stderr == ""
 
 
 @pytest.mark.parametrize("words", ["render -o out.exr --size 16x16", "apply a.png out.exr"])
@@ -473,25 +453,25 @@ def test_text_survives_a_plain_terminal(tmp_path: Path, encoding: str, name: str
 
 def test_without_standard_output_and_error(tmp_path: Path) -> None:
     """Some programs that start daemons close them."""
-    animation = ["render", "-o", str(tmp_path / "a.png"), "--frames", "2", *SMALL]
-    image = ["apply", str(tmp_path / "a_0000.png"), str(tmp_path / "b.png")]
-    for words in (animation, image):
+    wanted = ["--framebuffers", "final"]
+    scene = ["render", "-o", str(tmp_path / "a.png"), *wanted, *SMALL]
+    image = ["apply", str(tmp_path / "a.png"), str(tmp_path / "b.png")]
+    for words in (scene, image):
         command = [sys.executable, "-m", "vkbloom._cli", *words]
         ended = subprocess.run(["sh", "-c", 'exec "$@" >&- 2>&-', "sh", *command], check=False)
         assert ended.returncode == 0
-    assert {file.name for file in tmp_path.iterdir()} == {"a_0000.png", "a_0001.png", "b.png"}
+    assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png"}
 
 
-def test_an_animation_shows_its_progress_on_a_terminal(tmp_path: Path) -> None:
+def test_several_images_show_their_progress_on_a_terminal(tmp_path: Path) -> None:
     try:
         ours, theirs = os.openpty()
     except OSError as error:
         pytest.skip(f"no terminal can be had here: {error}")
     termios.tcsetwinsize(theirs, (24, 80))
-    command = [sys.executable, "-m", "vkbloom._cli", "render", "-o", str(tmp_path / "a.png")]
-    ended = subprocess.run(
-        [*command, *SMALL, "--frames", "2"], stdout=subprocess.PIPE, stderr=theirs, check=False
-    )
+    images = [str(vkbloom.write(tmp_path / f"{i}.png", np.zeros((8, 8, 3)))) for i in (0, 1)]
+    command = [sys.executable, "-m", "vkbloom._cli", "apply", *images, str(tmp_path / "out")]
+    ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=theirs, check=False)
     # Reading must not wait if there is no data.
     os.write(theirs, b"end")
     shown = os.read(ours, 65536).decode()

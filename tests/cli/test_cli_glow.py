@@ -25,10 +25,7 @@ SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
 
 def done(*words: object) -> Result:
     result = run(*words)
-    # The settings mix, and notes say what follows: see test_cli_photo.py and below.
-    notes = ("darkens the highlights", "step at the mask's edge")
-    lines = [one for one in result.stderr.splitlines() if not any(note in one for note in notes)]
-    assert (result.exit_code, lines) == (0, [])
+    assert (result.exit_code, result.stderr) == (0, "")
     return result
 
 
@@ -57,22 +54,6 @@ def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
     assert_array_equal(vkbloom.read(out), both)
 
 
-def test_a_mask_of_a_mix_says_that_its_edge_is_seen(tmp_path: Path) -> None:
-    source = stored(tmp_path / "a.exr", np.full((16, 24, 3), 0.425, np.float32))
-    mask = np.zeros((16, 24), np.uint8)
-    mask[:, :12] = 255
-    words = ("apply", source, tmp_path / "o.exr", "--mask", stored(tmp_path / "m.png", mask))
-    note = (
-        "vkbloom: note: the composite mix takes light from what the mask lets glow, which is seen "
-        "as a step at the mask's edge; --composite add or --preset photo adds the bloom without\n"
-    )
-    assert note in done(*words, *PYRAMID).stderr
-    # Without settings a picture of floats is mixed, too.
-    assert note in run(*words).stderr
-    assert note not in run(*words, "--composite", "add").stderr
-    assert note not in run(*words, "--preset", "kino").stderr
-
-
 def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
     # The files may have different channels and number types.
     images = [picture(24, 16, 4, seed=seed) for seed in (2, 3)]
@@ -87,25 +68,6 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
         found = vkbloom.read(tmp_path / "out" / source.name, premultiplied=True)
         wanted = expected(image, SETTINGS.replace(alpha="max"), emission=alike)
         assert_array_equal(found, wanted)
-
-
-def test_grids(tmp_path: Path) -> None:
-    image, emission = picture(24, 16, 3), picture(24, 16, 3, "float16", seed=1)
-    source, glow = stored(tmp_path / "a.exr", image), stored(tmp_path / "glow.exr", emission)
-    levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)
-    mask = stored(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
-    words = ("--axis", "intensity=0.5,1", "--mask", mask, "--emission", glow)
-    assert run("grid", source, "-o", tmp_path / "g", *PYRAMID, *words).exit_code == 0
-    files = sorted((tmp_path / "g").glob("*.png"))
-    assert len(files) == 2
-    store = ("-o", tmp_path / "g.zarr")
-    assert run("grid", source, *store, *PYRAMID, *words).exit_code == 0
-    grid = xr.open_zarr(tmp_path / "g.zarr")
-    given = {"mask": levels, "emission": emission.astype(np.float32)}
-    assert_array_equal(grid["final"].sel(intensity=1), expected(image, SETTINGS, **given))
-    other = run("grid", source, *store, *PYRAMID, *words[:-2], "--resume")
-    assert other.exit_code == 1
-    assert "source.emission" in other.stderr
 
 
 def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:

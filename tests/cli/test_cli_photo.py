@@ -124,14 +124,10 @@ def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.R
     np.testing.assert_array_equal(load(tmp_path / "b.png").pixels, load(written).pixels)
 
 
-def test_what_the_first_user_tried_says_so(tmp_path: Path) -> None:
+def test_the_first_try_has_no_notes(tmp_path: Path) -> None:
     path = png(tmp_path / "city.png", room())
     words: list[str | Path] = [path, tmp_path / "o.png", "--threshold", "0.7", "--intensity", "0.5"]
     assert apply(*words).stderr == ""
-    result = apply(*words, "--preset", "bevy_natural")
-    assert result.exit_code == 0
-    assert result.stderr.startswith("vkbloom: note: the bloom darkens the highlights to ")
-    assert result.stderr.endswith("add it with --composite add or --preset photo\n")
 
 
 def test_expand(tmp_path: Path) -> None:

@@ -204,16 +204,6 @@ class TestNotes:
         assert result.exit_code == 0, result.stderr
         assert ("alpha hides it; --alpha max" in result.stderr) is is_told
 
-    @pytest.mark.parametrize("value", [0.0, 1e-7, np.nan])
-    @pytest.mark.parametrize("suffix", [".exr", ".png"])
-    def test_a_black_frame(self, tmp_path: Path, value: float, suffix: str) -> None:
-        """The first frame of a fade has no highlights that could become darker."""
-        file = vkbloom.write(tmp_path / f"a{suffix}", np.full((8, 8, 3), value, np.float32))
-        result = CliRunner().invoke(program, ["apply", str(file), str(tmp_path / f"b{suffix}")])
-        assert result.exit_code == 0, result.stderr
-        assert "nan %" not in result.stderr
-        assert "darkens" not in result.stderr
-
 
 @pytest.mark.parametrize(
     ("source", "out", "bits", "numbers"),

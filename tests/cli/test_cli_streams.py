@@ -77,7 +77,7 @@ def stream_of(file: str, kind: str) -> Iterator[str]:
         ("apply a.png out.exr --mask {}", "m.png"),
         ("apply a.png out.exr --emission {}", "a.png"),
         ("apply a.png out.exr --method convolution --psf {}", "a.png"),
-        ("apply a.png out.exr --dirt {}", "a.png"),
+        ("apply a.png out.exr --glare dirt:image={}", "a.png"),
         (f"render -o out.exr --framebuffers final --skybox {{}} {SMALL}", "a.exr"),
         ("grid {} -o out --axis intensity=0.5 --image-format exr", "a.png"),
         ("compare a.png {} --diff out.exr", "a.exr"),

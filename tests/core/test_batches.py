@@ -14,10 +14,11 @@ import pytest
 import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
+from tests.planned import changed
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
 from vkbloom._renderer.requests import new_arrays
-from vkbloom._renderer.sources import scene_arguments
+from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.
@@ -354,19 +355,11 @@ def run_failing(
     return results, None
 
 
-@pytest.mark.parametrize("place", [0, 1, 2, 3, 6, 20, 99])
-def test_a_setting_that_the_device_cannot_run(place: int) -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
-    blame = _core.OutOfMemoryError("no memory")
-    results, error = run_failing(settings, {settings[place]: blame})
-    assert error is blame
-    assert [point for point, _ in results] == settings[:place]
-    timed = [list(timings) for _, (_, timings, _) in results]
-    assert timed == [[str(one.exposure)] for one in settings[:place]]
-
-
-@pytest.mark.parametrize("kind", [_core.ValidationError, _core.DeviceLostError, ValueError])
-def test_error_of_the_device_names_no_setting(
+@pytest.mark.parametrize(
+    "kind",
+    [_core.OutOfMemoryError, _core.ValidationError, _core.DeviceLostError, ValueError],
+)
+def test_an_error_of_the_device_loses_the_frames_of_its_submission(
     kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Batches double up to the largest size, however slow the machine is.
@@ -375,16 +368,8 @@ def test_error_of_the_device_names_no_setting(
     blame = kind("all")
     results, error = run_failing(settings, {settings[50]: blame})
     assert error is blame
-    # Only the frames of its batch, which begins after 1 + 2 + 4 + 8 + 16, are lost.
+    # Only the frames of its submission, which begins after 1 + 2 + 4 + 8 + 16, are lost.
     assert [point for point, _ in results] == settings[:31]
-
-
-def test_of_two_errors_the_first_is_raised() -> None:
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(6)]
-    first, second = _core.OutOfMemoryError("first"), _core.OutOfMemoryError("second")
-    results, error = run_failing(settings, {settings[4]: first, settings[5]: second})
-    assert error is first
-    assert len(results) == 4
 
 
 # The core's own types
@@ -413,16 +398,14 @@ def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
 
 def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
     # A Scene cannot have them, and the device must never get them.
-    arrays, *others = scene_arguments(scene, SIZE, "forward", 0.0)
-    serial, (vertices, indices, *mesh), *rest = arrays
+    block, pictures, (vertices, indices, *rest) = scene_arguments(scene, SIZE, "forward", 0.0)
     wrong = indices.copy()
     wrong[-1] = len(vertices)
     right = renderer.render(scene, None, SIZE)
-    source = _core.scene_source((2**63, (vertices, wrong, *mesh), *rest), *others)
+    source = _core.scene_source(changed(block, at1=2**31), pictures, (vertices, wrong, *rest))
     with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
         submitted(renderer, source, [Separable()])
     assert_same(renderer.render(scene, None, SIZE), right)
-    assert serial != 2**63
 
 
 def test_a_submission_of_a_closed_renderer() -> None:

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from tests.planned import scene_plan, scene_source
+from tests.planned import changed, scene_plan, scene_source
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._renderer.adapter import bundled_driver
-from vkbloom._renderer.sources import scene_arguments
+from vkbloom._scene.blocks import scene_arguments
 from vkbloom._settings.blocks import settings_block
 
 METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "three")
@@ -75,27 +75,23 @@ def arrays_for(*plans: _core.Plan) -> tuple[tuple[np.ndarray[Any, Any], ...], ..
 
 
 @pytest.fixture(scope="module")
-def names(
-    renderer: Renderer, scene: Scene, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
+def names(renderer: Renderer, scene: Scene) -> Iterator[dict[str, Any]]:
     """The names that the table uses."""
     source, plans = planned(renderer, Separable(), Separable(bloom_size=(3, 3)))
     read_only = np.empty((4, 4, 4), np.uint8)
     read_only.flags.writeable = False
     of_scene = scene_arguments(scene, (8, 8), "forward", 0.0)
-    parts, camera, size, *rest = of_scene
-    given = dict(zip(("serial", "body", "glow", "sky", "textures"), parts, strict=True))
-    # A file of a hole takes no room. In 32 bits there would be three indices.
-    file = tmp_path_factory.mktemp("indices") / "indices"
+    given = dict(zip(("scene_block", "pictures", "parts"), of_scene, strict=True))
 
-    def raw(size: Any = size, **changes: Any) -> _core.Source:
-        return _core.scene_source(tuple((given | changes).values()), camera, size, *rest)
+    def raw(**changes: Any) -> _core.Source:
+        return _core.scene_source(*(given | changes).values())
 
     with Renderer() as other:
         yield {
             **globals(),
             **given,
             "raw": raw,
+            "changed": changed,
             "scene_source": scene_source,
             "plan": lambda **fields: scene_plan(settings_with(**fields), (16, 16)),
             "ghosts": lambda given: stage_with(stage="ghosts", ghosts=given),
@@ -112,7 +108,6 @@ def names(
             "looked_at": _core.plan(source, Separable(), None, "fragment"),
             "block": Separable()._core_block(),
             "driver": bundled_driver(),
-            "many_indices": np.memmap(file, np.uint32, "w+", shape=(2**32 + 3,)),
         }
 
 

@@ -180,19 +180,14 @@ def test_is_found_and_named(
     monkeypatch.setenv("PYTHONPATH", str(mutant))
     # The pipelines of the right shaders must not be taken for these.
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path_factory.mktemp("pipelines")))
-    result = pytester.runpytest_subprocess(*options, "--bloom-report=report")
+    result = pytester.runpytest_subprocess(*options)
 
     result.assert_outcomes(failed=1)
     first = mutation.different[0]
     result.stdout.fnmatch_lines([f"*test_bloom: the first framebuffer that differs is {first} (*"])
-    report = pytester.path / "report"
-    (check,) = json.loads((report / "report.json").read_text())["checks"]
-    assert check["first_failure"] == first
-    outcomes = {each["name"]: each["outcome"] for each in check["framebuffers"]}
-    assert outcomes == dict.fromkeys(mutation.equal, "equal") | dict.fromkeys(
-        mutation.different, "failed"
-    )
-    assert f"the first framebuffer that differs is {first} (" in (report / "index.html").read_text()
+    lines = [f"*  {name}: equal" for name in mutation.equal]
+    lines += [f"*  {name}: FAILED (*" for name in mutation.different]
+    result.stdout.fnmatch_lines_random(lines)
 
     # On this device, whose other variants are right.
     monkeypatch.delenv("VKBLOOM_VARIANT")

@@ -130,7 +130,7 @@ def test_what_changes_all(opened: Renderer, scene: Scene, alone: Alone, change: 
     elif change == "aspect":
         size = (90, 160)
     elif change == "camera":
-        other = scene.with_camera(Camera(position=(0.5, 0, -8)))
+        other = dataclasses.replace(scene, camera=Camera(position=(0.5, 0, -8)))
     else:
         other = screen(noise((8, 8)), SIZE)
     # And back again.

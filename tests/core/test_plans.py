@@ -28,7 +28,8 @@ from vkbloom import (
     _core,
     presets,
 )
-from vkbloom._renderer.sources import image_source, scene_arguments
+from vkbloom._renderer.sources import image_source
+from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (96, 54)
 

@@ -282,3 +282,10 @@ def test_the_ranges_in_docstrings(kind: type[Settings]) -> None:
         narrowed = info.range != tuple(_core.VALUES[name][1:])
         assert own is not None or not narrowed, f"{name}: {kind.__name__} says no range"
         assert (own or documented_range(Settings, name)) == info.range, name
+
+
+@pytest.mark.parametrize("kind", METHODS.values())
+def test_choices_are_names_of_the_core(kind: type[Settings]) -> None:
+    for name, info in fields_of(kind).items():
+        if name in vkbloom._core.CHOICES:
+            assert set(info.choices) <= set(vkbloom._core.CHOICES[name])

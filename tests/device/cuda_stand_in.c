@@ -366,7 +366,6 @@ EXPORT int cuEventSynchronize(void *event)
     return event ? SUCCESS : INVALID_VALUE;
 }
 
-#ifndef OLD_DRIVER
 EXPORT int cuCtxRecordEvent(void *context, void *event)
 {
     REFUSE(1);
@@ -380,7 +379,6 @@ EXPORT int cuCtxWaitEvent(void *context, void *event)
     REFUSE(1);
     return context == &contexts && event ? SUCCESS : INVALID_VALUE;
 }
-#endif
 
 // Addresses 1 to 3 stand for freed memory, managed memory and memory of the other GPU.
 EXPORT int cuPointerGetAttribute(void *value, int attribute, unsigned long long address)

@@ -32,17 +32,14 @@ def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None
     check(done, folder)
 
 
-@pytest.mark.parametrize("driver", ["new", "old"])
 @pytest.mark.parametrize("lesser", ["", "waits"])
 def test_code_of_others_comes_between(
-    tmp_path: Path,
+    folder: Path,
     software: AdapterInfo,
     layer: Path,  # noqa: F811
-    driver: str,
     lesser: str,
 ) -> None:
     """Lifetimes, failures, captures of graphs and callbacks (device_limits.py)."""
-    folder = stand_in.build(tmp_path, *["-DOLD_DRIVER"] * (driver == "old"))
     # Freed memory has other content, so that a use of it is found.
     variables = stand_in.variables(folder, software) | {"MALLOC_PERTURB_": "165"}
     program = ("-m", "tests.device.device_limits", "validated")

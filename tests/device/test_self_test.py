@@ -81,16 +81,6 @@ def test_a_crash_is_told_with_its_case(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "ended with status -6" in last["wrong"]
 
 
-def test_a_driver_that_was_not_tried_is_told() -> None:
-    info = vkbloom.AdapterInfo("Arc", "integrated", "Intel open-source", "Mesa 25.0.7", "1.4.0")
-    (results,) = self_test.unknown(info)
-    assert results == (
-        "driver: Intel open-source has not been tried; llvmpipe, SwiftShader, NVIDIA have"
-    )
-    info = vkbloom.AdapterInfo("llvmpipe", "cpu", "llvmpipe", "Mesa 26.1.0 (LLVM 20)", "1.4.0")
-    assert "version Mesa 26.1.0 (LLVM 20) has not been tried" in self_test.unknown(info)[0]
-
-
 @pytest.mark.parametrize("wrong", [np.nan, 2.0])
 def test_what_is_wrong_comes_first(wrong: float) -> None:
     """The first wrong framebuffer in the data flow, although a later one is farther off."""

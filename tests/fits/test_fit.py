@@ -260,17 +260,6 @@ class TestVerdict:
         assert found.verdict == "poor"
         assert "has another encoding: about the power of 0.4" in found.cause
 
-    def test_another_order_of_channels(self, fit: Call) -> None:
-        image = IMAGE * np.array([1, 0.4, 0.1], np.float32)
-        truth = target_of(Pyramid(levels=3, intensity=0.4), "final", image)
-        found = fit(
-            image, truth[..., ::-1], Pyramid(levels=3, intensity=0.4), ["radius"], max_calls=8
-        )
-        assert (found.verdict, found.cause) == (
-            "poor",
-            "the target is in the order b, g, r",
-        )
-
     def test_another_method(self, fit: Call) -> None:
         truth = KinoBloom(threshold=0.5, intensity=0.5, radius=2.0)
         found = self.fitted(fit, target_of(truth, "final"))
@@ -296,7 +285,6 @@ class TestVerdict:
         found = fit(image, target, start, ["threshold", "intensity"], max_calls=40)
         assert found.verdict == "poor"
         assert found.cause.startswith("no bloom was found"), found.cause
-        assert ("the target is mirrored" in found.cause) == (change == "mirrored")
 
     def test_a_faint_bloom_is_judged_by_its_own_size(self, fit: Call) -> None:
         """A loss that is small beside the picture may be all of the bloom."""

@@ -9,9 +9,8 @@ from threading import Barrier
 import numpy as np
 
 from vkbloom import Separable
-from vkbloom._grid.keys import open_keys
 from vkbloom._grid.layout import Grid, Layout, Variable, ask
-from vkbloom._grid.store import GridStore
+from vkbloom._grid.store import prepare as prepare_store
 
 
 def laid_out(intensity: float) -> tuple[Grid, Layout]:
@@ -35,10 +34,9 @@ def laid_out(intensity: float) -> tuple[Grid, Layout]:
 def prepare(store: Path, part: tuple[int, int], intensity: float, start: Barrier) -> str:
     """Return what is said of the store when all processes have come here."""
     grid, layout = laid_out(intensity)
-    kept = GridStore(open_keys(store), grid, layout, (1,), part)
     start.wait(60)
     try:
-        kept.prepare(resume=True)
+        prepare_store(store, grid, layout, (1,), part, resume=True)
     except ValueError as error:
         return str(error)
     return ""

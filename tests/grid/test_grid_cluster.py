@@ -181,9 +181,6 @@ def test_a_worker_with_another_driver_or_version_is_refused(
     assert check_grid(tmp_path / "a.zarr").done == 0
 
 
-def test_asynchronous_client_and_memory_store_are_refused(client: Any) -> None:
-    zarr = pytest.importorskip("zarr")
+def test_what_is_no_client_is_refused() -> None:
     with pytest.raises(TypeError, match="client"):
         make(Path("a.zarr"), 3)
-    with pytest.raises(ValueError, match="in memory"):
-        make(zarr.storage.MemoryStore(), client)

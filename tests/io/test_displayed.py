@@ -200,7 +200,6 @@ class TestCommandLine:
             ("a.png", ("--view", "none"), "view: 'none' is not a view of OpenColorIO's"),
             ("a.png", ("--view", SDR, "--primaries", "p3"), "leave them out"),
             ("a.png", ("--view", SDR, "--encoding", "pq"), "leave out --view"),
-            ("a.png", ("--primaries", "p3", "--raw"), "leave out --input-colour and --primaries"),
             ("a.avif", (), "this OpenImageIO is built without libheif; PNG can name"),
         ],
     )

@@ -110,18 +110,6 @@ def test_orientation(tmp_path: Path, name: str, store: Any, orientation: int) ->
     assert (np.median(off) if name.endswith("jpg") else off.max()) < (3 if "jpg" in name else 0.01)
 
 
-def test_exif_after_the_pixels_is_kept(tmp_path: Path) -> None:
-    exif = image.Exif()
-    exif[271] = "Maker"
-    exif.get_ifd(0x8769)[0x9003] = "2020:01:02 03:04:05"
-    content = store_png(tmp_path / "a.png", PIXELS).read_bytes()
-    chunk = png_chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))
-    (tmp_path / "a.png").write_bytes(content[:-12] + chunk + content[-12:])
-    made, facts = vkbloom.read(tmp_path / "a.png", metadata=True)
-    assert made.shape == PIXELS.shape
-    assert (facts["Make"], facts["Exif:DateTimeOriginal"]) == ("Maker", "2020:01:02 03:04:05")
-
-
 @pytest.mark.parametrize(
     "exif",
     [

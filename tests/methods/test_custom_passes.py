@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import shutil
 import struct
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vkbloom import Renderer, _core
+from vkbloom._custom.rows import CoreShader, Resource, Row
 from vkbloom._settings.blocks import settings_block
 
 compiler = shutil.which("glslangValidator") or shutil.which("glslang")
@@ -47,8 +49,8 @@ Image = NDArray[np.float32]
 class Own:
     """Settings of a method whose passes are given."""
 
-    def __init__(self, *passes: tuple[Any, ...], **fields: Any) -> None:
-        self.passes = passes
+    def __init__(self, *passes: Any, **fields: Any) -> None:
+        self.passes: Any = passes
         self.asked: list[Any] = []
         self.fields = {"format": "rgba32float", **fields}
 
@@ -57,7 +59,9 @@ class Own:
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> Any:
         self.asked.append((frame, buffers))
-        return self.passes
+        if not isinstance(self.passes, tuple):
+            return self.passes
+        return tuple(one.packed() if isinstance(one, Row) else one for one in self.passes)
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +83,10 @@ def compiled(folder: Path, text: str, stage: str) -> bytes:
     assert compiler
     subprocess.run([compiler, "-V", str(source), "-o", str(target)], check=True)
     return target.read_bytes()
+
+
+def shader_of(name: str, code: bytes) -> CoreShader:
+    return CoreShader(name, code, hashlib.sha256(code).digest()[:16])
 
 
 def floats(*values: float) -> bytes:
@@ -105,28 +113,18 @@ def finish(
     return arrays, times[0]
 
 
-def tint(
-    spirv: dict[str, bytes], name: str, reads: str, *share: float, **more: Any
-) -> tuple[Any, ...]:
-    shader = _core.shader("tint", spirv["tint"])
+def tint(spirv: dict[str, bytes], name: str, reads: str, *share: float, **more: Any) -> Row:
+    shader = shader_of("tint", spirv["tint"])
     size, shown = more.get("size", (32, 20)), more.get("shown", True)
-    return (name, shader, size, more.get("format"), (reads,), shown, floats(*share), None)
+    return Row(name, shader, size, (reads,), shown, floats(*share))
 
 
 def test_passes_make_the_bloom(renderer: Renderer, spirv: dict[str, bytes]) -> None:
     image = picture()
     half = tint(spirv, "half", "MAIN", 0.5, 0.5, 0.5, 0.5)
     double = tint(spirv, "double", "GLOW", 2, 2, 2, 2, shown=False)
-    both = (
-        "bloom",
-        _core.shader("sum", spirv["sum"]),
-        (32, 20),
-        None,
-        ("half", "double"),
-        True,
-        b"",
-        None,
-    )
+    summed = shader_of("sum", spirv["sum"])
+    both = Row("bloom", summed, (32, 20), ("half", "double"), framebuffer=True)
     settings = Own(half, double, both, threshold=1.5, intensity=0.25)
     frames, _ = run(renderer, image, settings)
     assert settings.asked == [((32, 20), (32, 20))]
@@ -142,24 +140,10 @@ def test_passes_make_the_bloom(renderer: Renderer, spirv: dict[str, bytes]) -> N
 
 def test_compute_pass_has_its_own_groups(renderer: Renderer, spirv: dict[str, bytes]) -> None:
     image = picture(33, 19)
-    shader = _core.shader("compute", spirv["compute"])
-    one = ("bloom", shader, (33, 19), None, ("MAIN",), True, floats(2, 3, 4, 1), (8, 4))
+    shader = shader_of("compute", spirv["compute"])
+    one = Row("bloom", shader, (33, 19), ("MAIN",), True, floats(2, 3, 4, 1), (8, 4))
     frames, _ = run(renderer, image, Own(one))
     np.testing.assert_allclose(frames["bloom"][..., :3], image[..., :3] * (2, 3, 4), rtol=1e-6)
-
-
-def test_gpu_runs_the_compute_shader_of_a_pass_in_its_place(
-    spirv: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    twin = COMPUTE.replace("values.tint *", "values.tint +").replace("y = 4", "y = 8")
-    shader = _core.shader("twin", spirv["tint"], compiled(tmp_path, twin, "comp"))
-    one = ("bloom", shader, (32, 20), None, ("MAIN",), True, floats(1, 1, 1, 1), None)
-    image = picture()
-    for variants, expected in (("gpu", image + 1), ("cpu", image), ("fragment", image)):
-        monkeypatch.setenv("VKBLOOM_VARIANT", variants)
-        with Renderer("software", validation=True) as renderer:
-            frames, _ = run(renderer, image, Own(one))
-        np.testing.assert_allclose(frames["bloom"], expected, rtol=1e-6)
 
 
 def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
@@ -169,8 +153,8 @@ def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
     other = compiled(tmp_path, TINT.replace("values.tint *", "values.tint + "), "frag")
 
     def settings(code: bytes) -> Own:
-        one = ("bloom", _core.shader("one", code), (32, 20), None, ("MAIN",), True)
-        return Own((*one, floats(1, 1, 1, 1), None))
+        shader = shader_of("one", code)
+        return Own(Row("bloom", shader, (32, 20), ("MAIN",), True, floats(1, 1, 1, 1)))
 
     run(renderer, image, settings(spirv["tint"]))
     before = renderer._core.pipeline_count
@@ -183,45 +167,42 @@ def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
     np.testing.assert_allclose(frames["bloom"][..., :3], image[..., :3] + 1, rtol=1e-6)
 
 
-def test_shader_has_a_name_and_a_hash(spirv: dict[str, bytes]) -> None:
-    one, same = (_core.shader(name, spirv["tint"]) for name in ("one", "same"))
-    assert (one.name, one.hash) == ("one", same.hash)
-    assert len(one.hash) == 32
-    assert one.hash != _core.shader("one", spirv["sum"]).hash
-
-
 @pytest.mark.parametrize("code", [b"", b"\x03\x02\x23\x07", b"abcd" * 9, None])
-def test_what_is_not_spirv_is_refused(spirv: dict[str, bytes], code: bytes | None) -> None:
+def test_what_is_not_spirv_is_refused(
+    renderer: Renderer, spirv: dict[str, bytes], code: bytes | None
+) -> None:
+    shader = shader_of("one", spirv["tint"][:-1] if code is None else code)
     with pytest.raises(ValueError, match="is not SPIR-V"):
-        _core.shader("one", spirv["tint"][:-1] if code is None else code)
+        run(renderer, picture(), Own(Row("bloom", shader, (32, 20))))
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({0: ""}, "the name '' has not 1 to 31 bytes"),
-        ({0: "n" * 32}, "has not 1 to 31 bytes"),
-        ({0: "glow"}, "two images named glow"),
-        ({0: "other"}, "none writes bloom or main"),
-        ({0: "main", 2: (5, 5)}, "main is 5 x 5, which is not the frame's size, 32 x 20"),
-        ({2: (0, 5)}, "a size of 0 x 5"),
-        ({2: (1 << 20, 5)}, "out of this adapter's range"),
-        ({3: "bgra8unorm"}, "'bgra8unorm' is not a format of bloom buffers"),
-        ({4: ("bloom",)}, "bloom reads bloom, which no pass before it writes"),
-        ({4: ("later",)}, "reads later"),
-        ({4: ("MAIN",) * 17}, "reads 17 images, more than 16"),
-        ({6: bytes(1025)}, "1025 bytes of parameters, more than 1024"),
-        ({7: (0, 1)}, "a block without pixels"),
+        ({"name": ""}, "a pass has the wrong size or values out of their ranges"),
+        ({"name": "n" * 32}, "a pass has the wrong size or values out of their ranges"),
+        ({"reads": ("n" * 32,)}, "a pass has the wrong size or values out of their ranges"),
+        ({"name": "glow"}, "two images named glow"),
+        ({"name": "other"}, "none writes bloom or main"),
+        ({"name": "main", "size": (5, 5)}, "5 x 5, which is not the frame's size, 32 x 20"),
+        ({"size": (0, 5)}, "a size of 0 x 5"),
+        ({"size": (1 << 20, 5)}, "out of this adapter's range"),
+        ({"reads": ("bloom",)}, "bloom reads bloom, which no pass before it writes"),
+        ({"reads": ("later",)}, "reads later"),
+        ({"reads": ("MAIN",) * 17}, "17 images read are more than 16"),
+        ({"params": bytes(1025)}, "1025 bytes of parameters are more than 1024"),
+        ({"group": (0, 1)}, "a pass has the wrong size or values out of their ranges"),
+        ({"resources": (Resource(b"", None),)}, "a resource has the wrong size"),
+        ({"resources": (Resource(bytes(48), None),)}, "a resource has the wrong size"),
+        ({"resources": (Resource(bytes(48), None),) * 17}, "17 textures and buffers"),
     ],
 )
 def test_faulty_pass_is_refused(
-    renderer: Renderer, spirv: dict[str, bytes], change: dict[int, Any], message: str
+    renderer: Renderer, spirv: dict[str, bytes], change: dict[str, Any], message: str
 ) -> None:
-    one = list(tint(spirv, "bloom", "MAIN", 1, 1, 1, 1))
-    for place, value in change.items():
-        one[place] = value
+    one = tint(spirv, "bloom", "MAIN", 1, 1, 1, 1)
     with pytest.raises(ValueError, match=message):
-        run(renderer, picture(), Own(tuple(one)))
+        run(renderer, picture(), Own(one._replace(**change)))
 
 
 @pytest.mark.parametrize("passes", [5, [1], (1,), ((1, 2),)])

@@ -20,7 +20,6 @@ from vkbloom import (
     Separable,
     Settings,
 )
-from vkbloom._explorer.viewer import Viewer
 
 Image = NDArray[Any]
 
@@ -187,22 +186,3 @@ def test_plans_know_mask_and_emission(renderer: Renderer) -> None:
     reads = {one.name: one.reads for one in lit.passes}
     assert reads["glow"] == ("emission",)
     assert reads["final"] == ("image", "bloom")
-
-
-def test_the_explorer_reduces_what_is_given_with_the_image(renderer: Renderer) -> None:
-    image, emission = picture(64, 48, 3), picture(64, 48, 3, seed=4)
-    mask = np.zeros((48, 64), np.float32)
-    mask[:, 32:] = 1
-    settings = Pyramid(levels=2, composite="mix")
-    viewer = Viewer(image, settings, mask=mask, emission=emission, renderer=renderer)
-    asked = {"kind": "frame", "sides": {"a": settings.to_dict()}, "size": [32, 24]}
-    answer, _ = viewer.answer({**asked, "framebuffer": "glow"})
-    assert "error" not in answer["sides"]["a"]
-    glow = viewer.frames["a"]["glow"]
-    assert glow.shape == (24, 32, 4)
-    assert not glow[:, :15, :3].any()
-    half = emission.reshape(24, 2, 32, 2, 3).mean(axis=(1, 3))
-    assert_allclose(glow[:, 18:, :3], half[:, 18:], atol=0.2)
-    assert glow[:, 18:, :3].any()
-    with pytest.raises(ValueError, match="mask: the source is a scene"):
-        Viewer(Scene.ufo(), mask=mask, renderer=renderer)

@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
+from tests.conftest import SANITIZED
 from tests.exhaustive import by_turns
 from tests.images import hdr_picture
 from tests.methods.cases import (
@@ -49,8 +50,9 @@ CASES: dict[str, tuple[Settings, tuple[str, ...]]] = {
 # Sides that are multiples of the variants' strips and tiles, and some that are not; levels of
 # exactly half the size, and others; less than a kernel.
 SIZES = ((97, 61), (72, 64), (1, 1), (64, 48), (7, 1), (260, 24), (1, 9), (13, 7))
-# These have all three variants, the others two by turns.
-COMPLETE = {*METHODS, *WHOLE, *PRESETS, *itertools.islice(GIVEN, 4)}
+# These have all three variants, the others two by turns; so have all under the sanitizers, since a
+# method's plans in the two others differ in few rows.
+COMPLETE = set() if SANITIZED else {*METHODS, *WHOLE, *PRESETS, *itertools.islice(GIVEN, 4)}
 
 
 def has_equal_bits(settings: Settings) -> bool:
@@ -90,7 +92,7 @@ def opened() -> Iterator[dict[str, Renderer]]:
     with pytest.MonkeyPatch.context() as patch:
         for variant in VARIANTS:
             patch.setenv("VKBLOOM_VARIANT", variant)
-            renderers[variant] = Renderer(validation=True)
+            renderers[variant] = Renderer(validation=not SANITIZED)
     yield renderers
     for renderer in renderers.values():
         renderer.close()

@@ -146,24 +146,23 @@ def test_the_identity_is_not_blamed() -> None:
     [
         (
             lambda a: np.roll(box_chain(a), -1, 1),
-            "shifted by -1 pixels along x (half a texel of the level at 1/2 of the size), on",
+            "shifted by -1 pixels along x, on average over all positions.",
         ),
         (
             lambda a: np.roll(box_chain(a), (2, 2), (0, 1)),
-            "+2 pixels along x (half a texel of the level at 1/4 of the size) and +2 pixels along "
-            "y (half a texel of the level at 1/4",
+            "+2 pixels along x and +2 pixels along y, on average",
         ),
         (
             lambda a: np.roll(box_chain(a), -3, 0),
-            "-3 pixels along y (half a texel of each of the levels at 1/2 of the size and 1/4 of",
+            "-3 pixels along y, on average",
         ),
         (
             lambda a: ndimage.uniform_filter(a, (2, 1, 1), mode="nearest"),
-            "+0.5 pixels along y (half a texel of the level at full size)",
+            "+0.5 pixels along y, on average",
         ),
         (
             lambda a: np.asarray(ndimage.shift(a, (0, 0.3, 0), order=1)),
-            "+0.3 pixels along x, on average over all positions. Measured",
+            "+0.3 pixels along x, on average over all positions.",
         ),
     ],
 )
@@ -180,7 +179,7 @@ def test_a_correct_chain_of_boxes_says_why_it_moves_light() -> None:
     assert centroid.off == pytest.approx(3.5)
     assert centroid.limit == pytest.approx(0.01, abs=1e-3)
     assert "averages boxes of 2 x 2 pixels" in centroid.why
-    assert centroid.why.endswith("over 16 positions: -3.5 to +3.5 pixels, +0 on average.")
+    assert centroid.why.endswith("back on average over all positions.")
     assert str(found).splitlines()[6].split() == ["centroid_kept", "no", "3.5", "0.0102"]
 
 
@@ -189,8 +188,7 @@ def test_a_missing_half_texel_is_no_chain() -> None:
         lambda image: ndimage.uniform_filter(image, (4, 4, 0), mode="nearest"), size=(64, 64)
     )
     assert {"symmetric", "centroid_kept"} <= set(broken(found))
-    why = row(found, "centroid_kept").why
-    assert why.endswith("all positions move alike, as with a missing half texel.")
+    assert "a shift of half a texel" in row(found, "centroid_kept").why
 
 
 def test_a_threshold_is_tested_above_it() -> None:

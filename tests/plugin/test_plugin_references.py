@@ -9,7 +9,6 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.plugin.projects import ONE, PROJECT, edit, references, run, write
-from vkbloom.testing._references import cpu_vendor
 from vkbloom.testing._regression import name_of_test
 
 pytest.importorskip("xdist")
@@ -23,13 +22,6 @@ class TestReferences:
         result.stdout.fnmatch_lines(
             ["*test_frames: there is no reference *test_one/test_frames.json*--bloom-update*"]
         )
-        result.stdout.fnmatch_lines(["missing: bloom_references/test_one/test_frames.json"])
-
-    def test_missing_may_be_allowed(self, project: pytest.Pytester) -> None:
-        write(project, ONE)
-        result = run(project, "--bloom-allow-missing")
-        result.assert_outcomes(passed=1)
-        result.stdout.fnmatch_lines(["missing: bloom_references/test_one/test_frames.json"])
 
     def test_update_writes_and_the_next_run_passes(self, project: pytest.Pytester) -> None:
         write(project, ONE)
@@ -52,10 +44,9 @@ class TestReferences:
         )
         run(project, "--bloom-update").assert_outcomes(passed=1)
         file = project.path / "bloom_references" / "test_one" / "test_frames.json"
-        (reference,) = json.loads(file.read_text())["references"]
+        reference = json.loads(file.read_text())
         assert reference["origin"]["adapter"] == "An <engine>"
         assert reference["origin"]["driver"] == "7"
-        assert reference["origin"]["cpu_vendor"] == cpu_vendor()
         assert [each["name"] for each in reference["framebuffers"]] == ["glow", "bloom", "final"]
 
     def test_update_leaves_alone_what_passes(
@@ -76,35 +67,14 @@ class TestReferences:
         monkeypatch.delenv("SHIFT")
         run(project).assert_outcomes(failed=1)
 
-    def test_one_of_several_is_enough(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        write(
-            project,
-            PROJECT + "def test_frames(frame_regression):\n"
-            "    info = {'adapter': os.environ.get('SHIFT', '0')}\n"
-            "    frame_regression.check(frames(), info=info)",
-        )
-        run(project, "--bloom-update").assert_outcomes(passed=1)
-        monkeypatch.setenv("SHIFT", "0.1")
-        run(project).assert_outcomes(failed=1)
-        run(project, "--bloom-add").assert_outcomes(passed=1)
-        assert "test_frames.bloom.2.exr" in references(project)
-        for shift, outcome in (("0.1", "passed"), ("0", "passed"), ("0.05", "failed")):
-            monkeypatch.setenv("SHIFT", shift)
-            run(project).assert_outcomes(**{outcome: 1})
-        # Replacing all of them leaves no file behind.
-        run(project, "--bloom-update").assert_outcomes(passed=1)
-        assert "test_frames.bloom.2.exr" not in references(project)
-
-    def test_the_same_machine_replaces_its_own(
-        self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        write(project, ONE)
-        for shift in ("0", "0.1", "0.2"):
-            monkeypatch.setenv("SHIFT", shift)
-            run(project, "--bloom-add").assert_outcomes(passed=1)
-        assert len(references(project)) == 4
+    def test_an_update_leaves_no_file_behind(self, project: pytest.Pytester) -> None:
+        for image in ("frames()", "{'bloom': frames()['final']}"):
+            write(
+                project,
+                f"{PROJECT}def test_frames(frame_regression): frame_regression.check({image})\n",
+            )
+            run(project, "--bloom-update").assert_outcomes(passed=1)
+        assert references(project) == ["test_frames.bloom.png", "test_frames.json"]
 
     def test_no_value_is_lost(self, project: pytest.Pytester) -> None:
         write(
@@ -128,9 +98,7 @@ def test_image(frame_regression, dtype, number):
 """,
         )
         run(project, "--bloom-update").assert_outcomes(passed=20)
-        run(project, "--bloom-report=report").assert_outcomes(passed=20)
-        checks = json.loads((project.path / "report" / "report.json").read_text())["checks"]
-        assert [each["framebuffers"][0]["outcome"] for each in checks] == ["equal"] * 40
+        run(project).assert_outcomes(passed=20)
         folder = project.path / "bloom_references" / "test_one"
         stored = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
         for dtype, kind in stored.items():
@@ -367,12 +335,12 @@ def test_unnamed(frame_regression):
     frame_regression.compare(frames(0.1), frames())
 """,
         )
-        result = run(project, "--bloom-report=report")
+        result = run(project)
         result.assert_outcomes(passed=1, failed=2)
         # In any order of the tests.
         for name, adapters in (
-            ("other", f"Mesa 25, {cpu_vendor()}; now: My engine, {cpu_vendor()}"),
-            ("unnamed", "arrays without an adapter, *; now: arrays without an adapter, *"),
+            ("other", "Mesa 25; now: My engine"),
+            ("unnamed", "arrays without an adapter; now: arrays without an adapter"),
         ):
             result.stdout.fnmatch_lines(
                 [
@@ -381,24 +349,6 @@ def test_unnamed(frame_regression):
                 ]
             )
         assert not (project.path / "bloom_references").exists()
-
-    @pytest.mark.parametrize("folder", ["", "file", "file/below"])
-    def test_reports_that_cannot_be_written(self, project: pytest.Pytester, folder: str) -> None:
-        write(project, ONE)
-        (project.path / "file").write_text("kept")
-        result = run(project, f"--bloom-report={folder}")
-        assert result.ret == pytest.ExitCode.USAGE_ERROR
-        result.stderr.fnmatch_lines([f"ERROR: --bloom-report*{folder}: *"])
-        assert (project.path / "file").read_text() == "kept"
-        assert not (project.path / "index.html").exists()
-
-    def test_a_report_that_cannot_be_written_in_the_end(self, project: pytest.Pytester) -> None:
-        write(project, "def test_it(frame_regression): assert False, 'told'")
-        (project.path / "report" / "index.html").mkdir(parents=True)
-        result = run(project, "--bloom-report=report")
-        result.assert_outcomes(failed=1)
-        assert result.ret == pytest.ExitCode.INTERNAL_ERROR
-        result.stdout.fnmatch_lines(["*told*", "report: report is not written: *index.html'"])
 
     def test_wrong_arguments(self, project: pytest.Pytester) -> None:
         write(

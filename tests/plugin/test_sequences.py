@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.resources
 import json
 from pathlib import Path
@@ -114,7 +115,11 @@ def test_a_lamp_behind_a_fence(
         # Bars are one unit apart; what is drawn is 0.25 nearer than it is given.
         camera = Camera((-bars * index / fps, 1.0, -10.25), (0, 0, 0))
         frame = renderer.render(
-            scene.with_camera(camera), settings, (64, 36), shading="deferred", framebuffers="final"
+            dataclasses.replace(scene, camera=camera),
+            settings,
+            (64, 36),
+            shading="deferred",
+            framebuffers="final",
         )
         seen.append(frame["final"])
     found = flash(seen, fps, degrees=40)

@@ -166,7 +166,9 @@ def test_no_clip_plane_cuts_the_sky(
     cut = dataclasses.replace(behind, near=near, far=far)
     settings = Separable(bloom=False)
     whole, other = (
-        renderer.render(scene.with_camera(camera), settings, SIZE, shading=shading)["scene"]
+        renderer.render(dataclasses.replace(scene, camera=camera), settings, SIZE, shading=shading)[
+            "scene"
+        ]
         for camera in (behind, cut)
     )
     assert rgb(whole).any()

@@ -91,7 +91,7 @@ def test_every_scene_has_a_serial_of_its_own() -> None:
     first = scene()
     others = [
         scene(),
-        first.with_camera(first.camera),
+        dataclasses.replace(first, camera=first.camera),
         dataclasses.replace(first, glow_intensity=2.0),
         copy.copy(first),
         pickle.loads(pickle.dumps(first)),
@@ -101,7 +101,7 @@ def test_every_scene_has_a_serial_of_its_own() -> None:
 
 def test_a_changed_camera_changes_nothing_else() -> None:
     first = scene(glow=mesh(), skybox=Cubemap((np.zeros((6, 1, 1, 4), np.uint8),)))
-    second = first.with_camera(Camera(fov=60))
+    second = dataclasses.replace(first, camera=Camera(fov=60))
     assert second.camera.fov == 60.0
     assert first.camera.fov == 45.0
     assert second.body is first.body
@@ -170,7 +170,7 @@ def test_a_scene_of_one_file_has_neither_glow_nor_sky() -> None:
 
 def test_scenes_that_differ_in_the_camera_alone_share_their_contents() -> None:
     first = Scene.ufo()
-    turned = first.with_camera(Camera(rotation=(1.0, 2.0, 3.0)))
+    turned = dataclasses.replace(first, camera=Camera(rotation=(1.0, 2.0, 3.0)))
     brighter = dataclasses.replace(first, glow_intensity=2.0)
     other = dataclasses.replace(first, glow=None)
     serials = [scene.contents_serial for scene in (first, turned, brighter, other, Scene.ufo())]

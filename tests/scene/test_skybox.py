@@ -155,7 +155,7 @@ def test_a_mip_level_is_the_mean_of_four() -> None:
     faces[0, :, :, 0] = [[1, 2], [3, 4]]
     faces[5, :, :, 1] = [[255, 255], [255, 254]]
     faces[3, :, :, 2] = [[0, 0], [0, 1]]
-    top = skybox.mip_levels(faces)[1]
+    top = skybox.from_array(faces).levels[1]
     # 2.5 rounds to even, 254.75 up, 0.25 down.
     assert (top[0, 0, 0, 0], top[5, 0, 0, 1], top[3, 0, 0, 2]) == (2, 255, 0)
     assert top.dtype == np.uint8
@@ -165,16 +165,17 @@ def test_rounding_does_not_add_up() -> None:
     # Rounded level by level, the mean of 3/4 would become 1 at once and never come back.
     faces = np.zeros((6, 4, 4, 4), np.uint8)
     faces[:, :2, :2] = [[[1], [1]], [[1], [0]]]
-    assert [int(level.max()) for level in skybox.mip_levels(faces)] == [1, 1, 0]
+    assert [int(level.max()) for level in skybox.from_array(faces).levels] == [1, 1, 0]
 
 
 def test_odd_sides_are_floored() -> None:
     faces = faces_of(7, 4, "f4")
-    levels = skybox.mip_levels(faces)
+    levels = skybox.from_array(faces).levels
     assert [level.shape for level in levels] == [(6, n, n, 4) for n in (7, 3, 1)]
-    np.testing.assert_allclose(
-        levels[1][2, 1, 2], faces[2, 2:4, 4:6].reshape(4, 4).mean(axis=0), rtol=1e-6
-    )
+    # Of three texels along each axis, as `textures.mip_levels` says.
+    rows, columns = np.array([2, 3, 2]) / 7, np.array([1, 3, 3]) / 7
+    expected = np.einsum("y,x,yxc->c", rows, columns, faces[2, 2:5, 4:7])
+    np.testing.assert_allclose(levels[1][2, 1, 2], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4"])
@@ -185,7 +186,7 @@ def test_mip_levels_of_floats_neither_overflow_nor_spread_nan(dtype: str) -> Non
     faces[2, 0, 0] = math.inf
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        levels = skybox.mip_levels(faces)
+        levels = skybox.from_array(faces).levels
     np.testing.assert_array_equal(levels[0], faces)
     assert (levels[1][0] == largest).all()
     np.testing.assert_allclose(levels[1][1:3].astype("f8"), float(largest) * 0.75, rtol=1e-3)
@@ -217,7 +218,7 @@ def test_a_ktx_with_one_level_gets_the_others(tmp_path: Path) -> None:
         path.write_bytes(ktx_bytes([faces_of(4)], level_count=count))
         cube = skybox.load(path)
         assert [level.shape[1] for level in cube.levels] == [4, 2, 1]
-        np.testing.assert_array_equal(cube.levels[1], skybox.mip_levels(faces_of(4))[1])
+        np.testing.assert_array_equal(cube.levels[1], skybox.from_array(faces_of(4)).levels[1])
 
 
 def test_a_ktx_with_a_part_of_the_chain_keeps_it(tmp_path: Path) -> None:

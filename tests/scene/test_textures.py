@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import pickle
 from collections.abc import Callable
@@ -12,12 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.planned import changed
 from tests.refusals import assert_refused, rows
 from tests.screens import CAMERA, NOTHING, SQUARE, panel, rgb, screen
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
 from vkbloom._renderer.requests import new_arrays
 from vkbloom._scene import Mesh
-from vkbloom._scene.textures import WHITE, Texture, mip_levels
+from vkbloom._scene.blocks import scene_arguments
+from vkbloom._scene.textures import Texture, mip_levels
 
 Array = NDArray[Any]
 
@@ -397,32 +400,24 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
     assert body.summary == "4 triangles, 4 vertices, textures: 1"
 
 
-GOOD = half_colours(4, 4)
+BODY = panel((4, 4))
 
 
-def draw_raw(renderer: Renderer, serial: int, mesh: Any, textures: Any) -> None:
-    """Give a mesh and textures to the core past the checks of `Mesh` and `Texture`."""
-    source = _core.scene_source(
-        (serial, mesh, None, (), textures),
-        ((0, 0, -9), (0, 0, 0), 45, 0.1, 99),
-        (4, 4),
-        "forward",
-        0.0,
-        1.0,
-    )
+def packed(body: Mesh) -> Any:
+    return scene_arguments(Scene(body=body, camera=CAMERA), (4, 4), "forward", 0.0)
+
+
+def draw(renderer: Renderer, surfaces: Any = None, **places: int) -> None:
+    """Draw a mesh with a texture; the core gets other surfaces and numbers of its pictures."""
+    block, pictures, arrays = packed(BODY)
+    if surfaces is not None:
+        arrays = (*arrays[:3], np.array(surfaces, np.uint32), *arrays[4:])
+    source = _core.scene_source(block, changed(pictures, **places), arrays)
     plan = renderer._core.plan(source, Separable(), None)
     renderer._core.run(source, (plan,), (new_arrays(renderer._core, plan),))
 
 
-BODY = panel((4, 4))
-RAW_BODY = (BODY.vertices, BODY.indices, None, BODY.texcoords, ((12, 0, 0),))
-RAW_WHITE = (WHITE.levels, 0, 0, 1, 1, 1)
-
-
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "textures"))
 def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> None:
-    names = {
-        "draw": lambda mesh, texture: draw_raw(renderer, 2**60, mesh, (texture,)),
-    }
-    assert_refused(call, error, globals() | names)
-    draw_raw(renderer, 2**61, RAW_BODY, (RAW_WHITE,))
+    assert_refused(call, error, globals() | {"draw": functools.partial(draw, renderer)})
+    draw(renderer)

@@ -19,13 +19,13 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
-from vkbloom._cli.glow_options import accompanying, uploaded
 from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.streams import PIPE, is_stream
-from vkbloom._cli.terminal import detail, hides_progress, note, say
+from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import Saved
+from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Picture, SavedColour
 from vkbloom._renderer.frame_files import settings_facts
 
@@ -33,6 +33,9 @@ from vkbloom._renderer.frame_files import settings_facts
 Pair: TypeAlias = tuple[str, str]
 #: The settings of a file, and what its highlights are expanded up to.
 Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
+
+#: From an image to its mask and emission.
+Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, NDArray[Any]]]
 
 # Errors of one file, after which a batch goes on. A lost device fails for all of them.
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
@@ -49,10 +52,9 @@ class Options:
     subimage: int
     layer: str | None
     input_colour: Colour | None
-    raw: bool
+    half: bool
     mask: str | None
     emission: str | None
-    half: bool | None
     output_colour: SavedColour | None
     primaries: str
     view: str | None
@@ -156,10 +158,10 @@ class Run:
             if not is_planned:
                 is_planned = True
                 with self._wrong_use_of_all():
-                    given = uploaded(renderer, picture.pixels, glow_of(picture.pixels))
+                    given = _with_glow(renderer, picture.pixels, glow_of)
                     renderer.plan(given, settings, framebuffers=wanted)
             with self._of_file(pair):
-                given = uploaded(renderer, picture.pixels, glow_of(picture.pixels))
+                given = _with_glow(renderer, picture.pixels, glow_of)
                 frames = renderer.apply(given, settings, framebuffers=wanted)
                 self._tell(pair, picture, frames)
                 kept = no_bloom.only(frames, self._options.names)
@@ -167,14 +169,16 @@ class Run:
                 yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
 
     def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
-        """Print notes about the bloom of a file, and its time."""
+        """Print a note about the bloom of a file."""
         name, target = pair
-        texts = [*no_bloom.notes(frames, picture.pixels)]
-        if not no_bloom.is_without(frames) and self._is_straight(picture, target):
-            texts.append(no_bloom.hidden(frames["final"], frames.settings))
-        for text in filter(None, texts):
+        text = ""
+        if no_bloom.is_without(frames):
+            brightest = no_bloom.brightest_of(picture.pixels)
+            text = no_bloom.reason(frames.settings, brightest)
+        elif self._is_straight(picture, target):
+            text = no_bloom.hidden(frames["final"], frames.settings)
+        if text:
             note(f"{name}: {text}" if self._several else text)
-        detail(f"{name}: {1e3 * sum(frames.timings.values()):.2f} ms on the device")
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
         file = of_format(target, self._options.pipe_format)
@@ -187,28 +191,28 @@ class Run:
             options.subimage,
             options.input_colour,
             layer=options.layer,
-            raw=options.raw,
             expand=expand,
             is_blended=is_blended,
         )
         picture = premultiplied(picture) if is_blended else picture
-        pixels, is_half = picture.pixels, options.half
-        if is_half is None:
-            is_half = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
-        if is_half and pixels.dtype == np.float32:
+        pixels = picture.pixels
+        is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
+        if (options.half or is_large) and pixels.dtype == np.float32:
             picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
         return picture
 
-    def _read_glow(self, is_blended: bool) -> Callable[[NDArray[Any]], Any]:
+    def _read_glow(self, is_blended: bool) -> Glow:
         """Return a function that gives mask and emission for an image."""
         options = self._options
-        return accompanying(
-            options.mask,
-            options.emission,
-            options.input_colour,
-            raw=options.raw,
-            is_blended=is_blended,
-        )
+        given: dict[str, NDArray[Any]] = {}
+        if options.mask is not None:
+            mask = read_picture(options.mask, 0, "linear").pixels
+            given["mask"] = grey_mask(mask, options.mask)
+        if options.emission is None:
+            return lambda image: given
+        emission = read_picture(options.emission, 0, options.input_colour)
+        glow = (premultiplied(emission) if is_blended else emission).pixels
+        return lambda image: {**given, "emission": alike(glow, image)}
 
     def _write(
         self,
@@ -240,6 +244,12 @@ class Run:
             elif not self._several:
                 for path in (file, *written):
                     say(f"wrote {path}")
+
+
+def _with_glow(renderer: vkbloom.Renderer, image: NDArray[Any], glow_of: Glow) -> Any:
+    """Return an image, or a handle of it with its mask and its emission."""
+    glow = glow_of(image)
+    return renderer.upload(image, **glow) if glow else image
 
 
 def _send(file: Path, target: str) -> None:

@@ -17,7 +17,6 @@ import vkbloom
 from vkbloom._cli.applied import Options, Pair, Run, of_format
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import Command
-from vkbloom._cli.glow_options import glow_options, note_step
 from vkbloom._cli.image_files import (
     check_input_colour,
     expand_option,
@@ -32,7 +31,6 @@ from vkbloom._cli.streams import is_stream
 from vkbloom._cli.terminal import complain, say, tell_device
 from vkbloom._io import image_writing
 from vkbloom._io.displayed import PRIMARIES, Saved, check_saved
-from vkbloom._io.images import Colour
 from vkbloom._renderer.interruptible import opened_renderer
 
 CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
@@ -81,17 +79,10 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "error for an unknown one lists all.",
 )
 @click.option(
-    "--raw",
+    "--half",
     is_flag=True,
-    help="Do not decode or encode colours: use the values of an 8-bit file unchanged, in 8-bit "
-    "buffers.",
-)
-@click.option(
-    "--half/--no-half",
-    "half",
-    default=None,
-    help="Hold pictures in half floats, which need half the memory [default for 8-bit files "
-    "of at least 64 million pixels]",
+    help="Hold pictures in half floats, which need half the memory, as 8-bit files of at least 64 "
+    "million pixels are.",
 )
 @click.option(
     "--bits",
@@ -105,7 +96,20 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 @expand_option
 @subimage_option
 @layer_option
-@glow_options
+@click.option(
+    "--mask",
+    metavar="FILE",
+    type=click.Path(),
+    help="A grey image of the same size, which multiplies what glows: white keeps it, black "
+    "removes it. Its values are not decoded.",
+)
+@click.option(
+    "--emission",
+    metavar="FILE",
+    type=click.Path(),
+    help="An image of the same size that glows instead of the image, such as a renderer's pass of "
+    "emissive materials. It is decoded like the image.",
+)
 @device_options
 @settings_options_by_file
 def command(
@@ -143,11 +147,8 @@ def command(
             return opened
 
         run = Run(options, target, Path(folder), renderer, several=len(work) > 1)
-        mixed = None
         for begun, group in itertools.groupby(work, key=lambda pair: options.settings(pair[0])):
-            mixed = begun[0] if begun[0].composite == "mix" else mixed
             run.sequence([*group], *begun)
-    note_step(mixed, options.mask, options.emission)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:
         say(f"wrote {len(written)} images, {written[0]} to {written[-1]}")
@@ -173,7 +174,7 @@ def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
         raise click.UsageError("a pipe takes only final; leave out --framebuffers")
     work = pairs(sources, out)
     settings, _ = options.settings(work[0][0])
-    _check_colours(settings, options.input_colour, options.saved, raw=options.raw)
+    _check_colours(settings, options.saved)
     if options.skip_existing:
         left = [pair for pair in work if is_stream(pair[1]) or not os.path.exists(pair[1])]
         say(f"skipped {len(work) - len(left)} of {len(work)} images, whose OUT exists")
@@ -197,20 +198,11 @@ def _check_writable(target: str) -> None:
         raise ValueError(f"{target}: {reason}, such as .png or .exr") from None
 
 
-def _check_colours(
-    settings: vkbloom.Settings,
-    input_colour: Colour | None,
-    saved: Saved,
-    *,
-    raw: bool,
-) -> None:
+def _check_colours(settings: vkbloom.Settings, saved: Saved) -> None:
     """Raise click.UsageError for options that do not go together."""
     options = {"--output-colour": saved.curve, "--view": saved.view}
     options["--primaries"] = None if saved.primaries == "rec709" else saved.primaries
     used = [name for name, value in options.items() if value is not None]
-    if raw and (input_colour or used):
-        left_out = " and ".join(["--input-colour", *(used or ["--output-colour"])])
-        raise click.UsageError(f"--raw does not convert colours; leave out {left_out}")
     if settings.encoding != "none" and settings.alpha != "keep":
         raise click.UsageError(
             f"--alpha {settings.alpha} needs linear colours; leave out --encoding: OUT is encoded "

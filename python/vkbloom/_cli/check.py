@@ -23,7 +23,7 @@ from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
-from vkbloom._cli.terminal import detail_device, is_quiet, note, say
+from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
@@ -31,9 +31,10 @@ from vkbloom._suggestions import did_you_mean
 from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing import _showing as showing
-from vkbloom.testing._law_report import law_report
+from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._law_table import LAWS, law_name
 from vkbloom.testing._programs import Program
+from vkbloom.testing._subject import Subject
 
 
 class CheckCommand(Command):
@@ -177,7 +178,6 @@ def command(
     _check_choice(file, program, reference, against, page)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
-        detail_device(renderer)
         if reference is not None:
             _add_reference(settings, reference)
         preset = click.get_current_context().params["preset"]
@@ -186,30 +186,32 @@ def command(
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
             )
-        measured = [_measured(renderer, *source, how, bar) for source in sources.items()]
-        blooms, values = zip(*measured, strict=True)
+        blooms = [_measured(renderer, *source, how, bar) for source in sources.items()]
+        (values, report, subject), *others = blooms
+        name = values["name"]
         if page is not None:
-            safe_writing.write_file(Path(page), showing.as_page(blooms[0]).encode())
+            text = showing.as_page(values, report, subject)
+            safe_writing.write_file(Path(page), text.encode())
             say(f"wrote {page}", err=as_json)
-    if against is None:
-        failed = [row.name for row in showing.broken(blooms[0].report)]
-        text, table, written = showing.as_text(blooms[0]), showing.as_markdown(blooms[0]), values[0]
+    if not others:
+        failed = [row.name for row in report.rows if row.name in report.required and not row.held]
+        text, table = showing.as_text(values, report), showing.as_markdown(values, report)
     else:
-        changes = comparing.changes(values[1], values[0])
+        before = others[0][0]
+        changes = comparing.changes(before, values)
         failed = comparing.newly_broken(changes, how["require"])
-        names = (blooms[1].name, blooms[0].name)
+        names = (before["name"], name)
         text = comparing.as_text(changes, names)
-        table = comparing.as_markdown(changes, names, blooms[0].device)
-        written = comparing.as_values(changes, values[1], values[0], failed)
-    click.echo(json.dumps(written, indent=2) if as_json else text)
+        table = comparing.as_markdown(changes, names, values["adapter"])
+        values = comparing.as_values(changes, before, values, failed)
+    click.echo(json.dumps(values, indent=2) if as_json else text)
     if markdown is not None:
         safe_writing.write_file(Path(markdown), table.encode())
         say(f"wrote {markdown}", err=as_json)
-    held = {row.name: row.words for row in blooms[0].report.rows}
-    for name in failed:
-        note(
-            f"{blooms[0].name}: required law {name}: {'newly broken, ' * bool(against)}{held[name]}"
-        )
+    held = {row.name: row.words for row in report.rows}
+    for law in failed:
+        since = "newly broken, " if others else ""
+        note(f"{name}: required law {law}: {since}{held[law]}")
     return int(bool(failed))
 
 
@@ -219,8 +221,8 @@ def _measured(
     source: str | vkbloom.Settings,
     how: Mapping[str, Any],
     bar: Status,
-) -> tuple[measuring.Measured, dict[str, Any]]:
-    """Measure the bloom of settings, or of a command, as the options say; return all figures."""
+) -> tuple[dict[str, Any], LawReport, Subject]:
+    """Return what is measured of the bloom of settings, or of a command, as the options say."""
     size = how["size"]
     if isinstance(source, str):
         with as_wrong_use():
@@ -234,21 +236,11 @@ def _measured(
         subject = measuring.of_settings(renderer, source, how["measured"], how["gain"])
         passes, device = measuring.pass_times(renderer, source, size), renderer.info.summary
     try:
-        measured = measuring.Measured(
-            name=name,
-            device=device,
-            settings=None if isinstance(source, str) else measuring.exact(source),
-            size=size,
-            passes=passes,
-            subject=subject,
-            report=law_report(
-                subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}")
-            ),
-            renderer=renderer,
-        )
+        report = law_report(subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}"))
         bar.update(f"{name}: presets")
-        # Some figures are measured when they are read.
-        return measured, showing.as_values(measured)
+        settings = None if isinstance(source, str) else source
+        about = {"name": name, "adapter": device, "size": size, "passes": passes}
+        return measuring.values_of(renderer, subject, report, settings, **about), report, subject
     except AssertionError as error:
         raise click.ClickException(f"{name}: {error}") from error
 

@@ -18,7 +18,7 @@ from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._io import image_writing
 from vkbloom._io.images import Picture, StoredImage
-from vkbloom._views.comparison import ALL_METRICS, USUAL_METRICS, Comparison, compare, difference
+from vkbloom._views.comparison import Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
 from vkbloom._views.plain_values import plain
 from vkbloom._views.tolerances import Tolerances, failures
@@ -37,7 +37,6 @@ def tolerances_of(
     *,
     max_error: float | None = None,
     min_ssim: float | None = None,
-    min_psnr: float | None = None,
     max_flip: float | None = None,
     fail_percent: float | None = None,
 ) -> Tolerances:
@@ -49,14 +48,13 @@ def tolerances_of(
         atol, hard_fail = max_error or 0.0, None
     else:
         atol, hard_fail = 0.0, max_error
-        has_none = (max_error, min_ssim, min_psnr, max_flip) == (None, None, None, None)
+        has_none = (max_error, min_ssim, max_flip) == (None, None, None)
         fail_percent = 0.0 if has_none else 100.0
     return Tolerances(
         atol=atol,
         fail_percent=fail_percent,
         hard_fail=hard_fail,
         ssim=min_ssim,
-        psnr=min_psnr,
         flip=max_flip,
     )
 
@@ -76,24 +74,10 @@ def tolerances_of(
     is_flag=True,
     help="Accept NaN, and infinity of the same sign, at pixels where both images have it.",
 )
-@click.option(
-    "--pixels-per-degree",
-    metavar="X",
-    type=click.FLOAT,
-    help="Pixels that one degree of the observer's view spans, for FLIP [default 67]",
-)
-@click.option(
-    "--nits-per-unit",
-    metavar="X",
-    type=click.FLOAT,
-    help="Luminance of a linear value of 1 in cd/m2; with --pixels-per-degree, ColorVideoVDP is "
-    "computed, where its package is installed.",
-)
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @subimage_option
 @_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
 @_limit("min_ssim", "Smallest allowed structural similarity, -1 to 1")
-@_limit("min_psnr", "Smallest allowed peak signal-to-noise ratio, in dB")
 @_limit("max_flip", "Largest allowed mean FLIP, 0 to 1")
 @_limit(
     "fail_percent",
@@ -105,8 +89,6 @@ def command(
     second: str,
     diff: str | None,
     allow_nan: bool,
-    pixels_per_degree: float | None,
-    nits_per_unit: float | None,
     as_json: bool,
     subimage: int,
     **limits: float | None,
@@ -141,9 +123,6 @@ def command(
             b.pixels,
             threshold=tolerances.atol or 0.0,
             allow_nan=allow_nan,
-            metrics=USUAL_METRICS if nits_per_unit is None else ALL_METRICS,
-            nits_per_unit=nits_per_unit,
-            pixels_per_degree=pixels_per_degree,
         )
         cause = diagnose(a.pixels, b.pixels)
     result = _with_windows(result, a, b)
@@ -169,11 +148,11 @@ def _with_windows(comparison: Comparison, a: StoredImage, b: StoredImage) -> Com
     windows = [(*image.origin, *image.display) for image in (a, b)]
     if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
         return comparison
-    places = " against ".join(
+    told = " against ".join(
         f"data at {x},{y} and display {width} x {height} at {left},{top}"
         for x, y, left, top, width, height in windows
     )
-    reason = f"the windows differ, {places}"
+    reason = f"the windows differ, {told}"
     return dataclasses.replace(comparison, mismatches=(*comparison.mismatches, reason))
 
 
@@ -241,8 +220,6 @@ def _figures(comparison: Comparison, channels: tuple[str, ...]) -> list[str]:
         "SSIM": _shown(comparison.ssim),
         "FLIP": _shown(comparison.flip),
     }
-    if comparison.cvvdp is not None:
-        rows["CVVDP"] = f"{_shown(comparison.cvvdp)} JOD"
     for name, reason in comparison.not_computed.items():
         rows[name.upper()] = f"not computed: {reason}"
     return [f"  {label:<11}{text}" for label, text in rows.items()]

@@ -86,8 +86,6 @@ def _show_groups(report: dict[str, Any]) -> None:
         click.secho(f"{line}{group['seconds']:9.1f}", fg="red" if group["wrong"] else None)
     for item in report["wrong"]:
         click.echo(f"\nwrong: {item['group']}: {item['name']}\n       {item['wrong']}")
-    for line in report["unknown"]:
-        click.echo(f"\nnot known: {line}")
     click.echo(
         f"\n{report['cases']} cases in {report['seconds']:.0f} s, wrong: {len(report['wrong'])}."
     )

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.glow_options import accompanying, glow_options, note_step, refuse_glow_of_scene
 from vkbloom._cli.interrupts import INTERRUPTED
 from vkbloom._cli.live_options import live_options
 from vkbloom._cli.program import as_wrong_use, given
@@ -44,14 +43,11 @@ _LARGEST_PORT: Final = 65535
     help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
-@glow_options
 @live_options(image_has_size=False)
 def command(
     *,
     image: NDArray[Any] | None,
     origin: dict[str, Any],
-    mask: str | None,
-    emission: str | None,
     port: int,
     opens: bool,
     size: tuple[int, int],
@@ -71,13 +67,9 @@ def command(
     import_extra("tornado", "notebook", "explore")
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
-    glow: dict[str, Any] = {}
     if image is not None:
         looked_at = image
-        glow = accompanying(mask, emission)(image)
-        note_step(settings, mask, emission)
     else:
-        refuse_glow_of_scene(mask, emission)
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
@@ -86,9 +78,7 @@ def command(
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(
-                looked_at, begun, size=size, shading=shading, renderer=renderer, **glow, **origin
-            )
+            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **origin)
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

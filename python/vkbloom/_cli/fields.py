@@ -132,7 +132,10 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
             raise ValueError(
                 f"{name!r} is not one of {', '.join(known)}{did_you_mean(name, known)}"
             )
-        results.append(Glare.from_dict({"stage": name} | _read_fields(rest)))
+        fields = _read_fields(rest)
+        if isinstance(file := fields.get("image"), str):
+            fields["image"] = read_colours(file)
+        results.append(Glare.from_dict({"stage": name} | fields))
     return tuple(results)
 
 

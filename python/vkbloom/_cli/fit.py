@@ -15,7 +15,7 @@ from vkbloom._cli.image_files import input_colour_option, is_photograph, layer_o
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.search_options import search_options
 from vkbloom._cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, read_settings
-from vkbloom._cli.terminal import detail_device, note
+from vkbloom._cli.terminal import note
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.registry import METHODS
@@ -91,7 +91,6 @@ def command(
         searches.append((bright, [photo]))
         note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
-        detail_device(renderer)
         results = [
             item
             for image_of, begun in searches

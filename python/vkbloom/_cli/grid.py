@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 import vkbloom
-from vkbloom._cli import fields, glow_options, image_files, no_bloom, program, terminal
+from vkbloom._cli import fields, image_files, no_bloom, program, terminal
 from vkbloom._cli.axis_options import axis_values
 from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
@@ -27,7 +27,7 @@ from vkbloom._settings.settings import SHADINGS
 
 @click.command(cls=fields.Command)
 @click.argument("images", metavar="[IMAGE]...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, a URL, or a folder")
+@click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, or a folder")
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
 @click.option("--time", default=0.0, help="Time of a scene's animation; its period is 1.")
@@ -37,11 +37,9 @@ from vkbloom._settings.settings import SHADINGS
 @click.option("--resume/--no-resume", default=True, help="Continue a grid that is there")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
-@click.option("--raw", is_flag=True, help="Do not decode the values of 8-bit files.")
 @image_files.subimage_option
 @image_files.layer_option
 @image_files.expand_option
-@glow_options.glow_options
 @device_options
 @scene_options
 @settings_options
@@ -59,7 +57,7 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
 
     Other processes may render other parts at the same time.
     """
-    is_store = out.endswith(".zarr") or "://" in out
+    is_store = out.endswith(".zarr")
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")
@@ -77,9 +75,9 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
         settings = None
     # The presets of an axis differ in whether they expand.
     expand: float | None = given["expand"] if settings or program.given("expand") else None
-    pictures, source, glow = _source(images, settings, expand, given)
+    pictures, source = _source(images, expand, given)
     names = given["framebuffers"].split(",")
-    shared = {name: given[name] for name in ("size", "shading", "time")} | glow
+    shared = {name: given[name] for name in ("size", "shading", "time")}
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
         grid = layout.ask(source, settings, axes, reduce=None, **shared)
@@ -100,23 +98,19 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
 
 def _source(
     images: Sequence[str],
-    settings: vkbloom.Settings | None,
     expand: float | None,
     given: Mapping[str, Any],
-) -> tuple[list[Picture], Any, dict[str, Any]]:
-    """Return the pictures, the source of the grid, and the arguments `mask` and `emission`."""
+) -> tuple[list[Picture], Any]:
+    """Return the pictures, and the source of the grid."""
     if not images:
-        glow_options.refuse_glow_of_scene(given["mask"], given["emission"])
-        return [], given["scene"](), {}
-    colour, reading = given["input_colour"], {n: given[n] for n in ("subimage", "layer", "raw")}
+        return [], given["scene"]()
+    colour, reading = given["input_colour"], {n: given[n] for n in ("subimage", "layer")}
     reading["expand"] = expand
     pictures = [image_files.read_picture(image, colour=colour, **reading) for image in images]
-    glow_options.note_step(settings, given["mask"], given["emission"])
-    glow = glow_options.accompanying(given["mask"], given["emission"], colour, raw=given["raw"])
     # Labels are the file names, or numbers if a file is given twice.
     labels = images if len(set(images)) == len(images) else range(len(images))
     named = {str(label): item.pixels for label, item in zip(labels, pictures, strict=True)}
-    return pictures, named if len(images) > 1 else pictures[0].pixels, glow(pictures[0].pixels)
+    return pictures, named if len(images) > 1 else pictures[0].pixels
 
 
 def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
@@ -125,7 +119,6 @@ def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
     # A renderer of its own, so that the passes of the grid are counted from the first.
     with vkbloom.Renderer(adapter, validation=validation) as renderer:
-        terminal.detail_device(renderer)
         frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
     if lit and all(map(no_bloom.is_without, frames)):
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")
@@ -167,7 +160,7 @@ def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **
     with progress.Progress(len(points), done, shown=not terminal.is_quiet()) as bar:
         path = map(grid.point, todo)
         for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
-            picture = pictures[int(grid.point(index).place)] if pictures else None
+            picture = pictures[int(grid.point(index).entry)] if pictures else None
             _save(
                 frames,
                 {name: out / f"{stems[index]}{name}{suffix}" for name in frames},

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom._cli.program import given
 from vkbloom._cli.streams import as_file, shown
-from vkbloom._cli.terminal import detail, note
+from vkbloom._cli.terminal import note
 from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes
 from vkbloom._io.array_files import has_straight
@@ -87,7 +87,6 @@ def read_picture(
     colour: Colour | None,
     *,
     layer: str | None = None,
-    raw: bool = False,
     expand: float | None = None,
     is_blended: bool = True,
 ) -> Picture:
@@ -95,18 +94,12 @@ def read_picture(
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     source = shown(source)
-    if raw and stored.pixels.dtype != np.uint8:
-        raise click.UsageError(
-            f"--raw: {source} has {stored.numbers[0]}, not 8-bit integers; leave out --raw"
-        )
-    picture = image_reading.decode_file(stored, source, colour, raw=raw, expand=expand)
+    picture = image_reading.decode_file(stored, source, colour, expand=expand)
     for text in part_notes(stored, layer):
         note(f"{source}: {text}")
     counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
-    height, width = picture.pixels.shape[:2]
-    detail(f"{source}: {width} x {height}, {picture.numbers}")
     hidden = 0.0 if is_blended else picture.hidden
     for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
         note(f"{source}: {text}")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import math
 from typing import Any, Final
 
 import vkbloom
@@ -12,19 +10,12 @@ from vkbloom._settings.settings import Settings, Shading
 
 HELP: Final = """\
 B              bloom on, off
-Up, Down       scale of the blur, 0.1 to 2
-Left, Right    strength
 1 ... 9        the framebuffer that is shown
 P              the next preset
 Space          pauses the animation
-S              writes all framebuffers to files
 Q, Escape      close\
 """
 
-# A key changes the first of these fields that the settings have.
-_SCALES: Final = ("blur_scale", "radius", "filter_radius", "offset", "scatter", "blur_size")
-_STRENGTHS: Final = ("blur_strength", "intensity")
-_STEP: Final = 0.1
 _TURN_SECONDS: Final = 8.0
 
 
@@ -35,7 +26,6 @@ class Live:
     - `shading`: Of a scene.
     - `framebuffer`: Name of the framebuffer that is shown.
     - `time`: Time of the animation, in periods.
-    - `screenshot`: Whether to write a screenshot after the next frame.
     """
 
     settings: Settings
@@ -45,7 +35,6 @@ class Live:
     time: float = 0.0
     paused: bool = False
     closed: bool = False
-    screenshot: bool = False
 
     def press(self, key: str, names: list[str]) -> None:
         """Do what a key stands for; `names` are the framebuffers that there are."""
@@ -54,10 +43,6 @@ class Live:
             self.framebuffer = "final"
         if key == "b":
             self.settings = self.settings.replace(bloom=not self.settings.bloom)
-        elif key in ("up", "down"):
-            self._step(_SCALES, _STEP if key == "up" else -_STEP, 0.1, 2.0)
-        elif key in ("right", "left"):
-            self._step(_STRENGTHS, _STEP if key == "right" else -_STEP, 0.0, math.inf)
         elif key in "123456789" and int(key) <= len(names):
             self.framebuffer = names[int(key) - 1]
         elif key == "p":
@@ -66,21 +51,8 @@ class Live:
             self.settings = known[(shown + 1) % len(known)]
         elif key == "space":
             self.paused = not self.paused
-        elif key == "s":
-            self.screenshot = True
         elif key in ("q", "escape"):
             self.closed = True
-
-    def _step(self, names: tuple[str, ...], step: float, low: float, high: float) -> None:
-        """Change the value of the first of the names, no further than these."""
-        for name in self._of(names):
-            value = min(max(round(getattr(self.settings, name) + step, 4), low), high)
-            # The settings refuse what is beyond their range.
-            with contextlib.suppress(ValueError):
-                self.settings = self.settings.replace(**{name: value})
-
-    def _of(self, names: tuple[str, ...]) -> list[str]:
-        return [name for name in names if hasattr(self.settings, name)][:1]
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""
@@ -89,11 +61,9 @@ class Live:
 
     def title(self, seconds: float) -> str:
         """Return the text of the title; `seconds` is the time of a frame."""
-        names = [*self._of(_SCALES), *self._of(_STRENGTHS)] if self.settings.bloom else []
         parts = [
             f"{self.framebuffer}: {self.settings.method}",
-            *(f"{name} {getattr(self.settings, name):g}" for name in names),
-            *(["no bloom"] if not names else []),
+            *([] if self.settings.bloom else ["no bloom"]),
             *(["paused"] if self.paused else []),
             f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
         ]

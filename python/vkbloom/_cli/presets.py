@@ -11,10 +11,10 @@ from vkbloom._presets.named_settings import ENGINES, PRESETS
 
 def entries() -> Iterator[Entry]:
     """Yield the presets, those of an engine after each other."""
-    places = {
+    engines = {
         name: (engine, confirmed) for engine, confirmed, names in ENGINES for name in names.split()
     }
-    for name, (engine, confirmed) in places.items():
+    for name, (engine, confirmed) in engines.items():
         item = PRESETS[name]
         settings = item.make()
         # The command line expands the highlights of a photograph for the preset photo.

@@ -6,14 +6,12 @@ import errno
 import importlib
 import os
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, NoReturn
 
 import click
 from click.core import ParameterSource
-from click.shell_completion import CompletionItem
 
 import vkbloom
 from vkbloom._cli import terminal
@@ -24,7 +22,7 @@ from vkbloom._suggestions import did_you_mean
 
 #: What the commands do, by the modules of this package that have a click command `command`.
 COMMANDS: Final = {
-    "render": "Render a scene or its animation to image files",
+    "render": "Render a scene to image files",
     "apply": "Add bloom to an image file",
     "view": "Show the bloom of a scene or an image in a window",
     "explore": "Explore the bloom of an image or a scene in a browser",
@@ -66,8 +64,8 @@ class Program(click.Group):
             return None
         command: click.Command = importlib.import_module(f"vkbloom._cli.{cmd_name}").command
         raise_interrupts()
-        if terminal.PRINTING_OPTIONS[0] not in command.params:
-            command.params += terminal.PRINTING_OPTIONS
+        if terminal.QUIET_OPTION not in command.params:
+            command.params.append(terminal.QUIET_OPTION)
         return command
 
     def resolve_command(
@@ -84,16 +82,6 @@ class Program(click.Group):
         """Write what the commands do, without an import of them."""
         with formatter.section("Commands"):
             formatter.write_dl([*COMMANDS.items()])
-
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the commands that begin with some letters, without an import of them."""
-        results = [
-            CompletionItem(name, help=summary)
-            for name, summary in COMMANDS.items()
-            if name.startswith(incomplete)
-        ]
-        # Not the group's own: it would list the commands again.
-        return [*results, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **extra: Any
@@ -117,7 +105,6 @@ class Program(click.Group):
         """Run the program and exit: 0 done, 1 failed, 2 wrong use, 130 interrupted."""
         options["standalone_mode"] = False
         terminal.print_as_usual()
-        begun = time.perf_counter()
         try:
             words = with_methods(sys.argv[1:] if args is None else args)
             status = super().main(words, prog_name, **options)
@@ -144,7 +131,6 @@ class Program(click.Group):
             if isinstance(error, _FAILURES):
                 _exit(1, described(error))
             raise
-        terminal.detail(f"{time.perf_counter() - begun:.2f} s in all")
         sys.exit(status)
 
 
@@ -219,7 +205,7 @@ def given(name: str, context: click.Context | None = None) -> bool:
     # A call without a command prints one line instead of the help text.
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
-    params=[*terminal.PRINTING_OPTIONS],
+    params=[terminal.QUIET_OPTION],
 )
 @click.version_option(
     None, "-V", "--version", package_name="vkbloom", message="%(prog)s %(version)s"

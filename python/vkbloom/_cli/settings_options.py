@@ -58,7 +58,6 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         help="The method of the blur, with its defaults, or a file of a custom method "
         "[default the preset's]",
     )
-    @_glare_options
     @fields.options({"": vkbloom.Settings}, "shared")
     @fields.options(METHODS, "of_method", base=vkbloom.Settings)
     @click.option(
@@ -76,7 +75,6 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         preset: str | None,
         method: str | None,
         stored: str | None,
-        added: tuple[vkbloom.Glare, ...],
         shared: dict[str, Any],
         of_method: dict[str, Any],
         **rest: object,
@@ -87,9 +85,8 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             preset=preset,
             method=method,
             stored=None if stored is None else read_settings(stored),
-            added=added,
             changes={**shared, **of_method},
-            expands="expand" in rest and not rest.get("raw"),
+            expands="expand" in rest,
             expand=rest.get("expand"),  # type: ignore[arg-type]
         )
         if by_file:
@@ -111,7 +108,6 @@ class Start:
     """What the settings of a call start from, and how its options change them.
 
     - `stored`: Settings of a file, and what its picture was expanded up to.
-    - `added`: Stages that are added to the glare.
     - `expands`: Whether the highlights of files of integers can be expanded.
     - `expand`: What they are expanded up to, if the call says it.
     """
@@ -119,7 +115,6 @@ class Start:
     preset: str | None
     method: str | None
     stored: tuple[vkbloom.Settings, float | None] | None
-    added: tuple[vkbloom.Glare, ...]
     changes: dict[str, Any]
     expands: bool
     expand: float | None
@@ -127,10 +122,7 @@ class Start:
     def of(self, image: str) -> tuple[vkbloom.Settings, float | None]:
         """Return the settings for an image file, "" for a scene, and the value for --expand."""
         begun, expand = self._begun(image)
-        changes = self.changes
-        if self.added:
-            changes = {**changes, "glare": (*changes.get("glare", begun.glare), *self.added)}
-        return _changed(begun, changes), expand if self.expand is None else self.expand
+        return _changed(begun, self.changes), expand if self.expand is None else self.expand
 
     def of_all(self, images: Sequence[str]) -> tuple[vkbloom.Settings, float | None]:
         """Return the settings for image files that have the same, and the value for --expand."""
@@ -162,35 +154,6 @@ def _preset_of(image: str, *, expands: bool) -> str:
     if not image:
         return _PRESET_OF_SCENES
     return PRESET_OF_PHOTOS if expands and is_photograph(image) else PRESET_OF_IMAGES
-
-
-def _glare_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add options for stages; the command's argument `added` has the stages."""
-
-    @click.option("--streaks", type=click.IntRange(1, 16), help="Add this many streaks to --glare")
-    @click.option("--ghosts", is_flag=True, help="Add ghosts to --glare")
-    @click.option("--halo", is_flag=True, help="Add a halo to --glare")
-    @click.option(
-        "--dirt", type=click.Path(), help="Add dirt, with the picture of a file, to --glare"
-    )
-    @functools.wraps(command)
-    def run(
-        streaks: int | None, ghosts: bool, halo: bool, dirt: str | None, **rest: object
-    ) -> object:
-        added: list[vkbloom.Glare] = []
-        if streaks is not None:
-            added.append(vkbloom.Streaks(directions=streaks))
-        if ghosts:
-            added.append(vkbloom.Ghosts())
-        if halo:
-            added.append(vkbloom.Halo())
-        if dirt is not None:
-            picture = fields.read_colours(dirt)
-            with as_wrong_use():
-                added.append(vkbloom.Dirt(image=picture))
-        return command(added=tuple(added), **rest)
-
-    return run
 
 
 def _images_of(rest: dict[str, Any]) -> Sequence[str]:

@@ -13,7 +13,6 @@ from vkbloom._cli.fields import SIZE, Command, NameOf
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.search_options import search_options
 from vkbloom._cli.settings_options import STARTS, settings_options
-from vkbloom._cli.terminal import detail_device
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.registry import METHODS
 
@@ -58,6 +57,5 @@ def command(
         )
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
     with opened_renderer(adapter, validation) as renderer, as_wrong_use():
-        detail_device(renderer)
         result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
     show_results([result])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any, Final
 
 import click
@@ -16,20 +15,18 @@ from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.live import HELP, Live
 from vkbloom._cli.live_options import live_options
-from vkbloom._cli.terminal import detail_device, say
 from vkbloom._renderer.surface import Surface
 from vkbloom._settings.settings import SHADINGS, Shading
 
 _LARGEST: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
 _WAIT_SECONDS: Final = 0.1  # while the window is hidden
-_KEYS: Final = ("UP", "DOWN", "LEFT", "RIGHT", "SPACE", "ESCAPE", *"BPSQ", *"123456789")
+_KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
 @click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
 @click.option("--shading", type=click.Choice(SHADINGS), default="forward")
-@click.option("-o", "--out", default="view", help="Folder of screenshots.")
 @live_options(image_has_size=True)
 def command(
     *,
@@ -37,7 +34,6 @@ def command(
     origin: dict[str, Any],
     size: tuple[int, int] | None,
     shading: Shading,
-    out: str,
     adapter: str,
     validation: bool,
     scene: Callable[[], vkbloom.Scene],
@@ -52,7 +48,6 @@ def command(
         vkbloom.Renderer(adapter, validation=validation) as renderer,
         Surface(renderer, window) as surface,
     ):
-        detail_device(renderer)
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
         live = Live(settings, source, shading)
         _listen(glfw, window, renderer, live)
@@ -71,14 +66,6 @@ def command(
             if shown and now - since >= _TITLE_SECONDS:
                 glfw.set_window_title(window, live.title((now - since) / shown))
                 since, shown = now, 0
-            if live.screenshot:
-                live.screenshot = False
-                if image is None:
-                    frames = renderer.render(live.source, live.settings, surface.size, **options)
-                else:
-                    frames = renderer.apply(live.source, live.settings)
-                for path in frames.save(Path(out, time.strftime("%Y%m%d-%H%M%S"))):
-                    say(f"wrote {path}")
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom._cli.device_options import adapter_option
 from vkbloom._cli.fields import SIZE, NameOf
-from vkbloom._cli.terminal import detail_device, hides_progress, say
+from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._settings.registry import METHODS
 
 _TYPES: Final = ("uint8", "float16", "float32")
@@ -75,7 +75,6 @@ def command(
     warmed += [METHODS[name]() for name in methods]
     calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), warmed, _KEPT))
     with vkbloom.Renderer(adapter) as renderer:
-        detail_device(renderer)
         if everything:
             scene = vkbloom.Scene.ufo()
             for shading in ("forward", "deferred"):

@@ -17,7 +17,7 @@ from vkbloom import _core
 from vkbloom._argument_types import checked
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.params import RANGES, Param
-from vkbloom._custom.planning import Request, Row, planned
+from vkbloom._custom.planning import Request, planned
 from vkbloom._custom.resources import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
@@ -71,8 +71,8 @@ class CustomMethod(Settings, metaclass=CustomType):
         shared = {field.name: getattr(self, field.name) for field in dataclasses.fields(Settings)}
         return settings_block("custom", shared)
 
-    def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Row, ...]:
-        """Return the passes of a frame, as rows."""
+    def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Any, ...]:
+        """Return the passes of a frame, as the core takes them."""
         if self._state is None:
             changed = made_resources(self.file, storage=True)
         elif (changed := self._state.get(type(self), {})) == {}:
@@ -85,17 +85,17 @@ class CustomMethod(Settings, metaclass=CustomType):
             self._place,
             {**self.shaders.resources, **changed},
         )
-        return planned(self.file, self.shaders, request)
+        return tuple(row.packed() for row in planned(self.file, self.shaders, request))
 
     @property
     def _has_state(self) -> bool:
         """Whether passes change textures or buffers, so that frames depend on those before."""
         return any(block.storage for block in self.file.given.values())
 
-    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+    def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""
         copied = copy.copy(self)
-        object.__setattr__(copied, "_place", place)
+        object.__setattr__(copied, "_place", index)
         object.__setattr__(copied, "_state", state)
         return copied
 

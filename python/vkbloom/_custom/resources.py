@@ -1,14 +1,15 @@
-"""The textures and buffers of a custom method as objects of the core."""
+"""The textures and buffers of a custom method as rows of the core."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import struct
 from typing import Final
 
-from vkbloom import _core
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.file import CustomFile
+from vkbloom._custom.rows import Resource
 from vkbloom._custom.textures import Texture
 
 #: Kinds of the core's resources, and Vulkan's address modes.
@@ -18,7 +19,7 @@ BORDERS: Final = {"REPEAT": 0, "MIRROR": 1, "CLAMP": 2}
 #: Each resource has another serial, under which renderers keep it.
 SERIALS: Final = itertools.count(1)
 
-Resources = dict[str, _core.Resource]
+Resources = dict[str, Resource]
 
 
 def made_resources(file: CustomFile, *, storage: bool) -> Resources:
@@ -30,25 +31,26 @@ def made_resources(file: CustomFile, *, storage: bool) -> Resources:
     }
 
 
-def texture_resource(texture: Texture) -> _core.Resource:
+def texture_resource(texture: Texture) -> Resource:
     """Return a texture as a resource."""
-    width, height, depth = (*texture.sides, 1, 1)[:3]
     texel = len(texture.format.read(bytes(texture.format.file_bytes)).tobytes())
-    return _core.resource(
+    block = struct.pack(
+        "=2Q8I",
         next(SERIALS),
+        texel * math.prod(texture.sides),
         IMAGE if texture.storage else TEXTURE,
         texture.format.vulkan,
-        (len(texture.sides), width, height, depth),
+        len(texture.sides),
+        *(*texture.sides, 1, 1)[:3],
         texture.filter == "LINEAR",
         BORDERS[texture.border],
-        texel * math.prod(texture.sides),
-        texture.texels,
     )
+    return Resource(block, texture.texels)
 
 
-def buffer_resource(buffer: Buffer) -> _core.Resource:
+def buffer_resource(buffer: Buffer) -> Resource:
     """Return a buffer as a resource."""
-    kind = STORAGE if buffer.storage else UNIFORM
     size = -(-buffer.size // 16) * 16
     data = None if buffer.data is None else buffer.data.ljust(size, b"\0")
-    return _core.resource(next(SERIALS), kind, 0, (0, 0, 0, 0), False, 0, size, data)
+    kind = STORAGE if buffer.storage else UNIFORM
+    return Resource(struct.pack("=2Q8I", next(SERIALS), size, kind, *(0,) * 7), data)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
-from vkbloom import _core
 from vkbloom._custom.compiler import cached_code, compile_shader
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.glsl import Shader, write_shader
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.resources import made_resources
+from vkbloom._custom.rows import CoreShader
 from vkbloom._custom.source import Source
 
 #: Passes that the package adds: a copy, the difference of two pictures, and black.
@@ -42,51 +43,52 @@ class Shaders:
         self._name = name
         self._file = file
         self.resources = made_resources(file, storage=False)
-        self._compiled: dict[tuple[Any, ...], tuple[Shader, _core.Shader]] = {}
+        self._compiled: dict[tuple[Any, ...], tuple[Shader, CoreShader]] = {}
 
     def of(
-        self, one: CustomPass, stage: str, values: Mapping[str, float]
-    ) -> tuple[Shader, _core.Shader]:
+        self, item: CustomPass, stage: str, values: Mapping[str, float]
+    ) -> tuple[Shader, CoreShader]:
         """Return the shader of a pass at a stage, for the values that the compiler must know."""
-        key = self._key(one, stage, values)
-        found = self._compiled.get(key)
-        if found is None:
-            shader = write_shader(self._file, one, stage, values)
-            found = self._keep(key, one, shader, compile_shader(self._file, one, shader))
-        return found
+        key = self._key(item, stage, values)
+        kept = self._compiled.get(key)
+        if kept is None:
+            shader = write_shader(self._file, item, stage, values)
+            kept = self._keep(key, item, shader, compile_shader(self._file, item, shader))
+        return kept
 
     def compile_all(self, values: Mapping[str, float]) -> None:
         """Compile all passes, several at a time."""
         missing = []
-        for stage, one in self._file.runs():
+        for stage, item in self._file.runs():
             # The cache has most, and a thread takes longer than to read them.
-            shader = write_shader(self._file, one, stage, values)
+            shader = write_shader(self._file, item, stage, values)
             code = cached_code(shader)
             if code is None:
-                missing.append((one, stage))
+                missing.append((item, stage))
             else:
-                self._keep(self._key(one, stage, values), one, shader, code)
+                self._keep(self._key(item, stage, values), item, shader, code)
         if not missing:
             return
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            futures = [threads.submit(self.of, one, stage, values) for one, stage in missing]
+            futures = [threads.submit(self.of, item, stage, values) for item, stage in missing]
         for future in futures:
             future.result()
 
-    def _key(self, one: CustomPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
+    def _key(self, item: CustomPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
         fixed = tuple(values[param.name] for param in self._file.params if param.use != "uniform")
-        return one.line, stage, fixed
+        return item.line, stage, fixed
 
     def _keep(
-        self, key: tuple[Any, ...], one: CustomPass, shader: Shader, code: bytes
-    ) -> tuple[Shader, _core.Shader]:
-        found = shader, _core.shader(f"{self._name}_{one.line}", code)
-        self._compiled[key] = found
-        return found
+        self, key: tuple[Any, ...], item: CustomPass, shader: Shader, code: bytes
+    ) -> tuple[Shader, CoreShader]:
+        digest = hashlib.sha256(code).digest()[:16]
+        made = shader, CoreShader(f"{self._name}_{item.line}", code, digest)
+        self._compiled[key] = made
+        return made
 
 
 @functools.cache
-def package_shader(place: int) -> _core.Shader:
+def package_shader(index: int) -> CoreShader:
     """Return the shader of one of the package's passes."""
     file = read_file(Source("vkbloom", PACKAGE_PASSES))
-    return Shaders("own", file).of(file.passes[place], "MAIN", {})[1]
+    return Shaders("own", file).of(file.passes[index], "MAIN", {})[1]

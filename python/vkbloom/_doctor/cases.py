@@ -128,17 +128,17 @@ def _apply(
 
 
 def _with_passes(
-    found: Iterable[Deviation], renderer: Renderer, image: NDArray[Any], settings: Settings
+    results: Iterable[Deviation], renderer: Renderer, image: NDArray[Any], settings: Settings
 ) -> Iterator[Deviation]:
     """Add to what is wrong the shader and the variant of the pass that writes it."""
-    for one in found:
+    for item in results:
         writers = [
             f"{row.shader} ({row.variant})"
-            for row in (renderer.plan(image, settings).passes if one.wrong else ())
-            if one.name in row.writes
+            for row in (renderer.plan(image, settings).passes if item.wrong else ())
+            if item.name in row.writes
         ]
         by = f"; written by {', '.join(dict.fromkeys(writers))}" if writers else ""
-        yield one._replace(wrong=one.wrong + by)
+        yield item._replace(wrong=item.wrong + by)
 
 
 def _final(renderer: Renderer, parts: tuple[Any, ...]) -> Iterator[Deviation]:
@@ -152,19 +152,19 @@ def _final(renderer: Renderer, parts: tuple[Any, ...]) -> Iterator[Deviation]:
     )
     frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
     expected = reference.composite(image, frames["bloom"], settings)
-    found = deviation("final", frames["final"], expected, tolerance(dtype, expected))
-    yield from _with_passes([found], renderer, image, settings)
+    final = deviation("final", frames["final"], expected, tolerance(dtype, expected))
+    yield from _with_passes([final], renderer, image, settings)
 
 
 def _convolve(renderer: Renderer, size: tuple[int, int]) -> Iterator[Deviation]:
     """Compare transforms of all radices, whose error is relative to the largest value."""
     image, settings = np.abs(picture(size, 3, "float32")), Convolution(psf.spencer())
     frames, expected = renderer.apply(image, settings), reference.apply(image, settings)
-    found = (
+    results = (
         deviation(name, frames[name], expected[name], 1e-5 * float(np.abs(expected[name]).max()))
         for name in ("bloom", "final")
     )
-    yield from _with_passes(found, renderer, image, settings)
+    yield from _with_passes(results, renderer, image, settings)
 
 
 def _not_finite(renderer: Renderer, settings: Settings, dtype: str) -> Iterator[Deviation]:
@@ -201,10 +201,12 @@ def _derivatives(renderer: Renderer, settings: Settings, given: bool) -> Iterato
     values = np.random.default_rng(1).random((4, 11, 14, 3), np.float32)
     arrays: dict[str, Any] = {"mask": values[1, ..., 0], "emission": values[2]} if given else {}
     _, pullback = vkbloom.vjp(values[0], settings, renderer=renderer, **arrays)
-    found = pullback({"final": values[3]})
+    gradients = pullback({"final": values[3]})
     for name, part in reference.vjp(values[0], settings, **arrays)[1]({"final": values[3]}).items():
         limit = 1e-5 * max(float(np.abs(part).max()), 1e-3)
-        yield deviation(f"derivative by {name}", np.asarray(found[name]), np.asarray(part), limit)
+        yield deviation(
+            f"derivative by {name}", np.asarray(gradients[name]), np.asarray(part), limit
+        )
 
 
 def _map(renderer: Renderer, dtype: str, settings: Settings) -> Iterator[Deviation]:

@@ -109,14 +109,14 @@ def deviation(
     np.subtract(actual, expected, out=difference, where=finite)
     difference = np.abs(difference)
     limits = np.broadcast_to(limit, difference.shape)
-    place = np.unravel_index(int((difference - limits).argmax()), difference.shape)
-    off, allowed = float(difference[place]), float(limits[place])
+    at = np.unravel_index(int((difference - limits).argmax()), difference.shape)
+    off, allowed = float(difference[at]), float(limits[at])
     if off <= allowed:
         # Of all values, not of the one nearest to its limit, which a black one may be.
-        place = np.unravel_index(int(difference.argmax()), difference.shape)
-        return Deviation(name, float(difference[place]), float(limits[place]))
+        at = np.unravel_index(int(difference.argmax()), difference.shape)
+        return Deviation(name, float(difference[at]), float(limits[at]))
     wrong = (
-        f"{name}: {actual[place]:.8g} at {tuple(map(int, place))}, not {expected[place]:.8g}: "
+        f"{name}: {actual[at]:.8g} at {tuple(map(int, at))}, not {expected[at]:.8g}: "
         f"off by {off:.3g}, {allowed:.3g} allowed"
     )
     return Deviation(name, off, allowed, wrong)
@@ -225,7 +225,7 @@ def deviations(
     dtypes = {"final": image.dtype.name, "kernel": "float32"}
     # Light that glare adds is not stored in 8 bits.
     wide = "float16" if format == "rgba8unorm" else _DTYPES[format]
-    stages = tuple(one.stage for one in settings.glare)
+    stages = tuple(item.stage for item in settings.glare)
     for name, array in frames.items():
         dtype = dtypes.get(name, wide if name.startswith(stages) else _DTYPES[format])
         if array.dtype != dtype:

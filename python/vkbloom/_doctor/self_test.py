@@ -22,12 +22,6 @@ from vkbloom._doctor.deviations import Deviation
 
 PROGRAM = ("-m", "vkbloom._doctor.self_test")
 _MARK: Final = "vkbloom-case "
-#: What the tests have drawn with, by parts of the driver's name and of its version.
-DRAWN: Final = {
-    "llvmpipe": ("Mesa 22.3.6", "Mesa 25.0.7"),
-    "SwiftShader": ("SwiftShader",),
-    "NVIDIA": ("580.",),
-}
 
 
 def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
@@ -51,52 +45,38 @@ def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
 
 def report(adapter: str, result: list[dict[str, Any]], seconds: float) -> dict[str, Any]:
     """Return what `run` yielded as one object, to be written as JSON."""
-    device: dict[str, Any] = next(
-        (one for one in result if "device" in one), {"device": None, "unknown": []}
-    )
-    done = [one for one in result if "device" not in one]
+    device: dict[str, Any] = next((item for item in result if "device" in item), {"device": None})
+    done = [item for item in result if "device" not in item]
     groups = []
-    for name in dict.fromkeys(one["group"] for one in done):
-        group = [one for one in done if one["group"] == name]
-        worst = max(group, key=lambda one: one.get("share", 0.0))
+    for name in dict.fromkeys(item["group"] for item in done):
+        group = [item for item in done if item["group"] == name]
+        worst = max(group, key=lambda item: item.get("share", 0.0))
         groups.append(
             {
                 "name": name,
                 "cases": len(group),
-                "wrong": sum(bool(one["wrong"]) for one in group),
+                "wrong": sum(bool(item["wrong"]) for item in group),
                 "largest_error": worst.get("off"),
                 "allowed": worst.get("allowed"),
                 "worst": worst["name"],
-                "seconds": sum(one.get("seconds", 0.0) for one in group),
+                "seconds": sum(item.get("seconds", 0.0) for item in group),
             }
         )
-    wrong = [{key: one[key] for key in ("group", "name", "wrong")} for one in done if one["wrong"]]
+    wrong = [
+        {key: item[key] for key in ("group", "name", "wrong")} for item in done if item["wrong"]
+    ]
     return {
         "self_test": 1,
         "version": vkbloom.__version__,
         "platform": platform.platform(),
         "adapter": adapter,
         "device": device["device"],
-        "unknown": device["unknown"],
         "passed": bool(done) and not wrong,
         "cases": len(done),
         "seconds": seconds,
         "groups": groups,
         "wrong": wrong,
     }
-
-
-def unknown(info: vkbloom.AdapterInfo) -> list[str]:
-    """Return what no test of vkbloom has drawn with before."""
-    versions = next(
-        (known for name, known in DRAWN.items() if name in f"{info.driver} {info.name}"), ()
-    )
-    if not versions:
-        return [f"driver: {info.driver or info.name} has not been tried; {', '.join(DRAWN)} have"]
-    if any(version in f"{info.driver_info} {info.driver}" for version in versions):
-        return []
-    tried = " and ".join(versions)
-    return [f"driver: version {info.driver_info} has not been tried; {tried} have"]
 
 
 class _Renderers(contextlib.ExitStack):
@@ -120,11 +100,11 @@ def judge(case: Case, renderer: vkbloom.Renderer) -> dict[str, Any]:
     start = time.perf_counter()
     worst = Deviation("", 0.0, 0.0)
     try:
-        for found in case.check(renderer):
-            worst = max(worst, found, key=lambda one: one.share)
-            if found.wrong:
+        for each in case.check(renderer):
+            worst = max(worst, each, key=lambda item: item.share)
+            if each.wrong:
                 # The first one in the order of the data flow: later ones follow from it.
-                worst = found
+                worst = each
                 break
     except Exception as error:
         # Of the driver, or of what the driver made vkbloom do.
@@ -155,7 +135,7 @@ def main() -> None:
         except (vkbloom.Error, ValueError, OSError) as error:
             _tell(group="device", name=adapter, wrong=f"{type(error).__name__}: {error}")
             return
-        _tell(device=dataclasses.asdict(info), unknown=unknown(info), count=len(chosen))
+        _tell(device=dataclasses.asdict(info), count=len(chosen))
         for case in chosen:
             _tell(next={"group": case.group, "name": case.name})
             _tell(**judge(case, renderers.get(case.variant)))

@@ -20,8 +20,6 @@ def explore(
     source: Scene | NDArray[Any] | None = None,
     settings: Settings | None = None,
     *,
-    mask: NDArray[Any] | None = None,
-    emission: NDArray[Any] | None = None,
     against: Settings | None = None,
     size: tuple[int, int] = (1280, 720),
     shading: Shading = "deferred",
@@ -43,8 +41,6 @@ def explore(
         The initial settings. Default: ``presets["bevy_natural"]`` for an image and
         ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if the
         shading is deferred.
-    mask, emission : ndarray, optional
-        For an image, as for `Renderer.apply`. They are reduced with the image.
     against : Settings, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
@@ -78,8 +74,6 @@ def explore(
         Viewer(
             source,
             settings,
-            mask=mask,
-            emission=emission,
             against=against,
             size=size,
             shading=shading,

@@ -100,16 +100,16 @@ def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
     for control in result:
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-        is_own = control["name"] not in shared and control["name"] not in _RARE
-        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_own and slides)
+        is_of_method = control["name"] not in shared and control["name"] not in _RARE
+        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_of_method and slides)
 
-    def place(control: dict[str, Any]) -> tuple[int, ...]:
+    def rank(control: dict[str, Any]) -> tuple[int, ...]:
         name = control["name"]
         if name in _FIRST:
             return 0, _FIRST.index(name)
         return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
 
-    return sorted(result, key=place)
+    return sorted(result, key=rank)
 
 
 def _fields_of_function(function: PSF) -> list[dict[str, Any]]:
@@ -195,10 +195,8 @@ def as_code(settings: Settings) -> str:
 
 def _maker(kind: Any) -> str:
     """Return Python code of the class."""
-    if not METHODS.is_added(kind.method):
-        return f"vkbloom.{kind.__name__}"
     if not isinstance(kind, CustomType):
-        return str(kind.__name__)
+        return f"vkbloom.{kind.__name__}"
     path = kind.file.source.name
     source = "text" if path == "<text>" else json.dumps(path)
     name = "" if identifier_of(Path(path).stem) == kind.method else f', name="{kind.method}"'

@@ -29,6 +29,7 @@ import dataclasses
 import math
 import tempfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -36,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._checks import check_emission, check_image, check_mask, check_number, check_size
+from vkbloom._checks import check_image, check_number, check_size
 from vkbloom._explorer.controls import (
     as_fields,
     code_with_image,
@@ -50,7 +51,6 @@ from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._renderer.sources import image_source, scene_source
 from vkbloom._scene import Scene
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
@@ -92,8 +92,6 @@ class Viewer:
         source: Scene | NDArray[Any] | None = None,
         settings: Settings | None = None,
         *,
-        mask: NDArray[Any] | None = None,
-        emission: NDArray[Any] | None = None,
         against: Settings | None = None,
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
@@ -114,11 +112,8 @@ class Viewer:
             self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
             self._own_size = check_size("size", size)
-            for name, given in (("mask", mask), ("emission", emission)):
-                if given is not None:
-                    raise ValueError(f"{name}: the source is a scene; leave the argument out")
         else:
-            self._show_image(source, mask, emission)
+            self._show_image(source)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")
         self.renderer = Renderer(adapter) if renderer is None else renderer
@@ -149,23 +144,12 @@ class Viewer:
         self._name = PurePath(file).name
         self._note = f"highlights expanded up to {expand:g}" if expand is not None else ""
 
-    def _show_image(
-        self,
-        source: NDArray[Any],
-        mask: NDArray[Any] | None = None,
-        emission: NDArray[Any] | None = None,
-    ) -> None:
-        # Copies, since the caller may change the arrays while the page is open.
+    def _show_image(self, source: NDArray[Any]) -> None:
+        # A copy, since the caller may change the array while the page is open.
         image = np.array(check_image(source), order="C")
-        given = {"image": image}
-        if emission is not None:
-            given["emission"] = np.array(check_emission(emission, image), order="C")
-        if mask is not None:
-            # With a channel axis, as `reduced` requires.
-            given["mask"] = np.array(check_mask(mask, image.shape[:2]))[..., np.newaxis]
-        self._scene, self._image = None, given
+        self._scene, self._image = None, image
         self._own_size = (image.shape[1], image.shape[0])
-        self._reduced = (self._own_size, self._image)
+        self._reduced = (self._own_size, image)
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
         """Return the answer to a message.
@@ -253,7 +237,7 @@ class Viewer:
         size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
         stops = check_number("stops", message.get("stops", 0.0), -32, 32)
         self._looked_at(message)
-        at = None if message.get("at") is None else _place(message["at"])
+        at = None if message.get("at") is None else _position(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
         buffers: list[bytes] = []
@@ -293,19 +277,19 @@ class Viewer:
         return {"sides": sides}, buffers
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
-        at = _place(message.get("at"))
+        at = _position(message.get("at"))
         arrays = self._arrays_of(message.get("view"))
         return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
 
     def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
         """Return the time, shading and glow of a message; missing ones stay as they are."""
-        own = 1.0 if self._scene is None else self._scene.glow_intensity
+        usual = 1.0 if self._scene is None else self._scene.glow_intensity
         time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
         shading, glow = message.get("shading"), message.get("glow")
         return (
             time,
             self._shading if shading is None else check_shading(shading),
-            own if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+            usual if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
         )
 
     def _render(
@@ -314,43 +298,25 @@ class Viewer:
         """Return the named framebuffer, or `final`; the names of all; the planned passes."""
         name = message.get("framebuffer", "final")
         time, self._shading, glow = self._looked_at(message)
+        source: Any = self._scene
+        draw: Any = self.renderer.apply
+        how: dict[str, Any] = {}
         if self._scene is None:
-            given: dict[str, Any] = dict(self._image_of(size))
-            image = given.pop("image")
-            if "mask" in given:
-                # Rounding may move averages of 0..1 out of this range.
-                given["mask"] = given["mask"][..., 0].clip(0, 1)
-            names = list(self.renderer.plan(image, settings).framebuffers)
-            chosen = str(name) if name in names else "final"
-            frames = self.renderer.apply(image, settings, framebuffers=[chosen], **given)
-            source = image_source(image, **given)
-            return frames, names, self._passes(source, settings, chosen)
-        if glow != self._scene.glow_intensity:
-            self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
-        plan = self.renderer.plan(self._scene, settings, size, shading=self._shading)
-        names = list(plan.framebuffers)
-        chosen = str(name) if name in names else "final"
-        frames = self.renderer.render(
-            self._scene,
-            settings,
-            size,
-            shading=self._shading,
-            time=time,
-            framebuffers=[chosen],
-        )
-        source = scene_source(self._scene, size, self._shading, time)
-        return frames, names, self._passes(source, settings, chosen)
+            source = self._image_of(size)
+        else:
+            if glow != self._scene.glow_intensity:
+                source = self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
+            draw = partial(self.renderer.render, time=time)
+            how = {"size": size, "shading": self._shading}
+        names = list(self.renderer.plan(source, settings, **how).framebuffers)
+        how["framebuffers"] = [str(name) if name in names else "final"]
+        passes = self.renderer.plan(source, settings, **how).passes
+        return draw(source, settings, **how), names, list(passes)
 
-    def _passes(self, source: _core.Source, settings: Settings, name: str) -> list[Pass]:
-        """Return the passes of a framebuffer; of an image with its mask and emission."""
-        plan = self.renderer._core.plan(source, settings, (name,))
-        return [Pass(*row[:-1]) for row in plan.passes]
-
-    def _image_of(self, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
-        """Return the image, and its mask and emission, at the size at which it is shown."""
+    def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
+        """Return the image at the size at which it is shown."""
         if self._reduced[0] != size:
-            images = {name: reduced(array, size) for name, array in self._image.items()}
-            self._reduced = (size, images)
+            self._reduced = (size, reduced(self._image, size))
         return self._reduced[1]
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
@@ -396,7 +362,7 @@ def _described(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
-def _place(at: object) -> tuple[float, float]:
+def _position(at: object) -> tuple[float, float]:
     if not (isinstance(at, list | tuple) and len(at) == 2):
         raise TypeError(f"at: {at!r:.80} is not (x, y)")
     for part in at:

@@ -27,9 +27,9 @@ def is_found(target: Array, residual: Array, plain: Array) -> bool:
     """Return whether a bloom explains the target better than a change of each pixel's colour."""
     if np.count_nonzero(target != plain) < _FEW_VALUES:
         return False
-    found = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
+    remaining = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
     changed = float(np.linalg.norm(target - plain))
-    return found < changed and found < _recoloured(plain, target)
+    return remaining < changed and remaining < _recoloured(plain, target)
 
 
 def _recoloured(image: Array, target: Array) -> float:
@@ -59,17 +59,6 @@ def likely_cause(
     if not (target - plain).any():
         return f"{NOTHING_FOUND}; the target is equal to the image"
     result = target + residual
-    # Saturated pixels are equal to the target, which would not be so after a turn.
-    compared = (residual != 0).any(axis=2)
-    for text, flip in (
-        ("upside down", np.s_[::-1]),
-        ("mirrored", np.s_[:, ::-1]),
-        ("in the order b, g, r", np.s_[..., ::-1]),
-    ):
-        turned = target[flip][compared]
-        off = result[compared] - turned
-        if np.linalg.norm(off) < np.linalg.norm(residual) / 2:
-            return _with_bloom(f"the target is {text}", _is_bloom(turned, off, plain[compared]))
     peak = float(target.max())
     share = float((target >= peak).any(axis=2).mean())
     if share >= _CLIPPED and result.max() > 1.05 * peak:

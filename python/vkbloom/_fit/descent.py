@@ -110,7 +110,7 @@ class Descent(Search):
         begun = len(self.history)
         arrays: list[NDArray[np.float64]] = []  # the last one, where a step was accepted
         estimates: list[_Sums] = []
-        places: list[Point] = []
+        visited: list[Point] = []
 
         def residual(part: Point) -> NDArray[np.float64]:
             arrays[:] = [self._values(part)]
@@ -123,16 +123,16 @@ class Descent(Search):
             unit = self._measure.differences(array)
             unit /= max(float(np.linalg.norm(unit)), 1e-30)
             gradient, sums = self._sums(part, array, unit)
-            moved = np.abs(part - places[-1]).max() if places else 1.0
-            places.append(part.copy())
+            moved = np.abs(part - visited[-1]).max() if visited else 1.0
+            visited.append(part.copy())
             if moved > _NEAR:
                 estimates.clear()
             estimates.append(sums)
             del estimates[:-_MAX_ESTIMATES]
             rows = [
-                row - np.vdot(one, unit) * gradient
-                for signs, found in estimates
-                for one, row in zip(signs, found, strict=True)
+                row - np.vdot(each, unit) * gradient
+                for signs, results in estimates
+                for each, row in zip(signs, results, strict=True)
             ]
             # Of the rows only the products of columns count.
             return np.vstack([gradient, np.linalg.qr(np.array(rows) / np.sqrt(len(rows)), "r")])
@@ -160,7 +160,7 @@ class Descent(Search):
         signs = 1 - 2 * self._random.integers(0, 2, shape, np.int8)
         scales = self._measure.scales(array)
         back = self._derivatives(self._space.settings(part))
-        found = [back(one * scales) for one in (unit, *signs)]
-        rows = np.array([[float(one[axis.name]) for axis in self._space.axes] for one in found])
-        rows *= [axis.slope(place) for axis, place in zip(self._space.axes, part, strict=True)]
+        results = [back(each * scales) for each in (unit, *signs)]
+        rows = np.array([[float(each[axis.name]) for axis in self._space.axes] for each in results])
+        rows *= [axis.slope(at) for axis, at in zip(self._space.axes, part, strict=True)]
         return rows[0], (signs, rows[1:])

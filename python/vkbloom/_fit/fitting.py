@@ -173,31 +173,30 @@ def fit(
     if is_all:
         spaces = spaces_of_all(candidates, names, *limits)
     else:
-        spaces = [space_of(one, names, *limits) for one in candidates]
+        spaces = [space_of(each, names, *limits) for each in candidates]
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
     renderer = renderer or default_renderer()
     stages = _stages(renderer, image, pixels, measure)
     # All of them before the first is searched: the most likely failures come at once.
-    priced = [_priced(renderer, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
-    found = []
-    for space, cost in priced:
+    spaces = [_effective(renderer, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
+    results = []
+    for space in spaces:
         if not space.axes:
             continue
         with _bar(progress, space.start.method, max_calls) as on_loss:
-            one = _fitted(
+            fitted = _fitted(
                 renderer,
                 stages,
                 space,
-                cost,
                 framebuffer,
                 max_calls=max_calls,
                 on_loss=on_loss,
                 gradient=gradient,
             )
-            found.append(one)
-    found.sort(key=lambda one: one.loss)
-    return found[0] if isinstance(settings, Settings) else found
+            results.append(fitted)
+    results.sort(key=lambda item: item.loss)
+    return results[0] if isinstance(settings, Settings) else results
 
 
 def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]:
@@ -207,7 +206,7 @@ def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]
     some: list[Any] = [settings] if isinstance(settings, Settings | str) else list(settings)
     if not some:
         raise ValueError("settings: there are none; give at least one")
-    return [check_settings(one) for one in some]
+    return [check_settings(item) for item in some]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -251,10 +250,10 @@ def _stages(
     return stages
 
 
-def _priced(
+def _effective(
     renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
-) -> tuple[Space, NDArray[np.int_]]:
-    """Return a space, and how many passes run after a change of each varied field alone."""
+) -> Space:
+    """Return the space of the fields that have an effect; others are refused, or dropped."""
     plan = renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
     shape = plan.framebuffers[framebuffer][0]
     if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
@@ -262,29 +261,26 @@ def _priced(
             f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
             f"not the size of the target; it can be bloom or final"
         )
-    costs = np.array(
-        [_cost(stage.image, space, index, framebuffer) for index in range(len(space.axes))]
-    )
-    for axis, cost in zip(space.axes, costs, strict=True):
-        if not (cost or drop):
+    has_effect = [_has_effect(stage.image, space, i, framebuffer) for i in range(len(space.axes))]
+    for axis, is_effective in zip(space.axes, has_effect, strict=True):
+        if not (is_effective or drop):
             raise ValueError(
                 f"vary: {axis.name} has no effect on {framebuffer}"
                 + ("; give framebuffer='final'" if framebuffer != "final" else "")
             )
-    kept = tuple(itertools.compress(space.axes, costs))
-    return dataclasses.replace(space, axes=kept), costs[costs > 0]
+    return dataclasses.replace(space, axes=tuple(itertools.compress(space.axes, has_effect)))
 
 
-def _cost(image: Image, space: Space, index: int, framebuffer: str) -> int:
-    """Return how many passes run after a change of one varied field."""
+def _has_effect(image: Image, space: Space, index: int, framebuffer: str) -> bool:
+    """Return whether passes run after a change of one varied field."""
     steps = []
-    # From several places: at one of them a field may be without effect.
-    for place in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
+    # From several values: at one of them a field may be without effect.
+    for coordinate in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
         point = space.origin.copy()
-        point[index] = place
-        one = space.settings(point)
-        steps.append((image_source(image), _core.plan(image_source(image), one, (framebuffer,))))
-    return max(map(len, _core.dry_run(tuple(steps))[1:]))
+        point[index] = coordinate
+        plan = _core.plan(image_source(image), space.settings(point), (framebuffer,))
+        steps.append((image_source(image), plan))
+    return any(_core.dry_run(tuple(steps))[1:])
 
 
 @contextlib.contextmanager
@@ -307,7 +303,6 @@ def _fitted(
     renderer: Renderer,
     stages: list[_Stage],
     space: Space,
-    costs: NDArray[np.int_],
     framebuffer: str,
     *,
     max_calls: int,
@@ -336,7 +331,6 @@ def _fitted(
             stage.measure,
             render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
-            costs=costs,
             on_loss=on_loss,
             close=_close(stage, framebuffer),
         )
@@ -412,11 +406,11 @@ def _derivatives(
     def back(cotangent: NDArray[np.float64]) -> Any:
         whole = np.zeros((*cotangent.shape[:2], channels))
         whole[..., :3] = cotangent
-        found = pullback({framebuffer: whole})
-        if stage.factor == 1 or "blur_scale" not in found:
-            return found
+        gradients = pullback({framebuffer: whole})
+        if stage.factor == 1 or "blur_scale" not in gradients:
+            return gradients
         # `_smaller` has divided the scale.
-        return {**found, "blur_scale": found["blur_scale"] / np.float32(stage.factor)}
+        return {**gradients, "blur_scale": gradients["blur_scale"] / np.float32(stage.factor)}
 
     return back
 
@@ -435,18 +429,10 @@ def _smaller(settings: Settings, factor: int) -> Settings:
 
 @contextlib.contextmanager
 def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
-    """Give the function that gets each loss, and shows it where asked for."""
+    """Give the function that gets each loss, and counts the calls where asked for."""
     if not progress:
         yield lambda loss: None
         return
     tqdm = import_extra("tqdm.auto", "cli", "A progress bar").tqdm
-    best = math.inf
     with tqdm(total=total, desc=method, unit="call", leave=False) as bar:
-
-        def tell(loss: float) -> None:
-            nonlocal best
-            best = min(best, loss)
-            bar.set_postfix_str(f"loss {best:.3g}", refresh=False)
-            bar.update()
-
-        yield tell
+        yield lambda loss: bar.update()

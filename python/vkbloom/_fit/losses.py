@@ -146,7 +146,7 @@ class Measure:
     ) -> NDArray[np.float64]:
         if self.loss == "log":
             floor = _DARK * float(self.target.max())
-            first, second = (np.log10(np.maximum(one, floor)) for one in (array, target))
+            first, second = (np.log10(np.maximum(item, floor)) for item in (array, target))
             return np.ravel(first - second) / math.sqrt(array.size)
         scale = math.sqrt(array.size)
         if self.loss == "relative":
@@ -189,7 +189,7 @@ def _curve_of(target: NDArray[Any]) -> Curve | None:
     if not (values.min() >= 0 and values.max() <= 1):  # also NaN
         return None
     return next(
-        (one for one in _CURVES if np.abs(one.rounded(values) - values).max() < _LEVEL), None
+        (item for item in _CURVES if np.abs(item.rounded(values) - values).max() < _LEVEL), None
     )
 
 

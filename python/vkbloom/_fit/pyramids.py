@@ -101,8 +101,8 @@ def fit_pyramid(
     frames = renderer.apply(image, settings)
     start = renderer.apply(image, begun, framebuffers=["bloom"])["bloom"]
     framebuffer = "final" if direct else "bloom"
-    found = light(frames[framebuffer])
-    losses = measure(light(start)), measure(found)
+    fitted = light(frames[framebuffer])
+    losses = measure(light(start)), measure(fitted)
     plain = light(point) if direct else np.zeros_like(measure.target)
     return FitResult(
         settings=settings,
@@ -116,7 +116,7 @@ def fit_pyramid(
         vary=("level_weights", "intensity") if direct else ("level_weights",),
         frames=frames,
         target=measure.target,
-        residual=found - measure.target,
+        residual=fitted - measure.target,
         plain=plain,
         explained=measure.explained(losses[1], plain),
     )

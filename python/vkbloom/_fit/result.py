@@ -61,7 +61,7 @@ class FitResult:
         pixel's colour explains, such as brightness or contrast.
     cause : str
         What the likely cause is if the verdict is not good: no bloom in the target; a target that
-        is clipped, encoded or turned; or another method.
+        is clipped or encoded; or another method.
     """
 
     settings: Settings
@@ -107,11 +107,11 @@ class FitResult:
 
     def _repr_html_(self) -> str:
         """Return a report with pictures."""
-        found = self.target + self.residual
+        fitted = self.target + self.residual
         peak = float(np.percentile(self.target.max(axis=2), 99.9)) or 1.0
         largest = float(np.abs(self.residual).max()) or 1.0
         shown = (
-            (self.framebuffer, found / peak, f"1 is {peak:.3g}"),
+            (self.framebuffer, fitted / peak, f"1 is {peak:.3g}"),
             ("target", self.target / peak, f"1 is {peak:.3g}"),
             ("difference", np.abs(self.residual) / largest, f"1 is {largest:.3g}"),
         )

@@ -41,7 +41,6 @@ class Search:
 
     - `render`: Takes settings, returns the framebuffer as float64 (H, W, 3).
     - `max_calls`: How often it may be called.
-    - `costs`: Passes that run after a change of each varied field alone.
     - `on_loss`: Is called with the loss of each call.
     - `close`: Below this loss the search only polishes.
     """
@@ -53,7 +52,6 @@ class Search:
         render: Callable[[Any], NDArray[np.float64]],
         *,
         max_calls: int,
-        costs: NDArray[np.int_],
         on_loss: Callable[[float], None],
         close: float = CLOSE,
     ) -> None:
@@ -61,7 +59,6 @@ class Search:
         self._measure = measure
         self._render = render
         self._left = max_calls
-        self._costs = costs
         self._on_loss = on_loss
         self._close = close
         self.best = space.origin
@@ -137,7 +134,7 @@ class Search:
         units = qmc.Halton(len(low), scramble=False).random((turn + 1) * count + 1)[-count:]
         # Levels make a valley rough, so that least squares do not reach its end.
         enough = self._close if self._measure.is_rounded else min(_NEAR, self.loss / 2)
-        found = optimize.differential_evolution(
+        result = optimize.differential_evolution(
             self._loss,
             np.stack([low, high], axis=1),
             init=np.clip([self.best, *(low + (high - low) * units)], low, high),
@@ -147,8 +144,8 @@ class Search:
             rng=turn,
             callback=lambda intermediate_result: self.loss <= enough,
         )
-        order = np.argsort(found.population_energies, kind="stable")
-        for start in [self._space.origin, *found.population[order]][:_STARTS]:
+        order = np.argsort(result.population_energies, kind="stable")
+        for start in [self._space.origin, *result.population[order]][:_STARTS]:
             self._descend(start, STEPS[0], most=5)
             if self.loss <= self._close:
                 return
@@ -162,13 +159,11 @@ class Search:
             self._simplex(point, step, most)
             return
         optimize = import_extra("scipy.optimize", "fit", "Fitting")
-        # Cheap fields first: the render for the next field also resets the field before it.
-        order = free[np.argsort(self._costs[free], kind="stable")]
         known: dict[bytes, NDArray[np.float64]] = {}
 
         def residual(part: Point) -> NDArray[np.float64]:
             whole = point.copy()
-            whole[order] = part
+            whole[free] = part
             return self._measure.residual(self._values(whole))
 
         def jacobian(part: Point) -> NDArray[np.float64]:
@@ -182,12 +177,12 @@ class Search:
 
         def remembered(part: Point) -> NDArray[np.float64]:
             known.clear()
-            known[part.tobytes()] = found = residual(part)
-            return found
+            known[part.tobytes()] = result = residual(part)
+            return result
 
         optimize.least_squares(
             remembered,
-            np.clip(point[order], 1e-9, 1 - 1e-9),
+            np.clip(point[free], 1e-9, 1 - 1e-9),
             jacobian,
             bounds=(0.0, 1.0),
             x_scale="jac",

@@ -52,8 +52,8 @@ class Axis:
 
     def slope(self, coordinate: float) -> float:
         """Return the derivative of a number's value by its coordinate."""
-        place = min(max(coordinate, 0.0), 1.0) * self._length
-        return self._length * (1.0 if self.scale is None else self.scale * math.exp(place))
+        position = min(max(coordinate, 0.0), 1.0) * self._length
+        return self._length * (1.0 if self.scale is None else self.scale * math.exp(position))
 
     def coordinate(self, value: Any) -> float:
         """Return the coordinate of a value, the nearest where it is out of bounds."""
@@ -71,8 +71,8 @@ class Axis:
     def _warped(self, distance: float) -> float:
         return distance if self.scale is None else math.log1p(distance / self.scale)
 
-    def _unwarped(self, place: float) -> float:
-        return place if self.scale is None else self.scale * math.expm1(place)
+    def _unwarped(self, position: float) -> float:
+        return position if self.scale is None else self.scale * math.expm1(position)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +98,8 @@ class Space:
     def settings(self, point: Point) -> Settings:
         """Return the settings at some coordinates."""
         values = {
-            axis.name: axis.value(float(place))
-            for axis, place in zip(self.axes, point, strict=True)
+            axis.name: axis.value(float(position))
+            for axis, position in zip(self.axes, point, strict=True)
         }
         return self.start.replace(**values)
 
@@ -113,15 +113,15 @@ def spaces_of_all(
 ) -> list[Space]:
     """Return the space of each candidate that has some of the varied fields."""
     spaces, refused = [], None
-    for one in candidates:
+    for item in candidates:
         axes: list[Axis] = []
         for name in names:
             try:
-                axes += space_of(one, [name], bounds, brightest, height).axes
+                axes += space_of(item, [name], bounds, brightest, height).axes
             except ValueError as error:
                 refused = error
         if axes:
-            spaces.append(Space(start=one, axes=tuple(axes)))
+            spaces.append(Space(start=item, axes=tuple(axes)))
     if not spaces and refused is not None:
         raise refused
     return spaces
@@ -135,7 +135,7 @@ def space_of(
     axes = []
     for name in vary:
         if name not in fields:
-            known = ", ".join(one for one in fields if varied_as(fields[one]))
+            known = ", ".join(item for item in fields if varied_as(fields[item]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}"
                 f"{did_you_mean(name, fields) or ';'} it can vary {known}"

@@ -105,7 +105,7 @@ def translate(
     image = lights(check_size("size", size))
     names = _knobs(start) if vary is None else vary
     renderer = renderer or default_renderer()
-    found = fit(
+    result = fit(
         image,
         settings if callable(settings) else _applied(renderer, image, settings),
         _plain(start),
@@ -118,7 +118,7 @@ def translate(
         progress=progress,
     )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
-    return dataclasses.replace(found, settings=found.settings.replace(**look))
+    return dataclasses.replace(result, settings=result.settings.replace(**look))
 
 
 def _applied(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from vkbloom._argument_types import checked
 from vkbloom._grid.axes import Axis
-from vkbloom._grid.chunks import DONE, Chunks
-from vkbloom._grid.keys import Keys, open_keys
+from vkbloom._grid.chunks import DONE, METADATA, MISSING, Chunks
 from vkbloom._grid.order import Block, blocks
-from vkbloom._grid.store import METADATA, checked_identity
+from vkbloom._grid.store import checked_identity, folder_of, is_empty
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def check_grid(store: Any) -> GridReport:
 
     Parameters
     ----------
-    store : str, path-like or zarr.abc.store.Store
+    store : str or path-like
         As for `vkbloom.grid`.
 
     Returns
@@ -63,33 +63,40 @@ def check_grid(store: Any) -> GridReport:
     ValueError
         The store is not a grid, has another format version, or the group's metadata are damaged.
     """
-    keys = open_keys(store)
-    held = keys.all()
-    if not held:
-        raise FileNotFoundError(f"{keys.name}: the store does not exist or is empty")
-    own = checked_identity(keys)
+    folder = folder_of(store)
+    if is_empty(folder):
+        raise FileNotFoundError(f"{folder}: the store does not exist or is empty")
+    identity = checked_identity(folder)
     try:
-        return _report(own, keys, held)
+        return _report(identity, folder)
     except (KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{keys.name}: its {METADATA} is damaged: {error}") from error
+        raise ValueError(f"{folder}: its {METADATA} is damaged: {error}") from error
 
 
-def _report(own: Mapping[str, Any], keys: Keys, held: set[str]) -> GridReport:
-    axes = [Axis(name, tuple(own["axes"][name]), "settings", "", "") for name in own["axes"]]
-    variables = {name: len(variable["shape"]) for name, variable in own["variables"].items()}
-    chunks = Chunks(keys, variables, tuple(own["chunk"]))
+def _report(identity: Mapping[str, Any], folder: Path) -> GridReport:
+    named = identity["axes"]
+    axes = [Axis(name, tuple(named[name]), "settings", "", "") for name in named]
+    variables = {name: len(variable["shape"]) for name, variable in identity["variables"].items()}
+    chunks = Chunks(folder, variables, tuple(identity["chunk"]))
     shape = tuple(map(len, axes))
-    there = (key.removesuffix(f"/{METADATA}") for key in held if "/" in key and METADATA in key)
+    there = (file.parent.name for file in sorted(folder.glob(f"*/{METADATA}")))
     problems = [
         f"{problem}, of all points"
-        for name in dict.fromkeys((DONE, *variables, *own["axes"], *there))
-        if (problem := chunks.array_problem(name, held))
+        for name in dict.fromkeys((DONE, *variables, *named, *there))
+        if (problem := chunks.array_problem(name))
     ]
     done = 0
     for block in blocks(shape, chunks.chunk, range(len(shape))) if not problems else ():
-        marked = chunks.marked(block, held)
-        done += block.count * (marked is True)
-        problems += _problems_of(chunks, block, marked, held, describe(axes, block))
+        told = {name: chunks.problem(name, block) for name in (DONE, *variables)}
+        if told[DONE] == MISSING:
+            continue
+        done += block.count * (told[DONE] is None)
+        points = describe(axes, block)
+        problems += [
+            f"{chunks.key(name, block)} is {problem}, of {points}"
+            for name, problem in told.items()
+            if problem
+        ]
     return GridReport(math.prod(shape), done, tuple(problems))
 
 
@@ -100,14 +107,3 @@ def describe(axes: Iterable[Axis], block: Block) -> str:
         labels = [axis.label(start)] + [axis.label(stop - 1)] * (stop - start > 1)
         parts.append(f"{axis.name}={'..'.join(labels)}")
     return ", ".join(parts) or "the only point"
-
-
-def _problems_of(
-    chunks: Chunks, block: Block, marked: bool | str, held: set[str], points: str
-) -> Iterator[str]:
-    """Yield each missing or damaged chunk of a block that is marked as done."""
-    if isinstance(marked, str):
-        yield f"{chunks.key(DONE, block)} is {marked}, of {points}"
-    for name in chunks.trailing if marked is True else ():
-        if problem := chunks.problem(name, block, held):
-            yield f"{chunks.key(name, block)} is {problem}, of {points}"

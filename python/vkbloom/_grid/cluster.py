@@ -6,7 +6,6 @@ blocks, so that its points share passes.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import pickle
 import warnings
@@ -21,7 +20,6 @@ from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.layout import Grid, Layout, lay_out, origin
 from vkbloom._grid.order import Block
 from vkbloom._grid.progress import Progress
-from vkbloom._grid.running import written
 from vkbloom._grid.store import GridStore
 from vkbloom._renderer.default import renderer_on
 from vkbloom._renderer.renderer import Renderer
@@ -43,7 +41,7 @@ class _Run:
     """The arguments of a task other than the grid."""
 
     layout: Layout
-    writer: Chunks
+    chunks: Chunks
     blocks: tuple[Block, ...]
     adapter: str
 
@@ -59,10 +57,10 @@ def _lay_out(grid: Grid, adapter: str) -> Layout:
 
 def _refusal(renderer: Renderer, layout: Layout) -> str:
     """Return why this worker's results may differ from the other workers'; "" if they cannot."""
-    for what, own in origin(renderer).items():
-        if own != getattr(layout, what):
+    for what, here in origin(renderer).items():
+        if here != getattr(layout, what):
             return (
-                f"{what}: the worker's {own} is not the grid's {getattr(layout, what)}; their "
+                f"{what}: the worker's {here} is not the grid's {getattr(layout, what)}; their "
                 "pictures may differ, so all workers need the same adapter, driver and version"
             )
     return ""
@@ -74,10 +72,7 @@ def _render(run: _Run, grid: Grid) -> Tally | str:
     # Returned and not raised, since Dask would repeat the task, perhaps on another worker.
     if refusal := _refusal(renderer, run.layout):
         return refusal
-    total = Tally()
-    filler = Filler(grid, run.layout, renderer)
-    run.writer.flush([*written(filler, run.writer, run.blocks, run.layout, total.add)])
-    return total
+    return Filler(grid, run.layout, renderer).store(run.blocks, run.chunks)
 
 
 def check_client(client: Any) -> None:
@@ -124,38 +119,19 @@ def run_there(
 ) -> None:
     """Render missing blocks on the workers of a cluster."""
     distributed = import_extra("distributed", "grid", _PURPOSE)
-    layout, missing = store.layout, store.total - int(store.done.sum())
+    missing = sum(block.count for block in store.missing)
     points = math.ceil(missing / (max(1, len(client.nthreads())) * _RUNS_A_WORKER))
     runs = [
-        _Run(layout, store.writer, blocks, adapter)
-        for blocks in _runs(store.missing(), layout, points)
+        _Run(store.layout, store.chunks, blocks, adapter)
+        for blocks in _runs(store.missing, store.layout, points)
     ]
     futures = client.map(_render, runs, grid=shared, pure=False, retries=_RETRIES)
-    pending = dict(zip(futures, runs, strict=True))
-
-    def take(future: Future) -> None:
-        run = pending.pop(future)
-        tally = future.result()
-        if isinstance(tally, str):
-            raise ValueError(tally)
-        progress.add(tally)
-        store.mark(run.blocks)
-
     try:
-        for future in distributed.as_completed(futures):
-            take(future)
-    except BaseException as error:
-        _stop(client, pending, take)
-        if isinstance(error, distributed.KilledWorker):
-            raise Error(f"client: too many workers died: {error}") from error
-        raise
-
-
-def _stop(client: Client, pending: Iterable[Future], take: Any) -> None:
-    """Mark the runs that are done, and cancel the others."""
-    for future in list(pending):
-        if future.status == "finished":
-            # Other workers may be refused, too, and a full disk may prevent the marks.
-            with contextlib.suppress(OSError, ValueError):
-                take(future)
-    client.cancel(list(pending), force=True)
+        for _, tally in distributed.as_completed(futures, with_results=True):
+            if isinstance(tally, str):
+                raise ValueError(tally)
+            progress.add(tally)
+    except distributed.KilledWorker as error:
+        raise Error(f"client: too many workers died: {error}") from error
+    finally:
+        client.cancel(futures, force=True)

@@ -1,14 +1,17 @@
-"""Render blocks of points, and reduce their frames, into arrays."""
+"""Render blocks of points, and reduce their frames, into arrays or a store."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._background_writer import written_in_background
+from vkbloom._grid.chunks import Chunks
 from vkbloom._grid.layout import Grid, Layout, checked_value
 from vkbloom._grid.order import Block, Index, points
 from vkbloom._grid.sources import visit
@@ -69,3 +72,27 @@ class Filler:
                 f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
         array[inside] = value
+
+    def store(
+        self,
+        todo: Iterable[Block],
+        chunks: Chunks,
+        on_point: Callable[[Tally], object] = lambda tally: None,
+    ) -> Tally:
+        """Render blocks, and write each while the next one is rendered."""
+        total = Tally()
+
+        def made() -> Iterator[tuple[Tally, Callable[[], None]]]:
+            for block in todo:
+                arrays = {
+                    name: np.empty((*block.shape, *variable.shape), variable.dtype)
+                    for name, variable in self._layout.variables.items()
+                }
+                yield (
+                    self.fill(block, arrays, on_point),
+                    functools.partial(chunks.write, block, arrays),
+                )
+
+        for tally in written_in_background(made()):
+            total.add(tally)
+        return total

@@ -5,22 +5,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, import_extra
-from vkbloom._grid.filling import Tally
+from vkbloom._grid import cluster
+from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.identity import chunk_in
-from vkbloom._grid.keys import Keys, open_keys
 from vkbloom._grid.layout import Grid, Layout, ask, lay_out
 from vkbloom._grid.memory import chunk_of, in_memory
 from vkbloom._grid.order import Index, read_part
 from vkbloom._grid.progress import Progress
-from vkbloom._grid.running import run_here
 from vkbloom._grid.sources import ImageSource
-from vkbloom._grid.store import IDENTITY, GridStore, stored_identity
+from vkbloom._grid.store import IDENTITY, GridStore, folder_of, prepare, stored_identity
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -45,8 +45,6 @@ def grid(
     settings: Settings | str | None = None,
     axes: Mapping[str, Iterable[Any]] | None = None,
     *,
-    mask: NDArray[Any] | None = None,
-    emission: NDArray[Any] | None = None,
     size: tuple[int, int] | None = None,
     shading: Shading = "forward",
     time: float = 0.0,
@@ -67,8 +65,8 @@ def grid(
     ----------
     source : Scene, image, or list or mapping of images
         Several images add the dimension "image" before all others, with a mapping's keys as
-        labels. They must have the same shape and dtype. Uploaded images belong to one renderer:
-        they have no store that a cluster fills.
+        labels. They must have the same shape and dtype. Uploaded images have their mask and
+        emission; they belong to one renderer, so they have no store that a cluster fills.
     settings : Settings or str, optional
         The settings that the axes change, or the name of a preset. Default:
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
@@ -77,8 +75,6 @@ def grid(
         `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of these
         two axes and the argument `settings` can be given. All other axes change the settings of
         these axes, too.
-    mask, emission : ndarray, optional
-        Of all images, as for `apply`.
     size : (int, int), optional
         Width and height of a scene's frames. Default: (1280, 720).
     shading, time
@@ -91,9 +87,9 @@ def grid(
         Figures to keep, by name. Each callable gets the `Frames` of a point and returns a number
         or a small array. With ``framebuffers=()`` only they are kept. A callable gets the
         framebuffers that its attribute ``framebuffers`` names, or all if it has no such attribute.
-    store : str, path-like or zarr.abc.store.Store, optional
-        Where to write the grid instead: a folder ``name.zarr``, a URL that fsspec supports, or a
-        store. With a `client`, all its workers must be able to write to it. It can be opened with
+    store : str or path-like, optional
+        Where to write the grid instead: a folder ``name.zarr``. With a `client`, all its workers
+        must be able to write to it. It can be opened with
         ``xarray.open_zarr`` while it is written; its variable ``done`` tells which points are
         complete. If the process is killed, the same call renders only the missing points.
     chunks : mapping of str to int, optional
@@ -161,13 +157,11 @@ def grid(
             raise ValueError(f"{name}: a grid in memory has none; give store, too")
     if renderer is not None and (client is not None or adapter is not None):
         raise ValueError("renderer: the grid is rendered by those of client or adapter; give one")
-    keys = None if store is None else _keys(store, client)
+    folder = None if store is None else folder_of(store)
     asked = ask(
         source,
         settings,
         axes,
-        mask=mask,
-        emission=emission,
         size=size,
         shading=shading,
         time=time,
@@ -177,22 +171,20 @@ def grid(
     with ExitStack() as stack:
         if client is None and adapter is not None:
             renderer = stack.enter_context(opened_renderer(adapter, False))
-        if keys is None:
+        if folder is None:
             return in_memory(asked, renderer or default_renderer(), progress)
-        number, count = read_part(part)
+        numbers = read_part(part)
         _check_stored(asked, chunks, is_shared=client is not None)
 
         def prepared(layout: Layout) -> GridStore:
-            chunk = _chunk(asked, layout, chunks, keys, count)
-            stored = GridStore(keys, asked, layout, chunk, (number, count))
-            stored.prepare(resume=resume)
-            return stored
+            chunk = _chunk(asked, layout, chunks, folder, numbers[1])
+            return prepare(folder, asked, layout, chunk, numbers, resume=resume)
 
         if client is not None:
             tally = _filled_there(asked, prepared, client, adapter or "auto", progress)
         else:
             tally = _filled_here(asked, prepared, renderer or default_renderer(), progress)
-    dataset: xarray.Dataset = xr.open_zarr(keys.store)
+    dataset: xarray.Dataset = xr.open_zarr(folder)
     dataset.attrs.pop(IDENTITY, None)
     return dataset.assign_attrs(passes_run=tally.ran)
 
@@ -201,10 +193,9 @@ def _filled_here(
     asked: Grid, prepared: Callable[[Layout], GridStore], renderer: Renderer, progress: bool | None
 ) -> Tally:
     """Render the points of a store that are not done."""
-    layout = lay_out(asked, renderer)
-    store = prepared(layout)
+    store = prepared(lay_out(asked, renderer))
     with _progress(store, progress) as shown:
-        run_here(asked, layout, store, renderer, shown)
+        Filler(asked, store.layout, renderer).store(store.missing, store.chunks, shown.add)
     return shown.tally
 
 
@@ -216,8 +207,6 @@ def _filled_there(
     progress: bool | None,
 ) -> Tally:
     """Let the workers of a cluster render the points of a store that are not done."""
-    from vkbloom._grid import cluster  # noqa: PLC0415  Dask is optional
-
     cluster.check_client(client)
     shared = cluster.shared_grid(client, asked)
     store = prepared(cluster.lay_out_there(client, shared, adapter))
@@ -227,20 +216,10 @@ def _filled_there(
 
 
 def _progress(store: GridStore, shown: bool | None) -> Progress:
-    done = int(store.done.sum())
-    progress = Progress(store.total, done, shown=shown)
-    if done < store.total:
+    progress = Progress(store.total, store.done, shown=shown)
+    if store.missing:
         progress.add(Tally(ran=store.layout.ran))
     return progress
-
-
-def _keys(store: Any, client: Client | None) -> Keys:
-    import_extra("zarr", "grid", "grid with a store")
-    import_extra("dask.array", "grid", "grid with a store")
-    keys = open_keys(store)
-    if client is not None and not keys.is_shared:
-        raise ValueError("store: the workers cannot write to a store in memory; use a folder")
-    return keys
 
 
 def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bool) -> None:
@@ -263,11 +242,11 @@ def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bo
 
 
 def _chunk(
-    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys, parts: int
+    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, folder: Path, parts: int
 ) -> Index:
     """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
-        stored = stored_identity(keys)
+        stored = stored_identity(folder)
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vkbloom._checks import import_extra
 from vkbloom._free_memory import memory_left
 from vkbloom._grid.filling import Filler, Tally
-from vkbloom._grid.layout import Grid, Layout, Variable, attributes_of, lay_out
+from vkbloom._grid.layout import Grid, Layout, Variable, lay_out, made_dataset
 from vkbloom._grid.order import blocks, default_chunk
 from vkbloom._grid.progress import Progress
 from vkbloom._renderer.renderer import Renderer
@@ -55,7 +54,6 @@ def _gigabytes(size: int) -> str:
 
 def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.Dataset:
     """Render a grid into a Dataset."""
-    xr = import_extra("xarray", "grid", "grid")
     layout = lay_out(grid, renderer, lambda variables: check_fits(grid, variables))
     shape = grid.shape
     arrays = {
@@ -68,23 +66,5 @@ def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.D
         for block in blocks(shape, chunk_of(grid, layout), layout.ranking):
             views = {name: array[block.slices] for name, array in arrays.items()}
             filler.fill(block, views, shown.add)
-    dims = tuple(axis.name for axis in grid.axes)
-    attributes: dict[str, Any] = {
-        **attributes_of(grid, layout),
-        "passes_run": shown.tally.ran,
-    }
-    dataset: xarray.Dataset = xr.Dataset(
-        {
-            name: ((*dims, *variable.dims), arrays[name], dict(variable.attributes))
-            for name, variable in layout.variables.items()
-        },
-        coords={
-            **{axis.name: ((axis.name,), axis.coordinate, axis.attributes) for axis in grid.axes},
-            **{
-                name: ((name,), values, dict(attrs))
-                for name, (values, attrs) in layout.coordinates.items()
-            },
-        },
-        attrs=attributes,
-    )
-    return dataset
+    made = made_dataset(grid, layout, arrays)
+    return made.assign_attrs(passes_run=shown.tally.ran)

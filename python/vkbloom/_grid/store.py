@@ -6,9 +6,8 @@ The process may be killed at any time, because it writes in this order:
    are created only where there are none: of processes with different grids, one writes, and the
    others are refused.
 2. The arrays' metadata, and the coordinates.
-3. Blocks of points: a complete chunk of each variable, with a checksum. Zarr's LocalStore writes
-   a key to a temporary file first and renames it.
-4. The blocks' chunks of ``done``, after the blocks have been flushed to the disk.
+3. Blocks of points: a complete chunk of each variable, with a checksum, then the chunk of
+   ``done``. Zarr's LocalStore writes a key to a temporary file first and renames it.
 
 ``done`` has the same chunks as the variables. So a process writes only keys of its own blocks, and
 processes with different parts need no lock: they write the same metadata.
@@ -17,22 +16,20 @@ processes with different parts need no lock: they write the same metadata.
 from __future__ import annotations
 
 import json
-import math
+import os
 import warnings
-from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from vkbloom._checks import import_extra
-from vkbloom._grid.chunks import DONE, Chunks
+from vkbloom._grid.chunks import DONE, METADATA, Chunks
 from vkbloom._grid.identity import FORMAT, differences, identity, short
-from vkbloom._grid.keys import Keys
-from vkbloom._grid.layout import Grid, Layout, Variable, attributes_of
+from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
 from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
 
-METADATA: Final = "zarr.json"
 IDENTITY: Final = "vkbloom_grid"
 
 _PURPOSE: Final = "Grids on disk"
@@ -40,160 +37,150 @@ _PURPOSE: Final = "Grids on disk"
 _ZSTD_LEVEL: Final = 1
 # The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
 _KEYS: Final = {"name": "default", "separator": "."}
+# The end of the names of LocalStore's temporary files.
+_PARTIAL: Final = ".partial"
+
+
+def folder_of(store: object) -> Path:
+    """Return the folder of a store, which need not exist."""
+    if not isinstance(store, str | os.PathLike) or "://" in os.fspath(store):
+        raise TypeError(f"store: {store!r} is not the path of a folder")
+    return Path(store).absolute()
+
+
+def is_empty(folder: Path) -> bool:
+    """Return whether a store has no keys; temporary files are none."""
+    return all(path.is_dir() or path.suffix == _PARTIAL for path in folder.rglob("*"))
 
 
 def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     """Return the contents of a store before its first block, the group's metadata first."""
     zarr = import_extra("zarr", "grid", _PURPOSE)
-    held: dict[str, Any] = {}
-    memory = zarr.storage.MemoryStore(held)
-    own = identity(grid, layout, chunk)
-    # (As text: netCDF stores no mappings.)
-    attributes = {**attributes_of(grid, layout), IDENTITY: json.dumps(own)}
-    group = zarr.open_group(memory, mode="w", zarr_format=3, attributes=attributes)
-    coordinates = {axis.name: (axis.coordinate, axis.attributes) for axis in grid.axes}
-    for name, (values, attrs) in {**coordinates, **layout.coordinates}.items():
-        lone = Variable((name,), (), values.dtype, attrs)
-        array = _add_array(group, name, values.shape, values.shape, lone)
-        array[...] = values.astype(object) if values.dtype.kind == "U" else values
+    codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
+    dask = import_extra("dask.array", "grid", _PURPOSE)
     facts = {"description": "Whether the point is done"}
-    done = Variable((), (), np.dtype(np.bool_), facts)
-    dims = tuple(axis.name for axis in grid.axes)
-    for name, variable in {DONE: done, **layout.variables}.items():
-        spread = replace(variable, dims=(*dims, *variable.dims))
-        shape, chunks = ((*counts, *variable.shape) for counts in (grid.shape, chunk))
-        _add_array(group, name, shape, chunks, spread)
+    marked = {**layout.variables, DONE: Variable((), (), np.dtype(np.bool_), facts)}
+    dataset = made_dataset(
+        grid,
+        replace(layout, variables=marked),
+        {
+            name: dask.zeros((*grid.shape, *variable.shape), dtype=variable.dtype, chunks=-1)
+            for name, variable in marked.items()
+        },
+    )
+    for name, coordinate in dataset.coords.items():
+        if coordinate.dtype.kind == "U":
+            # Of texts, Zarr's format 3 defines those of any length alone.
+            dataset[name] = coordinate.astype(np.dtypes.StringDType())
+    # (As text: netCDF stores no mappings.)
+    dataset.attrs[IDENTITY] = json.dumps(identity(grid, layout, chunk))
+    # The checksum is the last codec, so that it covers the compressed bytes.
+    compressors = [codecs.ZstdCodec(level=_ZSTD_LEVEL), codecs.Crc32cCodec()]
+    encoding: dict[Any, dict[str, Any]] = {
+        # A fill value among the attributes would make readers mask and convert.
+        name: {"compressors": compressors, "chunk_key_encoding": _KEYS, "_FillValue": None}
+        for name in dataset.variables
+    }
+    for name, variable in marked.items():
+        encoding[name]["chunks"] = (*chunk, *variable.shape)
+    # Marks are too small for a compression, which zarr runs in a thread.
+    encoding[DONE]["compressors"] = compressors[1:]
+    held: dict[str, Any] = {}
     with warnings.catch_warnings():
         # Zarr warns because format 3 does not define consolidated metadata; xarray reads them.
         warnings.filterwarnings("ignore", message="Consolidated metadata")
-        zarr.consolidate_metadata(memory)
+        dataset.to_zarr(
+            zarr.storage.MemoryStore(held), zarr_format=3, compute=False, encoding=encoding
+        )
     names = sorted(held, key=lambda key: (key != METADATA, key))
     return {key: bytes(held[key].to_bytes()) for key in names}
 
 
-def _add_array(group: Any, name: str, shape: Index, chunk: Index, variable: Variable) -> Any:
-    """Add an array without its chunks to a Zarr group."""
-    codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
-    is_text = variable.dtype.kind == "U"
-    # The checksum is the last codec, so that it covers the compressed bytes.
-    compressors = [codecs.ZstdCodec(level=_ZSTD_LEVEL), codecs.Crc32cCodec()]
-    return group.create_array(
-        name,
-        shape=shape,
-        chunks=chunk,
-        dtype=str if is_text else variable.dtype,
-        dimension_names=variable.dims,
-        attributes=dict(variable.attributes),
-        chunk_key_encoding=_KEYS,
-        config={"write_empty_chunks": True},
-        # Marks are too small for a compression, which zarr runs in a thread.
-        compressors=compressors[name == DONE :],
-        fill_value={"f": math.nan, "U": ""}.get(variable.dtype.kind, 0),
-    )
+def _put(folder: Path, key: str, content: bytes, *, replaces: bool) -> None:
+    """Write a key: a reader sees the old content or the new one. Of several processes one does."""
+    zarr = import_extra("zarr", "grid", _PURPOSE)
+    store = zarr.storage.LocalStore(folder)
+    put = store.set if replaces else store.set_if_not_exists
+    buffers = import_extra("zarr.buffer", "grid", _PURPOSE).default_buffer_prototype()
+    sync = import_extra("zarr.core.sync", "grid", _PURPOSE).sync
+    sync(put(key, buffers.buffer.from_bytes(content)))
 
 
+@dataclass(frozen=True)
 class GridStore:
-    """The Zarr store of a grid, with its marks of completed points."""
+    """A prepared store.
 
-    def __init__(
-        self, keys: Keys, grid: Grid, layout: Layout, chunk: Index, part: Part = WHOLE
-    ) -> None:
-        self.keys = keys
-        self.part = part
-        self.grid = grid
-        self.layout = layout
-        self.chunk = chunk
-        self.done = np.zeros(grid.shape, np.bool_)
-        trailing = {name: len(v.shape) for name, v in layout.variables.items()}
-        self._chunks = Chunks(keys, trailing, chunk)
+    - `missing`: The blocks of the part that are not done, in the order in which they are rendered.
+    - `total`: The number of points of the part.
+    """
+
+    chunks: Chunks
+    layout: Layout
+    missing: list[Block]
+    total: int
 
     @property
-    def writer(self) -> Chunks:
-        """The writer of blocks, which can be sent to other processes."""
-        return self._chunks
-
-    def blocks(self) -> Iterable[Block]:
-        """Return the blocks of the part in the order in which they are rendered."""
-        return blocks(self.grid.shape, self.chunk, self.layout.ranking, self.part)
-
-    @property
-    def total(self) -> int:
-        """Number of points of the part."""
-        if self.part == WHOLE:
-            return self.done.size
-        return sum(block.count for block in self.blocks())
-
-    def missing(self) -> Iterable[Block]:
-        """Return the blocks that are not done, in the order in which they are rendered."""
-        return (block for block in self.blocks() if not self.done[block.slices].all())
-
-    def mark(self, written: Iterable[Block]) -> None:
-        """Mark points as done; their data must be on the disk."""
-        marked = list(written)
-        self._chunks.mark(marked)
-        for block in marked:
-            self.done[block.slices] = True
-
-    def prepare(self, *, resume: bool) -> None:
-        """Create the store, or examine an existing one and replace damaged metadata of arrays.
-
-        FileExistsError: the store exists and `resume` is False. ValueError: it contains other data
-        or another grid; nothing is written.
-        """
-        expected = expected_keys(self.grid, self.layout, self.chunk)
-        held = self.keys.all()
-        if held and not resume:
-            raise FileExistsError(
-                f"{self.keys.name}: the store already has a grid; resume it, or name another store"
-            )
-        if not held:
-            # Of processes that start at once, one decides which grid this is.
-            self.keys.create(METADATA, expected[METADATA])
-        stored = checked_identity(self.keys)
-        changed = differences(stored, identity(self.grid, self.layout, self.chunk))
-        if changed:
-            raise ValueError(f"{self.keys.name}: contains another grid; {'; '.join(changed)}")
-        if self.part == WHOLE:
-            self.keys.remove_leftovers()
-        for key, content in expected.items():
-            if self.keys.read(key) != content:
-                self.keys.write(key, content)
-        self.keys.flush(expected)
-        self._mark_complete(held)
-
-    def _mark_complete(self, held: set[str]) -> None:
-        """Mark the completed points, and remove the marks of damaged ones."""
-        unmarked = []
-        for block in self.blocks() if held else ():
-            marked = self._chunks.marked(block, held)
-            problems = (self._chunks.problem(name, block, held) for name in self.layout.variables)
-            is_complete = not any(problems)
-            self.done[block.slices] = is_complete
-            if is_complete and marked is not True:
-                # A complete block without a mark was written just before the process ended.
-                unmarked.append(block)
-            elif marked and not is_complete:
-                self.keys.remove(self._chunks.key(DONE, block))
-        self._chunks.mark(unmarked)
+    def done(self) -> int:
+        """The number of points that were done before."""
+        return self.total - sum(block.count for block in self.missing)
 
 
-def stored_identity(keys: Keys) -> dict[str, Any] | None:
+def prepare(
+    folder: Path, grid: Grid, layout: Layout, chunk: Index, part: Part = WHOLE, *, resume: bool
+) -> GridStore:
+    """Create the store, or examine an existing one and replace damaged metadata of arrays.
+
+    FileExistsError: the store exists and `resume` is False. ValueError: it contains other data or
+    another grid; nothing is written.
+    """
+    expected = expected_keys(grid, layout, chunk)
+    is_new = is_empty(folder)
+    if not is_new and not resume:
+        raise FileExistsError(
+            f"{folder}: the store already has a grid; resume it, or name another store"
+        )
+    if is_new:
+        # Of processes that start at once, one decides which grid this is.
+        _put(folder, METADATA, expected[METADATA], replaces=False)
+    changed = differences(checked_identity(folder), identity(grid, layout, chunk))
+    if changed:
+        raise ValueError(f"{folder}: contains another grid; {'; '.join(changed)}")
+    if part == WHOLE:
+        # Of processes that were killed while writing.
+        for path in folder.rglob(f"*{_PARTIAL}"):
+            path.unlink(missing_ok=True)
+    for key, content in expected.items():
+        file = folder / key
+        if not file.exists() or file.read_bytes() != content:
+            _put(folder, key, content, replaces=True)
+    trailing = {name: len(variable.shape) for name, variable in layout.variables.items()}
+    chunks = Chunks(folder, trailing, chunk)
+    missing, total = [], 0
+    for block in blocks(grid.shape, chunk, layout.ranking, part):
+        total += block.count
+        if any(chunks.problem(name, block) for name in (DONE, *trailing)):
+            (folder / chunks.key(DONE, block)).unlink(missing_ok=True)
+            missing.append(block)
+    return GridStore(chunks, layout, missing, total)
+
+
+def stored_identity(folder: Path) -> dict[str, Any] | None:
     """Return the grid's identity from the group's metadata; None if there is none."""
     try:
-        held = json.loads(json.loads(keys.read(METADATA) or b"")["attributes"][IDENTITY])
-    except (KeyError, TypeError, ValueError, RecursionError):
+        held = json.loads(json.loads((folder / METADATA).read_bytes())["attributes"][IDENTITY])
+    except (FileNotFoundError, KeyError, TypeError, ValueError, RecursionError):
         return None
     return held if isinstance(held, dict) else None
 
 
-def checked_identity(keys: Keys) -> dict[str, Any]:
+def checked_identity(folder: Path) -> dict[str, Any]:
     """Return the grid's identity, or raise ValueError if there is none of this version."""
-    held = stored_identity(keys)
+    held = stored_identity(folder)
     if held is None:
         raise ValueError(
-            f"{keys.name}: its content is not a grid of vkbloom, or its {METADATA} is damaged"
+            f"{folder}: its content is not a grid of vkbloom, or its {METADATA} is damaged"
         )
     version = held.get("format")
     if version != FORMAT:
-        raise ValueError(f"{keys.name}: its format version {short(version)} is not {FORMAT}")
+        raise ValueError(f"{folder}: its format version {short(version)} is not {FORMAT}")
     return held

@@ -58,8 +58,6 @@ _GREY_AND_ALPHA: Final = ("targa", "sgi", "jpeg2000", "jpegxl", "pnm", "psd", "r
 _GREY: Final = (0, 1)
 # Hidden light of less than this share of the visible light does not show.
 _TRIFLE: Final = 0.05
-# Pixels to read at a time.
-_BAND_PIXELS: Final = 1 << 20
 
 
 class Meaning(enum.Enum):
@@ -117,18 +115,11 @@ def meaning_of(
 
 
 def _is_0_everywhere(reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec) -> bool:
-    place = reader.current_subimage(), 0
-    step = max(_BAND_PIXELS // spec.width, 1)
-    last, bottom = spec.nchannels - 1, spec.y + spec.height
-    for y in range(spec.y, bottom, step):
-        alpha = reader.read_scanlines(
-            *place, y, min(y + step, bottom), 0, last, last + 1, spec.format
-        )
-        if alpha is None or alpha.any():
-            # The pixels are damaged if they cannot be read: they are read again.
-            failure_of(reader)
-            return False
-    return True
+    last = spec.nchannels - 1
+    alpha = reader.read_image(reader.current_subimage(), 0, last, last + 1, spec.format)
+    # The pixels are damaged if they cannot be read: they are read again.
+    failure_of(reader)
+    return alpha is not None and not alpha.any()
 
 
 def _of_bmp(path: str | os.PathLike[str]) -> Meaning | None:
@@ -215,8 +206,10 @@ def multiplied(values: NDArray[Any]) -> NDArray[Any]:
 def divided(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours divided by alpha, in the same dtype; unchanged where alpha is 0."""
     alpha = values[:, :, -1:].astype(np.float32)
-    one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
-    return _with_alpha(values, np.where(alpha == 0, one, one * one / np.where(alpha, alpha, one)))
+    unit = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
+    return _with_alpha(
+        values, np.where(alpha == 0, unit, unit * unit / np.where(alpha, alpha, unit))
+    )
 
 
 def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -23,11 +23,6 @@ from vkbloom._io.images import PIXEL_TYPES, Picture, SavedColour, check_name, is
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
 _ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
-# The file's number types for floats, in order of preference, by the requested bits.
-_FLOATS: Final[Mapping[int | None, tuple[str, ...]]] = {
-    None: ("half", "float", "uint8"),
-    **image_writing.BITS,
-}
 # Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
 
@@ -150,10 +145,10 @@ def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> 
             if is_float
             else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
         )
-    if bits is not None and (bits not in tuple(_FLOATS) or not is_float):
-        own = 8 * values.dtype.itemsize
-        if bits != own or is_float:
-            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+    if bits is not None and (bits not in image_writing.BITS or not is_float):
+        size = 8 * values.dtype.itemsize
+        if bits != size or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else size}")
     check_saved(saved)
     needs_three = saved.view is not None or saved.primaries != "rec709"
     if needs_three and (not is_float or values.shape[2] < 3):
@@ -233,9 +228,19 @@ def write(
     safe_writing.check_extension(oiio, target.suffix)
     if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
         values = divided(values) if premultiplied else multiplied(values)
-    layout = values.shape[2], _numbers(oiio, values, bits, target)
-    stored: SavedColour | None = "linear" if is_float else None
-    picture = Picture.of_values(values, layout[1], stored, _typed(oiio, metadata or {}))
+    numbers = PIXEL_TYPES[values.dtype.name]
+    encoded: SavedColour | None = "linear" if is_float else None
+    picture = Picture.of_values(values, numbers, encoded, _typed(oiio, metadata or {}))
+    layout = image_writing.chosen_layout(
+        oiio, picture, target, is_hdr=False, bits=bits if is_float else None
+    )
+    if layout[0] != values.shape[2]:
+        raise ValueError(f"{target}: its format has no alpha; write array[..., :{layout[0]}]")
+    if not is_float and layout[1] != numbers:
+        raise ValueError(
+            f"{target}: its format holds {layout[1]}, not {numbers}; write linear floats, as "
+            "vkbloom.read gives them"
+        )
     image_writing.save(picture, target, saved, quality=quality, layout=layout)
     return target
 
@@ -257,33 +262,6 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
             f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
         )
     return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
-
-
-def _numbers(oiio: ModuleType, values: NDArray[Any], bits: int | None, target: Path) -> str:
-    """Return OpenImageIO's name of the number type to write."""
-    own = PIXEL_TYPES[values.dtype.name]
-    wanted: Sequence[str] = [own]
-    if values.dtype.kind == "f":
-        wanted = [*dict.fromkeys((own, *_FLOATS[None]))] if bits is None else _FLOATS[bits]
-    channels = values.shape[2]
-    writer = oiio.ImageOutput.create(target.name)
-    kind = writer.format_name()
-    if channels in (2, 4) and not safe_writing.has_alpha(writer):
-        raise ValueError(f"{target}: {kind} has no alpha; write array[..., :{channels - 1}]")
-    for numbers in wanted:
-        if safe_writing.holds(oiio, target.suffix, channels, numbers):
-            return numbers
-    if values.dtype.kind == "u" and safe_writing.holds(oiio, target.suffix, channels, "float"):
-        raise ValueError(
-            f"{target}: {kind} holds floats, not {values.dtype}; write linear floats, as "
-            "vkbloom.read gives them"
-        )
-    if channels < 3:
-        raise ValueError(
-            f"{target}: {kind} cannot hold {channels} channels of {' or '.join(wanted)}; write "
-            "np.repeat(array[..., :1], 3, axis=2)"
-        )
-    raise ValueError(f"{target}: {kind} cannot hold {' or '.join(wanted)}; try another bits=")
 
 
 def has_straight(picture: Picture) -> bool:

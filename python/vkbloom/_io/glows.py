@@ -19,10 +19,6 @@ def alike(emission: NDArray[Any], image: NDArray[Any]) -> NDArray[Any]:
     """Return an emission with the channels and the dtype of an image; files may differ in both."""
     channels = image.shape[2]
     if emission.shape[2] < channels:
-        one = 255 if emission.dtype == np.uint8 else 1
-        alpha = np.full((*emission.shape[:2], 1), one, emission.dtype)
+        alpha = np.ones((*emission.shape[:2], 1), emission.dtype)
         emission = np.concatenate([emission, alpha], axis=2)
-    if (emission.dtype == np.uint8) != (image.dtype == np.uint8):
-        # --raw of one and floats of the other: as they come.
-        return emission[..., :channels]
     return emission[..., :channels].astype(image.dtype, copy=False)

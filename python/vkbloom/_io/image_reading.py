@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +14,7 @@ import numpy as np
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import HEIF_ADVICE, is_heif, late_exif, orientation_of, padded, upright
+from vkbloom._io.containers import HEIF_ADVICE, is_heif, orientation_of, padded, upright
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
@@ -96,7 +95,7 @@ def readable_extensions() -> set[str]:
     # "openexr:exr,sxr,mxr;png:png;..."
     formats = oiio.get_string_attribute("input_format_list").split(",")
     listed = oiio.get_string_attribute("extension_list").split(";")
-    pairs = (one.partition(":") for one in listed)
+    pairs = (entry.partition(":") for entry in listed)
     return {f".{word}" for name, _, words in pairs if name in formats for word in words.split(",")}
 
 
@@ -202,12 +201,12 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
     """Return an image with a layer's channels alone, by their names in it; None: all."""
     if layer is None:
         return stored
-    own = [index for index, of in enumerate(_layers(spec)) if of == layer]
+    chosen = [index for index, of in enumerate(_layers(spec)) if of == layer]
     return replace(
         stored,
-        pixels=stored.pixels[:, :, own],
-        channels=tuple(stored.channels[index].rpartition(".")[2] for index in own),
-        numbers=tuple(stored.numbers[index] for index in own),
+        pixels=stored.pixels[:, :, chosen],
+        channels=tuple(stored.channels[index].rpartition(".")[2] for index in chosen),
+        numbers=tuple(stored.numbers[index] for index in chosen),
     )
 
 
@@ -222,7 +221,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         listed = " ".join(map(str, points))
         notes.append(f"the code points {listed} of its colours are not known, and are ignored")
     # Before the reader goes to other parts.
-    found = StoredImage(
+    stored = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
         channels=tuple(
             "" if channel == "A" and meaning is Meaning.NONE else channel
@@ -236,7 +235,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         gamma=gamma,
         attributes={
             attribute.name: (attribute.type, attribute.value)
-            for attribute in (*_late_attributes(kind, name), *spec.extra_attribs)
+            for attribute in spec.extra_attribs
             if is_kept(attribute.name)
         },
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
@@ -244,19 +243,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         is_ultra_hdr=_is_ultra_hdr(reader, spec),
         notes=tuple(notes),
     )
-    return replace(found, parts=tuple(_parts(reader)))
-
-
-def _late_attributes(kind: str, name: str) -> Iterator[Any]:
-    """Yield the attributes of Exif after the pixels of a PNG file, which its reader ignores."""
-    if kind != "png" or (exif := late_exif(name)) is None:
-        return
-    with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        file.write(exif)
-        file.flush()
-        # Damaged metadata do not matter to the pixels.
-        with suppress(ValueError), opened(file.name, "Reading images") as reader:
-            yield from reader.spec().extra_attribs
+    return replace(stored, parts=tuple(_parts(reader)))
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
@@ -310,15 +297,15 @@ def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
 
 def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str) -> int:
     """Return the first part, from `subimage` on, that has a layer."""
-    found: dict[str, None] = {}
+    known: dict[str, None] = {}
     for index in range(max(subimage, 0), subimage + _MAX_PARTS):
         if not _seek(reader, index):
             break
         layers = _layers(reader.spec())
         if layer in layers:
             return index
-        found.update(dict.fromkeys(filter(None, layers)))
-    listed = f"its layers are {', '.join(found)}" if found else "it has no named layers"
+        known.update(dict.fromkeys(filter(None, layers)))
+    listed = f"its layers are {', '.join(known)}" if known else "it has no named layers"
     raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
 
 
@@ -349,18 +336,13 @@ def decode(
     stored: StoredImage,
     colour: Colour | None = None,
     *,
-    raw: bool = False,
     expand: float | None = None,
 ) -> Picture:
     """Decode a stored image to a picture of linear values."""
-    if raw and colour is not None:
-        raise ValueError(f"colour: {colour!r} cannot be combined with raw values")
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
     numbers = kinds.pop() if len(kinds) == 1 else "float"
-    if raw and numbers != "uint8":
-        raise ValueError(f"raw: {numbers} is not an 8-bit integer type")
     if numbers == "half":
         # OpenImageIO reads all channels as float if one channel is float.
         values = values.astype(np.float16, copy=False)
@@ -371,25 +353,23 @@ def decode(
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     has_alpha = values.shape[2] == 4
-    taken_as = ""
-    if not raw:
-        if stored.associated and has_alpha and values.dtype.kind == "u":
-            # 16 bits hold the quotients of 8 bits.
-            scale = 65535 // np.iinfo(values.dtype).max
-            values = divided(values.astype(np.uint16) * np.uint16(scale))
-            stored = replace(stored, associated=False)
-        taken_as, values, said = linear(values, stored, colour)
-        notes += said
-        is_hdr = colour is None and has_hdr_curve(stored.code_points)
-        if numbers in ("uint8", "uint16") and not is_hdr:
-            values = expanded(values, expand)
-        stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
+    if stored.associated and has_alpha and values.dtype.kind == "u":
+        # 16 bits hold the quotients of 8 bits.
+        scale = 65535 // np.iinfo(values.dtype).max
+        values = divided(values.astype(np.uint16) * np.uint16(scale))
+        stored = replace(stored, associated=False)
+    taken_as, values, said = linear(values, stored, colour)
+    notes += said
+    is_hdr = colour is None and has_hdr_curve(stored.code_points)
+    if numbers in ("uint8", "uint16") and not is_hdr:
+        values = expanded(values, expand)
+    stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     hidden = visible = 0.0
     if has_alpha and not stored.associated:
         hidden, visible = light_of(values)
     return Picture(
         pixels=np.ascontiguousarray(values),
-        encoding=None if raw else "linear",
+        encoding="linear",
         numbers=numbers,
         grey=grey,
         stored=stored,
@@ -405,12 +385,11 @@ def decode_file(
     file: str,
     colour: Colour | None,
     *,
-    raw: bool = False,
     expand: float | None = None,
 ) -> Picture:
     """Decode an image as `decode` does; a ValueError names the file."""
     try:
-        return decode(stored, colour, raw=raw, expand=expand)
+        return decode(stored, colour, expand=expand)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 
@@ -420,10 +399,10 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
     # If all channels have the same layer, its name is not needed.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
-    places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
-    alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
-    if {"R", "G", "B"} <= places.keys():
-        chosen = [places["R"], places["G"], places["B"], *alpha]
+    indices = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
+    alpha = [indices[name] for name in ("A", "ALPHA") if name in indices][:1]
+    if {"R", "G", "B"} <= indices.keys():
+        chosen = [indices["R"], indices["G"], indices["B"], *alpha]
     elif len([name for name in names if name and not _UNNAMED.match(name)]) == 1 + len(alpha):
         grey = [index for index in range(len(names)) if index not in alpha]
         chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]

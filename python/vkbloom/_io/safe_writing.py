@@ -35,7 +35,6 @@ _MISSING: Final = dict.fromkeys(
 )
 
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
-_READ_BYTES: Final = 64 << 20  # bytes read at a time
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
 _TRIED: Final = 32  # pixels on a side that every format can have
 _ZEROS: Final = 1 << 20  # bytes written at a time
@@ -240,20 +239,7 @@ def _unreadable(oiio: ModuleType, file: Path) -> str | None:
     if reader is None:
         return failure_of(oiio) or "unknown format"
     spec = reader.spec()
-    # Some rows at a time, so that large files are not completely in memory.
-    rows = max(_READ_BYTES // max(spec.scanline_bytes(True), 1), 1)
-    place, bottom = (0, 0), spec.y + spec.height
-    readable = (
-        reader.read_image(*place, 0, spec.nchannels, spec.format) is not None
-        if spec.tile_width
-        else all(
-            reader.read_scanlines(
-                *place, y, min(y + rows, bottom), 0, 0, spec.nchannels, spec.format
-            )
-            is not None
-            for y in range(spec.y, bottom, rows)
-        )
-    )
+    is_readable = reader.read_image(0, 0, 0, spec.nchannels, spec.format) is not None
     reason = failure_of(reader) or "the pixels are missing"
     reader.close()
-    return None if readable else reason
+    return None if is_readable else reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,34 +13,12 @@ from vkbloom.psf import _kernel_cache as kernel_cache
 from vkbloom.psf._eye import spencer
 
 if TYPE_CHECKING:
+    from vkbloom._methods.blender import BlenderGlare
     from vkbloom.psf._base import PSF
 
 
-class KernelSettings(Protocol):
-    """The settings that a kernel follows from."""
-
-    @property
-    def type(self) -> str: ...
-    @property
-    def quality(self) -> str: ...
-    @property
-    def version(self) -> str: ...
-    @property
-    def size(self) -> float: ...
-    @property
-    def kernel(self) -> Any: ...
-
-
-class _Shape(NamedTuple):
-    """The same, without the settings that a kernel does not follow from."""
-
-    type: str
-    quality: str
-    version: str
-    size: float
-    kernel: Any
-
-
+#: The fields that a kernel follows from.
+_SHAPE: Final = ("type", "quality", "version", "size", "kernel")
 #: What the sides are divided by.
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
 
@@ -51,11 +29,11 @@ def glare_size(buffers: tuple[int, int], quality: str) -> tuple[int, int]:
     return width, height
 
 
-def kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> NDArray[np.float64]:
+def kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> NDArray[np.float64]:
     """Return the kernel in pixels of the glare, (h, w, 3), with its point at [h // 2, w // 2]."""
     size = glare_size(buffers, settings.quality)
     if settings.type == "kernel":
-        psf: PSF | None = settings.kernel
+        psf = cast("PSF | None", settings.kernel)
         image = np.ones((1, 1, 3)) if psf is None else psf.kernel(size)
         if settings.version == "5.2" and settings.quality != "high":
             image = _reduced(image, FACTORS[settings.quality])
@@ -64,7 +42,7 @@ def kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> NDArray[np.
     return np.repeat(values[..., np.newaxis], 3, axis=2)
 
 
-def kernel_sides(settings: KernelSettings, buffers: tuple[int, int]) -> tuple[int, int]:
+def kernel_sides(settings: BlenderGlare, buffers: tuple[int, int]) -> tuple[int, int]:
     """Return the kernel's width and height."""
     if settings.type == "kernel":
         height, width = kernel_of(settings, buffers).shape[:2]
@@ -76,16 +54,17 @@ def kernel_sides(settings: KernelSettings, buffers: tuple[int, int]) -> tuple[in
     return 2 * width - 1, 2 * height - 1
 
 
-def core_kernel_of(settings: KernelSettings, buffers: tuple[int, int]) -> CoreKernel:
+def core_kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
     """Return the kernel as the core reads it."""
-    fields = (getattr(settings, name) for name in _Shape._fields)
-    return _kept_kernel(_Shape(*fields), buffers)
+    fields: dict[str, Any] = {name: getattr(settings, name) for name in _SHAPE}
+    return _kept_kernel(type(settings)(**fields), buffers)
 
 
 @kept
-def _kept_kernel(settings: _Shape, buffers: tuple[int, int]) -> CoreKernel:
+def _kept_kernel(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
+    fields = (getattr(settings, name) for name in _SHAPE)
     return kernel_cache.find_or_make(
-        ("blender", *settings, buffers), lambda: core_kernel(kernel_of(settings, buffers))
+        ("blender", *fields, buffers), lambda: core_kernel(kernel_of(settings, buffers))
     )
 
 
@@ -147,9 +126,9 @@ def _reduced(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
         count = length // factor
         if count == 0:
             return np.zeros((1, 1, image.shape[2]))
-        place = (np.arange(count) + 0.5) / count * length - 0.5
-        low = place.astype(int)
-        part = (place - low)[:, np.newaxis, np.newaxis]
+        position = (np.arange(count) + 0.5) / count * length - 0.5
+        low = position.astype(int)
+        part = (position - low)[:, np.newaxis, np.newaxis]
         image = (1 - part) * image[low] + part * image[np.minimum(low + 1, length - 1)]
         image = image.swapaxes(0, 1)
     return image

@@ -136,23 +136,23 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
 
 
 def new_memory(
-    core: _core.Renderer, shape: tuple[int, ...], dtype: str, place: Destination
+    core: _core.Renderer, shape: tuple[int, ...], dtype: str, destination: Destination
 ) -> NDArray[Any] | _core.Exported:
     """Return an array for a framebuffer, or memory on the device."""
-    if place == "cuda":
+    if destination == "cuda":
         return memory_for(core, math.prod(shape) * np.dtype(dtype).itemsize)
     return new_array(core, shape, dtype)
 
 
 def new_arrays(
-    core: _core.Renderer, plan: _core.Plan, place: Destination = "host"
+    core: _core.Renderer, plan: _core.Plan, destination: Destination = "host"
 ) -> tuple[NDArray[Any] | _core.Exported, ...]:
     """Return an array, or memory on the device, for each of a plan's outputs."""
     arrays: list[NDArray[Any] | _core.Exported] = []
     # Not a generator expression, for which `core` would be a cell. CPython 3.11 leaks all arguments
     # of a call if it cannot allocate a cell.
     for _, shape, dtype in plan.outputs:
-        arrays.append(new_memory(core, shape, dtype, place))
+        arrays.append(new_memory(core, shape, dtype, destination))
     return tuple(arrays)
 
 
@@ -175,13 +175,15 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Requ
 
 
 def named(
-    plan: _core.Plan, arrays: tuple[NDArray[Any] | _core.Exported, ...], place: Destination = "host"
+    plan: _core.Plan,
+    arrays: tuple[NDArray[Any] | _core.Exported, ...],
+    destination: Destination = "host",
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of a plan's outputs by name."""
     frames: dict[str, NDArray[Any]] = {}
-    # Not a comprehension, for the reason above: `place` would be a cell.
+    # Not a comprehension, for the reason above: `destination` would be a cell.
     for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True):
-        if place == "viewed" or isinstance(array, _core.Exported):
+        if destination == "viewed" or isinstance(array, _core.Exported):
             # Annotated as arrays of NumPy, which they are unless the caller asked for others.
             frames[name] = cast("NDArray[Any]", DeviceArray(array, shape, dtype))
         else:
@@ -200,14 +202,14 @@ class _Planned(NamedTuple):
     request: Request
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
-    place: Destination
+    destination: Destination
 
 
 def _taken(
     planned: _Planned, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
     return planned.request.settings, Result(
-        named(planned.plan, planned.arrays, planned.place), timings, counts
+        named(planned.plan, planned.arrays, planned.destination), timings, counts
     )
 
 
@@ -230,15 +232,14 @@ class _Requests:
         core: _core.Renderer,
         names: tuple[str, ...] | None,
         most: int,
-        place: Callable[[_core.Source], Destination],
+        destination: Callable[[_core.Source], Destination],
     ) -> None:
         self._sequence = iter(sequence)
         self._core = core
         self._names = names
         self._ever = most
-        self._place = place
+        self._destination = destination
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
-        self._alone = 0  # how many of these are submitted one by one
         self._limit = 1
         self._most = most  # that fit into MAX_SECONDS, as far as is known
         self._ended = False
@@ -246,27 +247,20 @@ class _Requests:
 
     def submit(self) -> _Submitted | None:
         """Submit the next requests. None: there are no more, or the next one failed."""
-        while requests := self._take():
-            plans = tuple(one.plan for one in requests)
-            try:
-                submission = self._core.run(
-                    requests[0].request.source, plans, tuple(one.arrays for one in requests)
-                )
-            except Exception as error:
-                if not self._blames_one(error, requests):
-                    self._fail(error)
-                    return None
-                # The requests before it are still submitted. The error is raised after their
-                # results.
-                self._waiting.extendleft(planned.request for planned in reversed(requests))
-                self._alone = len(requests)
-            else:
-                self._alone = max(0, self._alone - 1)
-                # Double the number, starting with one request. So the first frame waits for no
-                # other, and a caller that stops early wastes little work.
-                self._limit = min(2 * len(requests), MAX_REQUESTS)
-                return _Submitted(submission, requests, time.perf_counter())
-        return None
+        requests = self._take()
+        if not requests:
+            return None
+        plans = tuple(planned.plan for planned in requests)
+        arrays = tuple(planned.arrays for planned in requests)
+        try:
+            submission = self._core.run(requests[0].request.source, plans, arrays)
+        except Exception as error:
+            self._fail(error)
+            return None
+        # Double the number, starting with one request. So the first frame waits for no other, and
+        # a caller that stops early wastes little work.
+        self._limit = min(2 * len(requests), MAX_REQUESTS)
+        return _Submitted(submission, requests, time.perf_counter())
 
     def took(self, seconds: float, count: int) -> None:
         """Update the limit after a submission of `count` requests that took at most `seconds`."""
@@ -277,7 +271,7 @@ class _Requests:
         """Return the requests of the next submission."""
         requests: list[_Planned] = []
         size = 0
-        limit = 1 if self._alone else min(self._limit, self._most)
+        limit = min(self._limit, self._most)
         while len(requests) < limit:
             if requests and size + size // len(requests) > MAX_BYTES:
                 break
@@ -293,9 +287,9 @@ class _Requests:
                 ):
                     self._waiting.appendleft(request)
                     break
-                place = self._place(request.source)
-                arrays = new_arrays(self._core, plan, place)
-                requests.append(_Planned(request, plan, arrays, place))
+                destination = self._destination(request.source)
+                arrays = new_arrays(self._core, plan, destination)
+                requests.append(_Planned(request, plan, arrays, destination))
             except Exception as error:
                 self._fail(error)
                 break
@@ -320,14 +314,6 @@ class _Requests:
         self._ended = True
         self._waiting.clear()
 
-    @staticmethod
-    def _blames_one(error: Exception, requests: list[_Planned]) -> bool:
-        """Whether one of several requests may have caused the error; then each runs alone."""
-        general = _core.ValidationError, _core.DeviceLostError
-        return (
-            len(requests) > 1 and isinstance(error, _core.Error) and not isinstance(error, general)
-        )
-
 
 def run(
     sequence: Iterable[Request],
@@ -335,14 +321,14 @@ def run(
     names: tuple[str, ...] | None,
     *,
     alone: bool = False,
-    place: Callable[[_core.Source], Destination] = lambda _: "host",
+    destination: Callable[[_core.Source], Destination] = lambda _: "host",
 ) -> Iterator[tuple[Settings, Result]]:
     """Yield the result of each request, in their order.
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
     uses results: none before the first result, then enough for `AHEAD` submissions.
     """
-    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, place)
+    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, destination)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission ended

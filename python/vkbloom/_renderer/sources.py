@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from vkbloom import _core
@@ -17,8 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from vkbloom._scene import Mesh, Scene
-    from vkbloom._scene.textures import Texture
+    from vkbloom._scene import Scene
     from vkbloom._settings.settings import Shading
 
 
@@ -172,58 +170,7 @@ def scene_source(
 
     if not isinstance(scene, Scene):
         raise TypeError(f"{name}: {type(scene).__name__} is not a Scene")
+    # Imported here, for the same reason.
+    from vkbloom._scene.blocks import scene_arguments  # noqa: PLC0415
+
     return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
-
-
-def scene_arguments(
-    scene: Scene, size: tuple[int, int], shading: Shading, turns: float
-) -> tuple[Any, ...]:
-    """Return the arguments of the core's scene_source, from checked values."""
-    camera = scene.camera
-    return (
-        _scene_arrays(scene),
-        (camera.position, camera.rotation, camera.fov, camera.near, camera.far),
-        size,
-        shading,
-        # `time` has period 1. It is reduced first, so that large times keep their float precision.
-        math.fmod(turns, 1.0),
-        scene.glow_intensity,
-    )
-
-
-#: As Vulkan numbers them.
-_ADDRESS_MODES = ("repeat", "mirror-repeat", "clamp-to-edge")
-_FILTERS = ("nearest", "linear")
-
-
-def _scene_arrays(scene: Scene) -> Any:
-    """Return the scene's meshes, sky and textures."""
-    # Textures by identity, not by content: each is uploaded once.
-    numbers: dict[Texture, int] = {}
-    body = _mesh_arrays(scene.body, numbers)
-    glow = None if scene.glow is None else _mesh_arrays(scene.glow, numbers)
-    sky = () if scene.skybox is None else scene.skybox.levels
-    textures = tuple(
-        (
-            texture.levels,
-            *map(_ADDRESS_MODES.index, texture.address_mode),
-            *map(_FILTERS.index, (texture.mag_filter, texture.min_filter, texture.mipmap_filter)),
-        )
-        for texture in numbers
-    )
-    return scene.contents_serial, body, glow, sky, textures
-
-
-def _mesh_arrays(mesh: Mesh, numbers: dict[Texture, int]) -> Any:
-    """Return a mesh's arrays; textures get the next numbers."""
-    surfaces = tuple(
-        (
-            surface.index_count,
-            *(
-                numbers.setdefault(texture, len(numbers))
-                for texture in (surface.base, surface.emission)
-            ),
-        )
-        for surface in mesh.surfaces
-    )
-    return mesh.vertices, mesh.indices, mesh.emission, mesh.texcoords, surfaces

@@ -108,43 +108,25 @@ class _Loader:
 
     def _placed_meshes(self) -> Iterator[tuple[int, Floats, str]]:
         """Yield the index, the world matrix and the node of every mesh of the scene."""
-        nodes = self._file.items("nodes")
-        children: list[list[int]] = []
-        parents: dict[int, int] = {}
-        for index in range(len(nodes)):
-            node = self._file.item("nodes", index, "nodes")
-            children.append(self._node_list(node.children, f"nodes[{index}].children"))
-            for child in children[-1]:
-                if child in parents:
-                    self._file.fail(
-                        f"damaged: node {child} is a child of both {parents[child]} and {index}"
-                    )
-                parents[child] = index
-        roots = [index for index in range(len(nodes)) if index not in parents]
-        order = list(roots)
-        for index in order:
-            order.extend(children[index])
-        # Every node has at most one parent. So a node that is not reached from a root is in a cycle
-        # or below one.
-        if len(order) != len(nodes):
-            stray = min(set(range(len(nodes))).difference(order))
-            self._file.fail(f"damaged: the nodes form a cycle, at or above node {stray}")
-
-        starts = roots
+        count = len(self._file.items("nodes"))
         shown = self._file.root.scene
         if shown is None and self._file.items("scenes"):
             # Only one scene is shown, as in other viewers.
             shown = 0
-        if shown is not None:
+        if shown is None:
+            children = {child for index in range(count) for child in self._children(index)}
+            starts = [index for index in range(count) if index not in children]
+        else:
             scene = self._file.item("scenes", shown, "scene")
             starts = self._node_list(scene.nodes, f"scenes[{shown}].nodes")
-            for start in starts:
-                if start in parents:
-                    self._file.fail(f"damaged: the scene lists node {start}, which has a parent")
+        reached: set[int] = set()
         pending = [(start, np.eye(4)) for start in reversed(starts)]
         while pending:
             index, outer = pending.pop()
-            node = nodes[index]
+            if index in reached:
+                self._file.fail(f"damaged: node {index} has two parents, or is below itself")
+            reached.add(index)
+            node = self._file.item("nodes", index, "nodes")
             # An overflow is found later: the baked vertices are then not finite.
             with np.errstate(over="ignore", invalid="ignore"):
                 world = outer @ self._local_matrix(node, f"nodes[{index}]")
@@ -152,7 +134,14 @@ class _Loader:
                 self._file.leave_out("skins")
             if node.mesh is not None:
                 yield node.mesh, world, f"nodes[{index}]"
-            pending.extend((child, world) for child in reversed(children[index]))
+            pending.extend((child, world) for child in reversed(self._children(index)))
+        if shown is None and len(reached) != count:
+            stray = min(set(range(count)) - reached)
+            self._file.fail(f"damaged: node {stray} has two parents, or is below itself")
+
+    def _children(self, index: int) -> list[int]:
+        node = self._file.item("nodes", index, "nodes")
+        return self._node_list(node.children, f"nodes[{index}].children")
 
     def _node_list(self, value: object, what: str) -> list[int]:
         if value is None:
@@ -160,10 +149,7 @@ class _Loader:
         if not isinstance(value, list):
             self._file.fail(f"{what} is not a list")
         last = len(self._file.items("nodes")) - 1
-        indices = [self._file.integer(index, what, 0, last) for index in value]
-        if len(set(indices)) != len(indices):
-            self._file.fail(f"damaged: {what} names a node twice")
-        return indices
+        return [self._file.integer(index, what, 0, last) for index in value]
 
     def _local_matrix(self, node: Parsed, what: str) -> Floats:
         """Return the 4x4 matrix of a node: its own, or T * R * S (3.5.3)."""
@@ -225,13 +211,13 @@ class _Loader:
                 total += geometry.vertex_count
                 if max(total, corners / 3) > MAX_VERTICES:
                     self._file.fail(f"too large: over {MAX_VERTICES} vertices or triangles")
-                rows, places, triangles = self._bake(geometry, world, f"{user}: {what}")
+                rows, coordinates, triangles = self._bake(geometry, world, f"{user}: {what}")
                 material = geometry.material
                 indices.setdefault(material.textures, []).append(
                     (triangles + (total - len(rows))).astype(np.uint32).ravel()
                 )
                 vertices.append(rows)
-                texcoords.append(places)
+                texcoords.append(coordinates)
                 emission.append(
                     np.broadcast_to(material.emission.astype(np.float32), (len(rows), 3))
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,7 @@ class Mesh:
     - `surfaces`: The textures of triangles at the end of `indices`, one surface after the other.
       The triangles before the first surface have no textures.
 
-    Arrays are copied unless they are read-only, C-contiguous owners of their memory. The core
-    checks them.
+    Arrays are copied unless they are read-only, C-contiguous owners of their memory.
     """
 
     vertices: NDArray[np.float32]
@@ -48,11 +48,20 @@ class Mesh:
     def __repr__(self) -> str:
         return f"Mesh({self.summary})"
 
+    @cached_property
+    def packed(self) -> NDArray[np.float32]:
+        """The vertices as the device reads them, with the emission: (N, 3, 4)."""
+        packed = np.zeros((len(self.vertices), 3, 4), np.float32)
+        packed[..., :3] = self.vertices.reshape(-1, 3, 3)
+        if self.emission is not None:
+            packed[..., 3] = self.emission
+        return packed
+
     @property
     def summary(self) -> str:
         """The size of the mesh as text."""
         size = f"{len(self.indices) // 3} triangles, {len(self.vertices)} vertices"
         if not self.surfaces:
             return size
-        textures = {texture for part in self.surfaces for texture in (part.base, part.emission)}
+        textures = {texture for part in self.surfaces for texture in part.textures}
         return f"{size}, textures: {len(textures - {WHITE})}"

@@ -16,8 +16,10 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io import image_reading
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, read_only
+from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
@@ -161,16 +163,16 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     height, width = panorama.shape[:2]
     centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
     t, s = np.meshgrid(centres, centres, indexing="ij")
-    one = np.ones_like(s)
+    unit = np.ones_like(s)
     directions = (
-        (one, -t, -s),
-        (-one, -t, s),
-        (s, one, t),
-        (s, -one, -t),
-        (s, -t, one),
-        (-s, -t, -one),
+        (unit, -t, -s),
+        (-unit, -t, s),
+        (s, unit, t),
+        (s, -unit, -t),
+        (s, -t, unit),
+        (-s, -t, -unit),
     )
-    source = _finite(panorama)
+    source = finite_floats(panorama)
     faces = np.empty((6, side, side, panorama.shape[2]), panorama.dtype)
     for face, (x, y, z) in zip(faces, directions, strict=True):
         u = 0.5 + np.arctan2(x, -z) / (2.0 * np.pi)
@@ -181,51 +183,21 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
         top, bottom = np.clip(row, 0, height - 1), np.clip(row + 1, 0, height - 1)
         above = source[top, left] * (1.0 - across) + source[top, right] * across
         below = source[bottom, left] * (1.0 - across) + source[bottom, right] * across
-        face[...] = _as_dtype(above * (1.0 - down) + below * down, panorama.dtype)
+        face[...] = rounded_to(above * (1.0 - down) + below * down, panorama.dtype)
     return faces
 
 
-def mip_levels(faces: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Make all mip levels of a cubemap.
+def _with_levels(faces: NDArray[Any]) -> Cubemap:
+    """Return a cubemap with all mip levels of `faces`, which nobody else may change.
 
-    Returns: `faces` and all smaller levels down to 1 x 1. A pixel is the mean of 2 x 2 pixels of
-    the next larger level. The last row and column of an odd side are left out, as sides are rounded
-    down. Means are computed in float32 and rounded to the dtype once for each level, so that errors
-    do not add up. NaN and infinity count as 0.
+    NaN and infinity count as 0 in the smaller ones.
     """
     # Face by face, since what a face needs stays in the CPU's cache.
-    smaller = zip(*map(_smaller_levels, faces), strict=True)
-    return (faces, *map(np.stack, smaller))
-
-
-def _smaller_levels(face: NDArray[Any]) -> list[NDArray[Any]]:
-    quarter = np.float32(0.25)
-    levels = []
-    mean = face if face.dtype == np.uint8 else _finite(face)
-    while len(mean) > 1:
-        end = len(mean) // 2 * 2
-        complete = mean[:end, :end]
-        # Two sums, since a sum over two axes is ten times as slow.
-        if mean.dtype == np.uint8:
-            # Sums of integers are exact, too, and take half the time.
-            rows = np.add(complete[::2], complete[1::2], dtype=np.uint16)
-            mean = (rows[:, ::2] + rows[:, 1::2]) * quarter
-        else:
-            # Multiplied before the sum, so that four of the largest float32 do not overflow.
-            quarters = complete * quarter
-            rows = quarters[::2] + quarters[1::2]
-            mean = rows[:, ::2] + rows[:, 1::2]
-        levels.append(_as_dtype(mean, face.dtype))
-    return levels
-
-
-def _with_levels(faces: NDArray[Any]) -> Cubemap:
-    """Return a cubemap with all mip levels of `faces`, which nobody else may change."""
-    levels = mip_levels(faces)
+    levels = [faces, *map(np.stack, zip(*(mip_levels(face)[1:] for face in faces), strict=True))]
     for level in levels:
         # So that the cubemap takes the level itself.
         level.flags.writeable = False
-    return Cubemap(levels)
+    return Cubemap(tuple(levels))
 
 
 def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
@@ -238,18 +210,6 @@ def _with_alpha(image: NDArray[Any]) -> NDArray[Any]:
     return full
 
 
-def _finite(image: NDArray[Any]) -> NDArray[np.float32]:
-    """Return `image` in float32. NaN and infinity become 0, since a mean would spread them."""
-    values = image.astype(np.float32)
-    if image.dtype.kind == "f":
-        values[~np.isfinite(values)] = 0.0
-    return values
-
-
-def _as_dtype(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    return (np.rint(values) if dtype == np.uint8 else values).astype(dtype)
-
-
 def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """Split texel coordinates into integer texels and fractions (with a new last axis)."""
     whole = np.floor(coordinate)
@@ -258,25 +218,9 @@ def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[n
 
 def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Read an RGB or RGBA image file as ``(H, W, C)``, with its stored values."""
-    # Imported here, since most skies come without them.
-    from vkbloom._io.image_reading import (  # noqa: PLC0415
-        check_plausible,
-        opened,
-    )
-    from vkbloom._io.images import failure_of  # noqa: PLC0415
-
-    name = os.fspath(path)
-    with opened(path, "Reading sky images") as image:
-        spec = image.spec()
-        if spec.nchannels not in (3, 4) or spec.depth > 1 or spec.deep:
-            raise ValueError(f"{name}: has {spec.nchannels} channels; flat RGB or RGBA is needed")
-        if max(spec.width, spec.height) > 4 * MAX_SIDE:
-            raise ValueError(f"{name}: {spec.width} x {spec.height} is too large for a sky")
-        check_plausible(spec, name)
-        kind = str(spec.format) if str(spec.format) in ("uint8", "half") else "float"
-        pixels = image.read_image(0, 0, 0, spec.nchannels, kind)
-        # For a truncated file, OpenImageIO returns the part that is there and reports an error.
-        if pixels is None or image.has_error:
-            raise ValueError(f"{name}: damaged: {failure_of(image)}")
-    result: NDArray[Any] = np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
-    return result
+    pixels = image_reading.load(path).pixels
+    if pixels.shape[2] not in (3, 4):
+        raise ValueError(
+            f"{os.fspath(path)}: has {pixels.shape[2]} channels; flat RGB or RGBA is needed"
+        )
+    return pixels / np.float32(65535) if pixels.dtype == np.uint16 else pixels

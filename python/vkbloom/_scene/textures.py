@@ -65,11 +65,16 @@ class Surface:
     base: Texture = WHITE
     emission: Texture = WHITE
 
+    @property
+    def textures(self) -> tuple[Texture, Texture]:
+        """Both textures."""
+        return self.base, self.emission
 
-def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
+
+def mip_levels(picture: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Make all mip levels of a picture.
 
-    - `picture`: ``(h, w, C)`` float16, finite.
+    - `picture`: ``(h, w, C)`` of uint8, float16 or float32.
     - Returns: the picture and all smaller levels down to 1 x 1; sizes are halved and rounded down.
       A texel is the mean of the part of the larger level that it covers: of two texels along an
       even side, and of three weighted texels along an odd side (Guthe and Heckbert,
@@ -77,26 +82,39 @@ def mip_levels(picture: NDArray[np.float16]) -> tuple[NDArray[np.float16], ...]:
       for each level.
     """
     levels = [picture]
-    mean: NDArray[Any] = picture
+    mean = finite_floats(picture)
     while max(mean.shape[:2]) > 1:
         mean = _halved(_halved(mean, 0), 1)
-        levels.append(mean.astype(np.float16))
+        levels.append(rounded_to(mean, picture.dtype))
     return tuple(levels)
 
 
-def _halved(picture: NDArray[Any], axis: int) -> NDArray[Any]:
-    """Return the picture with one of its first two sides halved, in float32."""
+def finite_floats(image: NDArray[Any]) -> NDArray[np.float32]:
+    """Return an image in float32. NaN and infinity become 0, since a mean would spread them."""
+    values = image.astype(np.float32)
+    if image.dtype.kind == "f":
+        values[~np.isfinite(values)] = 0.0
+    return values
+
+
+def rounded_to(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return floats as numbers of a dtype: integers are rounded to the nearest."""
+    return (np.rint(values) if dtype == np.uint8 else values).astype(dtype)
+
+
+def _halved(picture: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+    """Return the picture with one of its first two sides halved."""
     side = picture.shape[axis]
     if side == 1:
         return picture
     half = side // 2
     lines = np.moveaxis(picture, axis, 0)
-    first = lines[0 : 2 * half : 2].astype(np.float32)
-    second = lines[1 : 2 * half : 2].astype(np.float32)
+    first, second = lines[0 : 2 * half : 2], lines[1 : 2 * half : 2]
+    # Shares are multiplied before the sum, so that the largest float32 does not overflow.
     if side % 2 == 0:
-        mean = (first + second) / 2
+        mean = first * np.float32(0.5) + second * np.float32(0.5)
     else:
-        place = np.arange(half, dtype=np.float32)[:, np.newaxis, np.newaxis]
-        third = lines[2::2].astype(np.float32)
-        mean = ((half - place) * first + half * second + (place + 1) * third) / np.float32(side)
+        index = np.arange(half, dtype=np.float32)[:, np.newaxis, np.newaxis]
+        first_share, last_share = (half - index) / side, (index + 1) / side
+        mean = first_share * first + np.float32(half / side) * second + last_share * lines[2::2]
     return np.moveaxis(mean, 0, axis)

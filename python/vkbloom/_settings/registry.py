@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Reference(Protocol):
-    """A method in NumPy, such as the modules of `vkbloom.reference`.
+    """A module of `vkbloom.reference`: a method in NumPy.
 
     ``passes(source, settings)`` returns the framebuffers after the glow, in the order of the data
     flow; the last one is "bloom". `source` is a `vkbloom.reference._image.BlurInput`.
@@ -43,14 +43,14 @@ class Registry(Named[type[Any]]):
     def __init__(self, kind: str) -> None:
         super().__init__(kind, _imported)
 
-    def supply(self, package: str, places: Mapping[str, str]) -> None:
+    def supply(self, package: str, sources: Mapping[str, str]) -> None:
         """Set the classes of a package: "module:Class" by name."""
-        self.fill(lambda: {name: f"{package}.{place}" for name, place in places.items()})
+        self.fill(lambda: {name: f"{package}.{source}" for name, source in sources.items()})
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
-            (name, one if isinstance(one, str) else one.__name__, "")
-            for name, one in self._entries.items()
+            (name, entry if isinstance(entry, str) else entry.__name__, "")
+            for name, entry in self._entries.items()
         ]
 
     def is_added(self, name: str) -> bool:
@@ -61,39 +61,23 @@ class Registry(Named[type[Any]]):
 class Methods(Registry):
     """The settings classes of the methods, and the methods in NumPy."""
 
-    _references: Final[dict[str, Reference]]
-
-    def __init__(self, kind: str) -> None:
-        super().__init__(kind)
-        self._references = {}
-
-    def register(self, kind: type[Any], reference: Reference | None = None) -> None:
-        """Add a class under its `method`, or replace one that was added."""
-        name = kind.method
-        if isinstance(self._entries.get(name), str):
-            raise ValueError(f"method: {name!r} is a method of vkbloom; give another name")
-        self.unregister(name)
-        self._entries[name] = kind
-        if reference is not None:
-            self._references[name] = reference
+    def register(self, kind: type[Any]) -> None:
+        """Add the class of a custom method, or replace one that was added."""
+        self.unregister(kind.method)
+        self._entries[kind.method] = kind
 
     def unregister(self, name: str) -> None:
         """Remove a class that was added, if it is there."""
-        if isinstance(self._entries.get(name), type):
+        if self.is_added(name):
             del self._entries[name]
             self._made.pop(name, None)
-            self._references.pop(name, None)
-
-    def has_reference(self, name: str) -> bool:
-        """Return whether the method is there in NumPy."""
-        return isinstance(self._entries.get(name), str) or name in self._references
 
     def reference(self, name: str) -> Reference:
-        """Return a method in NumPy; raise KeyError if there is none."""
-        if isinstance(self._entries.get(name), str):
-            module: Any = import_module(f"vkbloom.reference._{name}")
-            return module  # type: ignore[no-any-return]
-        return self._references[name]
+        """Return a method of the package in NumPy; raise KeyError for a custom one."""
+        if not isinstance(self._entries[name], str):
+            raise KeyError(name)
+        module: Any = import_module(f"vkbloom.reference._{name}")
+        return module  # type: ignore[no-any-return]
 
 
 #: The methods, which `vkbloom._methods` supplies, in the order of ``VKB_METHODS`` in the core.

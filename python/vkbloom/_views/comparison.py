@@ -10,18 +10,16 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import as_float, check_number, import_extra, native_order
+from vkbloom._checks import check_number, import_extra, native_order
 from vkbloom._io.srgb import decode_srgb
 
-Metric = Literal["ssim", "psnr", "flip", "cvvdp"]
+Metric = Literal["ssim", "psnr", "flip"]
 
 _DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Side of scikit-image's default window in pixels.
 _SSIM_WINDOW: Final = 7
 #: Names of the metrics.
-ALL_METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
-#: Those that are computed where none are named: ColorVideoVDP needs luminances, and PyTorch.
-USUAL_METRICS: Final[tuple[Metric, ...]] = ("ssim", "psnr", "flip")
+METRICS: Final[tuple[Metric, ...]] = get_args(Metric)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +39,6 @@ class Comparison:
       values, 0 and 1, which is 1 for images within 0..1.
     - `ssim`, `psnr`, `flip`: Structural similarity, peak signal-to-noise ratio in dB (inf if
       nothing differs) and mean FLIP.
-    - `cvvdp`: ColorVideoVDP in just-objectionable differences: 10 where no difference is visible.
     - `not_computed`: Why one of these is None, by its name; also "not asked for".
     """
 
@@ -57,7 +54,6 @@ class Comparison:
     ssim: float | None = None
     psnr: float | None = None
     flip: float | None = None
-    cvvdp: float | None = None
     not_computed: Mapping[str, str]
 
     @property
@@ -88,9 +84,7 @@ def compare(
     threshold: float = 0.0,
     relative: float = 0.0,
     allow_nan: bool = False,
-    metrics: Collection[Metric] = USUAL_METRICS,
-    nits_per_unit: float | None = None,
-    pixels_per_degree: float | None = None,
+    metrics: Collection[Metric] = METRICS,
 ) -> Comparison:
     """Compare two images; `a` is the reference.
 
@@ -98,13 +92,13 @@ def compare(
     including alpha; FLIP uses the first three, or the first as grey. A pixel counts in
     `percent_over` if it differs by more than threshold + relative * abs(a). With `allow_nan`, NaN
     and infinity of the same sign are equal. SSIM and PSNR are scikit-image's (SSIM with its window
-    of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats. "cvvdp" needs the
-    luminance of a linear 1 in cd/m2 and the pixels of a degree of the observer's view; FLIP has 67
-    where that is None. Values that are not finite count as 0 in SSIM and FLIP only.
+    of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats.
+    Values that are not finite count as 0 in SSIM and FLIP only.
     """
     check_number("threshold", threshold, 0.0, math.inf)
     check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
-    _check_metrics(metrics, nits_per_unit=nits_per_unit, pixels_per_degree=pixels_per_degree)
+    if unknown := [name for name in metrics if name not in METRICS]:
+        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(METRICS)}")
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
@@ -112,18 +106,16 @@ def compare(
             mismatches=mismatches,
             threshold=threshold,
             relative=relative,
-            not_computed=dict.fromkeys(ALL_METRICS, "the images are no match"),
+            not_computed=dict.fromkeys(METRICS, "the images are no match"),
         )
     pair = _pair(a, b)
     unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
     if unequal.any():
-        mismatches += (f"NaN or infinity in one image only, {_places(unequal)}",)
+        mismatches += (f"NaN or infinity in one image only, {_positions(unequal)}",)
     if common.any() and not allow_nan:
-        mismatches += (f"NaN or infinity in both images, {_places(common)}",)
+        mismatches += (f"NaN or infinity in both images, {_positions(common)}",)
     data_range = 1.0 if pair.is_integer else _span(pair)
-    computed, not_computed = _metrics(
-        pair, metrics, data_range=data_range, nits=nits_per_unit, degree=pixels_per_degree
-    )
+    computed, not_computed = _metrics(pair, metrics, data_range)
     over = _over(pair, threshold, relative)
     position, values = _largest(pair)
     is_any = bool(pair.valid.any())
@@ -140,17 +132,6 @@ def compare(
         not_computed=not_computed,
         **computed,
     )
-
-
-def _check_metrics(metrics: Collection[Metric], **viewing: float | None) -> None:
-    """Raise TypeError or ValueError for an unknown metric and wrong viewing conditions."""
-    if unknown := [name for name in metrics if name not in ALL_METRICS]:
-        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(ALL_METRICS)}")
-    for name, number in viewing.items():
-        if number is not None and not 0 < as_float(name, number) < math.inf:
-            raise ValueError(f"{name}: {number!r} is out of range, finite and above 0")
-        if number is None and "cvvdp" in metrics:
-            raise ValueError(f"{name}: None is not a number; the metric cvvdp needs one")
 
 
 def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[NDArray[np.float32], float]:
@@ -228,7 +209,7 @@ def _over(pair: _Pair, threshold: float, relative: float) -> NDArray[np.bool_]:
     return over
 
 
-def _places(where: NDArray[np.bool_]) -> str:
+def _positions(where: NDArray[np.bool_]) -> str:
     """Describe the number of marked values of an (H, W, C) image, and the position of the first."""
     y, x, channel = (int(index[0]) for index in np.nonzero(where))
     return f"{int(where.sum())} values, the first at x {x}, y {y}, channel {channel}"
@@ -250,22 +231,16 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
 
 
 def _metrics(
-    pair: _Pair,
-    wanted: Collection[Metric],
-    *,
-    data_range: float,
-    nits: float | None,
-    degree: float | None,
+    pair: _Pair, wanted: Collection[Metric], data_range: float
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return the computed metrics, and the reasons for the others, by name."""
     measures: dict[Metric, Callable[[], float | str]] = {
         "ssim": lambda: _ssim(pair, data_range),
         "psnr": lambda: _psnr(pair, data_range),
-        "flip": lambda: _mean_flip(pair, degree),
-        "cvvdp": lambda: _cvvdp(pair, nits or 0.0, degree or 0.0),
+        "flip": lambda: _mean_flip(pair),
     }
     computed: dict[str, float] = {}
-    reasons: dict[str, str] = dict.fromkeys(set(USUAL_METRICS) - set(wanted), "not asked for")
+    reasons: dict[str, str] = dict.fromkeys(set(METRICS) - set(wanted), "not asked for")
     for name in wanted:
         # Extreme floats give figures that are not finite.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -300,40 +275,13 @@ def _psnr(pair: _Pair, data_range: float) -> float | str:
     return float(metrics.peak_signal_noise_ratio(a, b, data_range=data_range))
 
 
-def _mean_flip(pair: _Pair, degree: float | None) -> float | str:
+def _mean_flip(pair: _Pair) -> float | str:
     if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
         return "OpenImageIO 3.2 is needed"
-    return float(_flip(pair, degree).mean(dtype=np.float64))
+    return float(_flip(pair).mean(dtype=np.float64))
 
 
-def _cvvdp(pair: _Pair, nits: float, degree: float) -> float | str:
-    """Return ColorVideoVDP of two still images.
-
-    Source: Mantiuk et al., "ColorVideoVDP: A Visual Difference Predictor for Image, Video and
-    Display Distortions", SIGGRAPH 2024.
-    """
-    try:
-        package = import_extra("pycvvdp", "cvvdp", "ColorVideoVDP")
-    except ModuleNotFoundError as error:
-        return str(error)
-    images = [np.float32(nits) * image for image in _linear(pair)]
-    height, width = images[0].shape[:2]
-    # A display that shows all luminances of both images, and adds no light of its own.
-    peak = max(float(image.max()) for image in images)
-    metric = package.cvvdp(
-        display_photometry=package.vvdp_display_photo_eotf(
-            Y_peak=max(peak, nits), contrast=1e6, source_colorspace="BT.709-linear", E_ambient=0
-        ),
-        display_geometry=package.vvdp_display_geometry((width, height), ppd=degree),
-        quiet=True,
-    )
-    score, _ = metric.predict(images[1], images[0], dim_order="HWC")
-    return float(score)
-
-
-def flip_map(
-    a: NDArray[Any], b: NDArray[Any], *, pixels_per_degree: float | None = None
-) -> NDArray[np.float32]:
+def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
     """Return FLIP of every pixel; its mean is the figure of `compare`."""
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
@@ -341,7 +289,7 @@ def flip_map(
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     if not hasattr(_oiio().ImageBufAlgo, "FLIP_diff"):
         raise ModuleNotFoundError("FLIP needs OpenImageIO 3.2: pip install vkbloom[images]")
-    return _flip(_pair(a, b), pixels_per_degree)
+    return _flip(_pair(a, b))
 
 
 def _oiio() -> Any:
@@ -362,7 +310,7 @@ def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
     return results
 
 
-def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:
+def _flip(pair: _Pair) -> NDArray[np.float32]:
     """Return OpenImageIO's FLIP of every pixel.
 
     Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
@@ -375,8 +323,5 @@ def _flip(pair: _Pair, degree: float | None) -> NDArray[np.float32]:
         # from an equal one that is not, which leaves about 1e-6.
         return np.zeros(first.shape[:2], np.float32)
     buffers = [oiio.ImageBuf(image) for image in (first, second)]
-    # OpenImageIO takes 0 as its default, which is FLIP's own.
-    errors = oiio.ImageBufAlgo.FLIP_diff(
-        *buffers, hdr=0 if pair.is_integer else 1, ppd=degree or 0.0
-    )
+    errors = oiio.ImageBufAlgo.FLIP_diff(*buffers, hdr=0 if pair.is_integer else 1)
     return np.asarray(errors.get_pixels(), np.float32)[:, :, 0]

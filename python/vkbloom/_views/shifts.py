@@ -19,7 +19,6 @@ MIN_SHIFT: Final = 1 / 64
 # a pixel, the image may have been interpolated by another filter.
 _REMAINS: Final = 0.1
 _REMAINS_OF_WHOLE: Final = 0.02
-_WINDOW: Final = 512  # pixels; the side of the part in which a shift is searched
 _LONGEST: Final = 0.25  # of the image's side
 # Shifts by quarters and eighths are tried, too: the estimate is less exact than its judgement.
 _PARTS: Final = (4, 8)
@@ -33,51 +32,23 @@ def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None
     try:
         registration = import_extra("skimage.registration", "quality", "Finding a shift")
         ndimage = import_extra("scipy.ndimage", "quality", "Finding a shift")
-        optimize = import_extra("scipy.optimize", "quality", "Finding a shift")
     except ModuleNotFoundError:
         return None
     # Bright lights alone would decide otherwise, and interpolations differ in high frequencies.
     grey_a, grey_b = (
         ndimage.gaussian_filter(_compressed(image).mean(axis=2), 1, mode="wrap") for image in (a, b)
     )
-    start, *_ = registration.phase_cross_correlation(
-        grey_b, grey_a, upsample_factor=4, normalization=None
+    (y, x), *_ = registration.phase_cross_correlation(
+        grey_b, grey_a, upsample_factor=64, normalization=None
     )
-    window = _brightest_window(grey_a + grey_b)
-    part_a, part_b = grey_a[window], grey_b[window]
-    inner = _inner(part_a.shape, (start[1], start[0]))
-
-    def difference(shift: NDArray[np.float64]) -> float:
-        moved = ndimage.shift(part_a, shift, order=1, mode="grid-wrap")
-        return _rms((moved - part_b)[inner])
-
-    best = optimize.minimize(
-        difference, start, method="Nelder-Mead", options={"xatol": 5e-3, "fatol": 0.0}
-    )
-    y, x = map(float, best.x)
     rounded = [(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS]
-    for shift in dict.fromkeys((*rounded, (x, y))):
+    for shift in dict.fromkeys((*rounded, (float(x), float(y)))):
         is_short = max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _LONGEST
-        # Most pairs are refused by a part of them.
-        if (
-            is_short
-            and max(map(abs, shift)) >= MIN_SHIFT
-            and _residual(a[window], b[window], shift, step) is not None
-            and (residual := _residual(a, b, shift, step)) is not None
-        ):
-            return shift, residual
+        if is_short and max(map(abs, shift)) >= MIN_SHIFT:
+            residual = _residual(a, b, shift, step)
+            if residual is not None:
+                return shift, residual
     return None
-
-
-def _brightest_window(image: _Image) -> tuple[slice, slice]:
-    """Return rows and columns around the brightest pixel, where a shift is best seen."""
-    y, x = np.unravel_index(int(image.argmax()), image.shape)
-    starts = (
-        min(max(int(middle) - _WINDOW // 2, 0), max(side - _WINDOW, 0))
-        for middle, side in zip((y, x), image.shape, strict=True)
-    )
-    rows, columns = (slice(start, start + _WINDOW) for start in starts)
-    return rows, columns
 
 
 def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:

@@ -10,9 +10,9 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from vkbloom._checks import check_number
-from vkbloom._views.comparison import USUAL_METRICS, Comparison, Metric
+from vkbloom._views.comparison import METRICS, Comparison, Metric
 
-Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "PSNR", "FLIP"]
+Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "FLIP"]
 
 #: (atol, rtol) of each dtype. Integers: one level, by which a value near the middle of two levels
 #: may change. Half: relative, four roundings of 2**-11 each; absolute, a fortieth of an 8-bit
@@ -45,8 +45,6 @@ class Tolerances:
         Difference that no pixel may exceed, independent of `fail_percent`: ``hardfail``.
     ssim : float or None
         Smallest structural similarity, -1 to 1.
-    psnr : float or None
-        Smallest peak signal-to-noise ratio, in dB.
     flip : float or None
         Largest mean FLIP, 0 to 1.
     allow_nan : bool
@@ -63,7 +61,6 @@ class Tolerances:
     fail_percent: float = 0.0
     hard_fail: float | None = None
     ssim: float | None = None
-    psnr: float | None = None
     flip: float | None = None
     allow_nan: bool = False
 
@@ -74,7 +71,6 @@ class Tolerances:
             ("fail_percent", 0.0, 100.0),
             ("hard_fail", 0.0, math.inf),
             ("ssim", -1.0, 1.0),
-            ("psnr", -math.inf, math.inf),
             ("flip", 0.0, 1.0),
         ):
             value = getattr(self, name)
@@ -92,7 +88,7 @@ class Tolerances:
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The metrics that have a limit, which `compare` must compute."""
-        return tuple(name for name in USUAL_METRICS if getattr(self, name) is not None)
+        return tuple(name for name in METRICS if getattr(self, name, None) is not None)
 
 
 def failures(
@@ -112,7 +108,7 @@ def failures(
     hard, largest = tolerances.hard_fail, comparison.max_error or 0.0
     if hard is not None and largest > hard:
         failed.append(("tolerances", f"{worst(comparison)}, over {hard:.6g}, the most allowed"))
-    names: dict[Metric, Stage] = {"ssim": "SSIM", "psnr": "PSNR", "flip": "FLIP"}
+    names: dict[Metric, Stage] = {"ssim": "SSIM", "flip": "FLIP"}
     for metric, name in names.items():
         value, limit = getattr(comparison, metric), getattr(tolerances, metric)
         if metric not in metrics or limit is None:

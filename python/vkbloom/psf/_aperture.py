@@ -88,9 +88,9 @@ class iris:
 @kept
 def _mask(made: iris) -> NDArray[np.float32]:
     fine = 4 * made.size
-    places = (np.arange(fine) + 0.5) * 2 / fine - 1
+    positions = (np.arange(fine) + 0.5) * 2 / fine - 1
     # Rows count downwards.
-    x, y = places, -places[:, np.newaxis]
+    x, y = positions, -positions[:, np.newaxis]
     open_ = np.empty((fine, fine), np.bool_)
     bands = [slice(first, first + _BAND) for first in range(0, fine, _BAND)]
     step = 2 * math.pi / made.blades
@@ -127,7 +127,7 @@ def _mask(made: iris) -> NDArray[np.float32]:
 
 def _near(centre: float, radius: float, count: int) -> slice:
     """Return the samples of -1..1 whose distance from the centre is at most the radius."""
-    first, last = ((place + 1) * count / 2 for place in (centre - radius, centre + radius))
+    first, last = ((position + 1) * count / 2 for position in (centre - radius, centre + radius))
     return slice(max(0, math.floor(first)), min(count, math.ceil(last)))
 
 
@@ -273,19 +273,19 @@ def _sums(mask: Array, below: int) -> Array:
     columns[:count], columns[-count:] = waves[:count], waves[count:]
     half = np.fft.fft(columns, axis=0).real
     middle = side // 2
-    places = np.arange(-middle, min(middle, below))
-    sums = np.zeros((len(places) + 3, side + 3))
-    sums[2:-1, middle + 2 : -1] = half[places, :middle]
-    sums[2:-1, 2 : middle + 2] = half[-places, middle:0:-1]
+    positions = np.arange(-middle, min(middle, below))
+    sums = np.zeros((len(positions) + 3, side + 3))
+    sums[2:-1, middle + 2 : -1] = half[positions, :middle]
+    sums[2:-1, 2 : middle + 2] = half[-positions, middle:0:-1]
     return sums.cumsum(axis=0, out=sums).cumsum(axis=1, out=sums)
 
 
-def _between(sums: Array, places: Array) -> Array:
+def _between(sums: Array, positions: Array) -> Array:
     """Return the differences of the sums between neighbouring places along the first axis.
 
     The sums are interpolated by cubics between the cells, and constant outside of them.
     """
-    at = np.clip(places, 0, len(sums) - 3)
+    at = np.clip(positions, 0, len(sums) - 3)
     lower = np.minimum(at.astype(np.intp), len(sums) - 4)
     t = at - lower
     # Catmull and Rom's spline.
@@ -295,12 +295,12 @@ def _between(sums: Array, places: Array) -> Array:
         ((4 - 3 * t) * t + 1) * t / 2,
         (t - 1) * t * t / 2,
     )
-    found = np.empty((len(places), sums.shape[1]))
+    values = np.empty((len(positions), sums.shape[1]))
     products = np.empty((_BLOCK, sums.shape[1]))
     # Blocks that stay in the processor's cache.
-    for first in range(0, len(places), _BLOCK):
+    for first in range(0, len(positions), _BLOCK):
         block = slice(first, first + _BLOCK)
-        rows = found[block]
+        rows = values[block]
         np.take(sums, lower[block], axis=0, out=rows, mode="clip")
         rows *= weights[0][block, np.newaxis]
         for offset, weight in enumerate(weights[1:], 1):
@@ -308,7 +308,7 @@ def _between(sums: Array, places: Array) -> Array:
             np.take(sums, lower[block] + offset, axis=0, out=product, mode="clip")
             product *= weight[block, np.newaxis]
             rows += product
-    return np.diff(found, axis=0)
+    return np.diff(values, axis=0)
 
 
 def _colours(lengths: tuple[float, ...] | tuple[int, ...]) -> Array:

@@ -207,13 +207,13 @@ def centred(array: Array, size: tuple[int, int]) -> Array:
     """Return the array cropped, or extended by zeros, around its centre [h // 2, w // 2]."""
     width, height = check_size("size", size)
     result = np.zeros((height, width, *array.shape[2:]))
-    places: list[tuple[slice, slice]] = []
+    windows: list[tuple[slice, slice]] = []
     for length, wanted in zip(array.shape[:2], (height, width), strict=True):
         first = max(0, length // 2 - wanted // 2)
         start = max(0, wanted // 2 - length // 2)
         count = min(length - first, wanted - start)
-        places.append((slice(first, first + count), slice(start, start + count)))
-    (rows, to_rows), (columns, to_columns) = places
+        windows.append((slice(first, first + count), slice(start, start + count)))
+    (rows, to_rows), (columns, to_columns) = windows
     result[to_rows, to_columns] = array[rows, columns]
     return result
 
@@ -225,7 +225,7 @@ def functions() -> dict[str, type[PSF]]:
 
 def _leaves(kind: type[Any]) -> list[type[Any]]:
     """Return the classes below `kind` that have parameters."""
-    found: list[type[Any]] = []
+    kinds: list[type[Any]] = []
     for below in kind.__subclasses__():
-        found += [below] if dataclasses.is_dataclass(below) else _leaves(below)
-    return found
+        kinds += [below] if dataclasses.is_dataclass(below) else _leaves(below)
+    return kinds

@@ -32,7 +32,7 @@ _HEADER: Final = struct.Struct("<Q7I")
 _DIGEST_SIZE: Final = 32
 _PACKAGE: Final = Path(__file__).parents[1]
 # Modules whose functions follow from their fields alone. Those of users may change at any time.
-_OWN: Final = {f"vkbloom.psf._{name}" for name in ("aperture", "eye", "lens", "renderers")}
+_PURE_MODULES: Final = {f"vkbloom.psf._{name}" for name in ("aperture", "eye", "lens", "renderers")}
 _SOURCES: Final = ("_core_kernel.py", "_methods/convolution.py", "_methods/blender_kernels.py")
 
 Pixels: TypeAlias = NDArray[np.float32]
@@ -71,8 +71,8 @@ def _update(digest: Any, value: Any) -> bool:
         return True
     if isinstance(value, tuple):
         digest.update(f"{len(value)}\n".encode())
-        return all(_update(digest, one) for one in value)
-    if not dataclasses.is_dataclass(value) or type(value).__module__ not in _OWN:
+        return all(_update(digest, item) for item in value)
+    if not dataclasses.is_dataclass(value) or type(value).__module__ not in _PURE_MODULES:
         return False
     digest.update(f"{type(value).__name__}\n".encode())
     return all(_update(digest, getattr(value, field.name)) for field in dataclasses.fields(value))
@@ -103,8 +103,8 @@ def _pack(kernel: CoreKernel) -> bytes:
 
 def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
     """Return the first to the last of the lines along an axis that have a True."""
-    places = np.flatnonzero(filled.any(axis=axis))
-    return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 0)
+    lines = np.flatnonzero(filled.any(axis=axis))
+    return slice(int(lines[0]), int(lines[-1]) + 1) if len(lines) else slice(0, 0)
 
 
 def _unpack(data: bytes) -> CoreKernel:

@@ -64,16 +64,16 @@ def _spread(psf: measured) -> Array:
     # Values of doubles are not clamped.
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1
-    if METHODS.has_reference(psf.settings.method):
-        spread = reference.blur(point, psf.settings, format="rgba32float")
-    else:
+    if METHODS.is_added(psf.settings.method):
         spread = _rendered(point, psf.settings)
+    else:
+        spread = reference.blur(point, psf.settings, format="rgba32float")
     spread.flags.writeable = False
     return spread
 
 
 def _rendered(point: Array, settings: Settings) -> Array:
-    """Return the bloom of a method without a reference."""
+    """Return the bloom of a custom method."""
     from vkbloom._renderer.default import apply  # noqa: PLC0415  above this floor
 
     exact = settings.replace(format="rgba32float")

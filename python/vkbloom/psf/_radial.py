@@ -69,8 +69,8 @@ def _centre(density: Callable[[Array], Array]) -> Array:
     for level in range(1, 1 + _LEVELS):
         side = 3.0**-level
         # Of the eight squares around the middle one, four lie on an axis and four on a diagonal.
-        places = np.array([side, side]), np.array([0.0, side])
-        total = total + 4 * _product(density, *places, side, 12).sum(axis=1)
+        centres = np.array([side, side]), np.array([0.0, side])
+        total = total + 4 * _product(density, *centres, side, 12).sum(axis=1)
     return np.asarray(total)
 
 
@@ -129,7 +129,7 @@ class RadialPSF(PSF):
         theta, weights = _nodes(_edges(finest))
         rings = (self._rings(theta) * weights[..., np.newaxis]).reshape(-1, 3)
         angles = 2 * math.pi * theta.ravel()
-        transfer = np.stack([bessel(0, one * angles) @ rings for one in cycles])
+        transfer = np.stack([bessel(0, cycle * angles) @ rings for cycle in cycles])
         return np.asarray(np.abs(transfer) / rings.sum(axis=0))
 
     def _rings(self, theta: Array) -> Array:

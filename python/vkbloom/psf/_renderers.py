@@ -139,7 +139,7 @@ def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = N
     The kernel of a frame of 16384 x 1 would have 16384 rows, of which one counts.
     """
     image = _image_of(psf)
-    row, column = _place(image, psf.center)
+    row, column = _point(image, psf.center)
     centre = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
     around = image[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].copy()
     top, left = row - max(row - 2, 0), column - max(column - 2, 0)
@@ -168,7 +168,7 @@ def _image_of(psf: unreal) -> Array:
     return rgb(psf.image)
 
 
-def _place(image: Array, center: tuple[float, float] | None) -> tuple[int, int]:
+def _point(image: Array, center: tuple[float, float] | None) -> tuple[int, int]:
     """Return the row and the column of the point."""
     height, width = image.shape[:2]
     if center is not None:

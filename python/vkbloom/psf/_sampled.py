@@ -53,9 +53,9 @@ class SampledPSF(PSF):
 
     def mtf(self, frequencies: ArrayLike) -> Array:
         lines = self.native_array().sum(axis=0)
-        places = np.arange(len(lines)) - len(lines) // 2
+        positions = np.arange(len(lines)) - len(lines) // 2
         cycles = check_radii("frequencies", frequencies)
-        waves = np.exp(-2j * np.pi * np.outer(cycles, places))
+        waves = np.exp(-2j * np.pi * np.outer(cycles, positions))
         return np.asarray(np.abs(waves @ lines) / lines.sum(axis=0))
 
 

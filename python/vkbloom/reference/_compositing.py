@@ -28,7 +28,6 @@ def composite(
     dtype: DTypeLike | None = None,
     *,
     share: float | Array = 1.0,
-    is_light: bool = False,
 ) -> Array:
     """Return the final image: composite, exposure, tone map, encoding, dither, in this order.
 
@@ -57,8 +56,6 @@ def composite(
         Dtype of the final image; by default the scene's. The result is clamped to its range.
     share : float or ndarray, shape (H, W, 1)
         The share of the scene in the bloom's source: the mask, or 0 with an emission.
-    is_light : bool
-        Whether `bloom` is already i b, or the sum of that and glare.
 
     Returns
     -------
@@ -76,7 +73,7 @@ def composite(
         return composite_checked(image, None, settings, stored)
     if bloom is None:
         raise TypeError("bloom: None is not an array; settings.bloom is True")
-    light = as_float(bloom, "bloom", (3, 4)) * (1.0 if is_light else strength_of(settings))
+    light = as_float(bloom, "bloom", (3, 4)) * strength_of(settings)
     if light.shape[:2] != image.shape[:2]:
         raise ValueError(
             f"bloom: height and width {light.shape[:2]} are not the scene's {image.shape[:2]}"
@@ -189,8 +186,8 @@ def _noise(size: tuple[int, int], seed: int) -> Array:
     state = [columns, rows, np.full(size, seed, np.uint32)]
     state = [np.uint32(1664525) * number + np.uint32(1013904223) for number in state]
     for mixing in range(2):
-        for place in range(3):
-            state[place] = state[place] + state[place - 2] * state[place - 1]
+        for channel in range(3):
+            state[channel] = state[channel] + state[channel - 2] * state[channel - 1]
         if mixing == 0:
             state = [number ^ (number >> np.uint32(16)) for number in state]
     return (np.stack(state, axis=-1) // np.uint32(2**20) + 0.5) / 4096

@@ -1,6 +1,5 @@
 # The public names of `vkbloom.testing`; lazy_loader reads them, and imports what is asked for.
-from ._border import assert_border, assert_views, border_energy
-from ._frame_files import read_frame
+from ._border import assert_border, assert_views
 from ._judging import Diagnosis, Tolerances, diagnose
 from ._law_report import LawReport, LawRow, report
 from ._laws import (
@@ -10,13 +9,11 @@ from ._laws import (
     assert_no_ringing,
     assert_superposition,
     assert_symmetric,
-    first_infected,
 )
 from ._moving_light import Stability, assert_stable, stability
 from ._point_spread import (
     assert_centroid_kept,
     assert_separable,
-    assert_spread,
     point_spread,
 )
 from ._probe import Probe
@@ -28,7 +25,7 @@ from ._scaled_scene import (
     resolution_response,
 )
 from ._sequences import Flash, Flicker, flash, flicker
-from ._shape import assert_round, assert_sizes, roundness
+from ._shape import assert_round, assert_sizes
 from ._time import assert_history, assert_jitter
 from ._transparency import assert_alpha
 from ._veiling_glare import veiling_glare_index
@@ -57,22 +54,17 @@ __all__ = [
     "assert_round",
     "assert_separable",
     "assert_sizes",
-    "assert_spread",
     "assert_stable",
     "assert_superposition",
     "assert_symmetric",
     "assert_views",
-    "border_energy",
     "command",
     "diagnose",
-    "first_infected",
     "flash",
     "flicker",
     "point_spread",
-    "read_frame",
     "report",
     "resolution_response",
-    "roundness",
     "stability",
     "veiling_glare_index",
 ]

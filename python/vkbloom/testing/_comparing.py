@@ -2,32 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from vkbloom.testing._shape import LEVELS
+from vkbloom.testing._showing import FIGURES, figure_of, times, words
 
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
-#: Figures by name: their place in the values of a bloom, and whether less of them is better.
-_FIGURES: Final[Mapping[str, tuple[tuple[str, ...], bool]]] = {
-    "gain": (("gain",), False),
-    "energy of a pixel": (("energy",), False),
-    "50 % within, pixels": (("psf", "r50"), False),
-    "90 % within, pixels": (("psf", "r90"), False),
-    "peak": (("psf", "peak"), False),
-    **{
-        f"roundness at {level:g}": (("laws", "round", "figures", f"round_{level:g}"), True)
-        for level in LEVELS
-    },
-    "ripple": (("stability", "ripple"), True),
-    "jitter, pixels": (("stability", "jitter"), True),
-    "shimmer": (("stability", "shimmer"), True),
-    "growth": (("stability", "growth"), True),
-    "veiling glare index, %": (("veiling_glare_index",), False),
-}
 # What counts as a change: of a deviation, in shares of its limit, and of a figure, as a share of
 # itself and at least so much; of a time, as a share, since a shared machine repeats it within that.
 _LAW: Final = (0.1, 0.25)
@@ -87,31 +69,19 @@ def _held(law: Mapping[str, Any]) -> str:
 
 
 def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
-    for name, (keys, less) in _FIGURES.items():
-        old, new = (_at(side, keys) for side in (before, after))
+    for name, (keys, less) in FIGURES.items():
+        old, new = (figure_of(side, keys) for side in (before, after))
         verdict = _verdict(old, new, *_FIGURE, less=less)
-        yield Change("figure", name, old, new, (_words(old), _words(new)), verdict)
-
-
-def _at(values: Any, keys: Sequence[str]) -> float | None:
-    for key in keys:
-        values = values.get(key)
-    return None if values is None else float(values)
+        yield Change("figure", name, old, new, (words(old), words(new)), verdict)
 
 
 def _times(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
-    sides = [{each["name"]: each["seconds"] for each in side["passes"]} for side in (before, after)]
-    for side in sides:
-        side["together"] = math.fsum(side.values())
+    sides = [times(side) for side in (before, after)]
     for name in dict.fromkeys([*sides[1], *sides[0]]):
         old, new = (side.get(name) for side in sides)
-        words = (_words(old, 1e3, ".3f", " ms"), _words(new, 1e3, ".3f", " ms"))
+        told = ["none" if each is None else f"{1e3 * each:.3f} ms" for each in (old, new)]
         verdict = _verdict(old, new, _TIME, 0.0, less=True) if name == "together" else "same"
-        yield Change("time", name, old, new, words, verdict)
-
-
-def _words(value: float | None, factor: float = 1.0, form: str = ".4g", unit: str = "") -> str:
-    return "none" if value is None else f"{factor * value:{form}}{unit}"
+        yield Change("time", name, old, new, (told[0], told[1]), verdict)
 
 
 def _verdict(

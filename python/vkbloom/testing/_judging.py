@@ -13,15 +13,7 @@ from vkbloom._views.comparison import Comparison, compare
 from vkbloom._views.diagnosis import Diagnosis, diagnose
 from vkbloom._views.tolerances import Stage, Tolerances, failures
 
-__all__ = [
-    "Diagnosis",
-    "Tolerances",
-    "Verdict",
-    "diagnose",
-    "first_failure",
-    "judge",
-    "judge_image",
-]
+__all__ = ["Diagnosis", "Tolerances", "Verdict", "diagnose", "first_failure", "judge"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +25,6 @@ class Verdict:
     - `reasons`: One reason for each failed check.
     - `comparison`: The figures; None if shapes or dtypes differ, or one image is missing.
     - `diagnosis`: The cause of the difference of two images that failed.
-    - `atol`, `rtol`: The tolerances that were used.
     """
 
     name: str
@@ -41,8 +32,6 @@ class Verdict:
     reasons: tuple[str, ...] = ()
     comparison: Comparison | None = None
     diagnosis: Diagnosis | None = None
-    atol: float = 0.0
-    rtol: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -64,7 +53,7 @@ def judge(
     return tuple(
         _of_missing(name, is_expected=name in expected)
         if name not in expected or name not in actual
-        else judge_image(name, expected[name], actual[name], tolerances)
+        else _judge_image(name, expected[name], actual[name], tolerances)
         for name in _merged(list(expected), list(actual))
     )
 
@@ -74,7 +63,7 @@ def first_failure(verdicts: tuple[Verdict, ...]) -> Verdict | None:
     return next((verdict for verdict in verdicts if not verdict.passed), None)
 
 
-def judge_image(
+def _judge_image(
     name: str, expected: NDArray[Any], actual: NDArray[Any], tolerances: Tolerances
 ) -> Verdict:
     """Compare one image with its reference: shape and dtype, finiteness, values, SSIM, FLIP."""
@@ -108,8 +97,6 @@ def judge_image(
         reasons=tuple(reason for _, reason in failed),
         comparison=comparison,
         diagnosis=diagnose(expected, actual) if failed else None,
-        atol=atol,
-        rtol=rtol,
     )
 
 

@@ -130,7 +130,7 @@ class LawReport:
             f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
         ]
         for row in self.rows:
-            figures = "".join(f"{cell:>10}" for cell in _cells(row))
+            figures = "".join(f"{cell:>10}" for cell in cells(row))
             mark = " required" if row.name in self.required else ""
             lines.append(f"{row.name:<18} {row.words:<11}{figures}{mark}".rstrip())
         for row in self.rows:
@@ -158,7 +158,7 @@ class LawReport:
                 (
                     element("span", row.name, title=row.law, **kind),
                     markup.joined((words, required)),
-                    *_cells(row),
+                    *cells(row),
                     element("span", *why, style="text-align:left"),
                 )
             )
@@ -168,7 +168,8 @@ class LawReport:
         return str(markup.table(rows, head, caption=caption, name=name, style="color:inherit"))
 
 
-def _cells(row: LawRow) -> tuple[str, str]:
+def cells(row: LawRow) -> tuple[str, str]:
+    """Return what a table shows of deviation and limit."""
     return ("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")
 
 

@@ -8,11 +8,10 @@ expected value there. The allowed deviation is the sum of the errors of all valu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
@@ -292,43 +291,3 @@ def _inner(probe: Probe, border: int) -> tuple[slice, slice]:
             f"border: {border!r} is out of range, 0 to under half of {min(width, height)}"
         )
     return slice(border, height - border), slice(border, width - border)
-
-
-@checked
-def first_infected(
-    bloom: Callable[[NDArray[Any]], Mapping[str, NDArray[Any]]], probe: Probe = _DEFAULT
-) -> str | None:
-    """Return the first framebuffer that NaN or infinity of a pixel reaches.
-
-    The image is noise with one pixel of NaN, of infinity and of minus infinity, in turn. They may
-    stay at that pixel in framebuffers of the size of the image.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns framebuffers by name, in the order of the data flow, as
-        `Renderer.apply` does.
-    probe : Probe
-        Of floats.
-
-    Returns
-    -------
-    str or None
-        The name; None if no framebuffer is infected.
-    """
-    if probe.dtype.kind == "u":
-        raise ValueError(f"probe: {probe.dtype} has neither NaN nor infinity")
-    x, y = probe.centre
-    infected: dict[str, bool] = {}
-    for value in (math.nan, math.inf, -math.inf):
-        image = probe.noise(0, probe.value)
-        image[y, x] = value
-        result = bloom(probe.given(image))
-        if not isinstance(result, Mapping):
-            raise TypeError(f"bloom: it returns {type(result).__name__}, not a mapping of names")
-        for name, frame in result.items():
-            wrong = ~np.isfinite(np.asarray(frame))
-            if wrong.shape[:2] == image.shape[:2]:
-                wrong[y, x] = False
-            infected[name] = infected.get(name, False) or bool(wrong.any())
-    return next((name for name, is_infected in infected.items() if is_infected), None)

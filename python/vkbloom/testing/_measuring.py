@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +15,7 @@ from vkbloom._fit.translating import lights
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings
+from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share
@@ -31,52 +29,53 @@ Array = NDArray[np.float64]
 VIEW: Final = (256, 144)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
-    """The point spread: energy, radii of shares of it in pixels, and its curve."""
-
-    array: Array
-    energy: float
-    at_border: float
-    r50: float
-    r90: float
-    peak: float
-    radii: Array
-    encircled: Array
+# What the values of a bloom hold of a law, of the moving light, and of the response to the size.
+_OF_A_LAW: Final = ("held", "off", "limit", "figures", "law", "message", "why")
+_OF_STABILITY: Final = ("ripple", "jitter", "flicker", "shimmer", "growth")
+_OF_RESOLUTION: Final = ("sizes", "r50", "r90", "peak")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measured:
-    """All that is measured of a bloom; figures are measured when they are read.
+def values_of(
+    renderer: Renderer,
+    subject: Subject,
+    report: LawReport,
+    settings: Settings | None,
+    **about: Any,
+) -> dict[str, Any]:
+    """Return all that is measured as plain values; what is not a number is None.
 
-    `passes`: seconds at `size`.
+    `about`: "name", "adapter", "size", and "passes", in seconds.
     """
-
-    name: str
-    device: str
-    settings: Settings | None
-    size: tuple[int, int]
-    passes: Mapping[str, float]
-    subject: Subject
-    report: LawReport
-    renderer: Renderer
-
-    @functools.cached_property
-    def spread(self) -> Spread:
-        """The point spread of the lamp."""
-        return spread_of(self.subject.spread, self.subject.lamp)
-
-    @functools.cached_property
-    def veiling_glare_index(self) -> float:
-        """The index of the picture, or of the bloom alone."""
-        probe, bloom = self.subject.probe, self.subject.picture or self.subject.bloom
-        patch = max(1, min(probe.size) // 8)
-        return veiling_glare_index(bloom, size=probe.size, patch=patch, value=probe.value)
-
-    @functools.cached_property
-    def nearest(self) -> tuple[str, float]:
-        """The preset whose bloom is nearest, and its difference."""
-        return nearest_preset(self.name, self.subject.bloom, self.renderer)
+    probe = subject.probe
+    veil = veiling_glare_index(
+        subject.picture or subject.bloom,
+        size=probe.size,
+        patch=max(1, min(probe.size) // 8),
+        value=probe.value,
+    )
+    near, difference = nearest_preset(about["name"], subject.bloom, renderer)
+    passes = [{"name": name, "seconds": time} for name, time in about.pop("passes").items()]
+    values: dict[str, Any] = plain(
+        about
+        | spread_of(subject.spread, subject.lamp)
+        | {
+            "settings": None if settings is None else exact(settings).to_dict(),
+            "passes": passes,
+            "laws": {
+                row.name: {name: getattr(row, name) for name in _OF_A_LAW} for row in report.rows
+            },
+            "untaken": report.untaken,
+            "gain": report.gain,
+            "stability": {name: getattr(subject.stability, name) for name in _OF_STABILITY},
+            "resolution": {name: getattr(subject.resolution, name) for name in _OF_RESOLUTION},
+            "veiling_glare_index": veil,
+            "reference": subject.reference or None,
+            "nearest_preset": {"name": near or None, "difference": difference},
+            "required": report.required,
+            "passed": all(row.held for row in report.rows if row.name in report.required),
+        }
+    )
+    return values
 
 
 def exact(settings: Settings) -> Settings:
@@ -112,7 +111,6 @@ def of_settings(
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=lambda: differences(renderer, used),
-        frames=lambda image: renderer.apply(image, used),
     )
     if gain is None:
         keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
@@ -129,14 +127,8 @@ def of_program(
     if program.bits is not None:
         probe = Probe(size=size, atol=COARSE_ERROR)
 
-    @functools.wraps(program)
-    def difference(image: NDArray[Any], **options: Any) -> NDArray[Any]:
-        result = program(image, **options)[..., :3]
-        x, y, *_ = options.get("region") or (0, 0)
-        if result.shape[:2] == image.shape[:2]:
-            x, y = 0, 0
-        height, width = result.shape[:2]
-        return np.asarray(result - image[y : y + height, x : x + width, :3])
+    def difference(image: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(program(image)[..., :3] - image[..., :3])
 
     bloom: Bloom = difference if less_input else program
     subject = Subject(
@@ -177,29 +169,25 @@ def noise(size: tuple[int, int], seed: int) -> Array:
     return np.asarray(random.random((size[1], size[0], 3)) ** 8 * 20)
 
 
-def spread_of(array: Array, probe: Probe) -> Spread:
-    """Return the figures of a point spread."""
+def spread_of(array: Array, probe: Probe) -> dict[str, Any]:
+    """Return the figures of a point spread: its energy, radii of shares of it, and its curve."""
     psf = samples(array)
     energy = float(psf.energy().mean())
     radii = np.concatenate([[0.0], np.geomspace(1.0, max(probe.size), 33)])
-    encircled = psf.encircled_energy(radii).mean(axis=1)
     fine = np.arange(0.0, max(probe.size), 0.5)
     shares = psf.encircled_energy(fine).mean(axis=1) / energy if energy > 0 else np.zeros(len(fine))
-
-    def radius(share: float) -> float:
-        inside = np.flatnonzero(shares >= share)
-        return float(fine[inside[0]]) if inside.size else math.nan
-
-    return Spread(
-        array=array,
-        energy=energy,
-        at_border=border_share(array),
-        r50=radius(0.5),
-        r90=radius(0.9),
-        peak=float(array.max()),
-        radii=radii,
-        encircled=encircled,
-    )
+    within = {"r50": np.flatnonzero(shares >= 0.5), "r90": np.flatnonzero(shares >= 0.9)}
+    of_psf = {
+        **{
+            name: float(fine[inside[0]]) if inside.size else math.nan
+            for name, inside in within.items()
+        },
+        "peak": float(array.max()),
+        "at_border": border_share(array),
+        "radii": radii,
+        "encircled": psf.encircled_energy(radii).mean(axis=1),
+    }
+    return {"energy": energy, "psf": of_psf}
 
 
 def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:

@@ -143,73 +143,20 @@ def assert_centroid_kept(
                 )
 
 
-@checked
-def assert_spread(
-    bloom: Bloom,
-    sigma: float | tuple[float, float],
-    probe: Probe = _DEFAULT,
-    *,
-    rtol: float = 0.02,
-) -> None:
-    """Assert how far light spreads.
-
-    The law: the standard deviation of the point spread along x and y is sigma. A convolution adds
-    variances (Bracewell, "The Fourier Transform and Its Applications", chapter 8), so the sigma of
-    several passes is the root of the sum of squares. A kernel with weights w_i at distances d_i
-    has the variance sum w_i d_i^2 / sum w_i.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width.
-    sigma : float or (float, float)
-        Standard deviation in pixels: one number for both axes, or one for x and one for y.
-    probe : Probe
-        Its image must be large enough that no light reaches the border.
-    rtol : float
-        Allowed relative difference. The default allows for a Gaussian that is cut off at three
-        sigma, whose standard deviation is 1.3 % smaller.
-    """
-    __tracebackhide__ = True
-    pair = sigma if isinstance(sigma, tuple) else (sigma, sigma)
-    for number in pair:
-        check_number("sigma", number, 0.0, math.inf)
-    check_number("rtol", rtol, 0.0, math.inf)
-    spread, error = measured_spread(bloom, probe, None)
-    _check_lit("assert_spread", spread, error)
-    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
-    for channel in range(spread.shape[2]):
-        for axis, name in ((0, "x"), (1, "y")):
-            profile = spread[:, :, channel].sum(axis=axis)
-            distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
-            result = _deviation(profile)
-            # The error of the variance is 2 sigma times the error of the standard deviation.
-            variance_error = _moment_error(spread[:, :, channel], error, axis, distance**2)
-            allowed = rtol * pair[axis] + variance_error / max(2 * result, 1e-6)
-            law = (
-                f"the standard deviation of the light of a pixel along {name} is "
-                f"{pair[axis]:.6g} pixels"
-            )
-            if not is_within(law, abs(result - pair[axis]), allowed):
-                fail(
-                    "assert_spread",
-                    law,
-                    f"it is {result:.6g} around x {probe.centre[0]}, y {probe.centre[1]}, channel "
-                    f"{channel}: off by {abs(result - pair[axis]):.3g}, {allowed:.3g} allowed",
-                )
-
-
 def measured_spread(
-    bloom: Bloom, probe: Probe, at: tuple[int, int] | None = None
+    bloom: Bloom,
+    probe: Probe,
+    at: tuple[int, int] | None = None,
+    dark: tuple[Image, float] | None = None,
 ) -> tuple[Image, float]:
-    """Return the point spread and the error of its values."""
+    """Return the point spread and the error of its values; `dark` are those of a black image."""
     __tracebackhide__ = True
     position = at or probe.centre
     if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
     lit, lit_error = probe.apply(bloom, probe.point(position, probe.value))
-    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
-    return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
+    black, dark_error = dark or probe.apply(bloom, probe.flat(0.0))
+    return (lit - black) / probe.value, (lit_error + dark_error) / probe.value
 
 
 def _check_lit(assertion: str, spread: Image, error: float) -> None:
@@ -240,20 +187,6 @@ def border_share(plane: Image) -> float:
     total = float(np.abs(plane).sum())
     inside = float(np.abs(plane[1:-1, 1:-1]).sum())
     return (total - inside) / total if total else 0.0
-
-
-def _centroid(profile: Image) -> float:
-    return float((profile * np.arange(len(profile))).sum() / profile.sum())
-
-
-def _deviation(profile: Image) -> float:
-    """Return the standard deviation of a profile; NaN if the variance is negative."""
-    total = float(profile.sum())
-    if not total:
-        return math.nan
-    distance = np.arange(len(profile), dtype=np.float64) - _centroid(profile)
-    variance = float((profile * distance**2).sum() / total)
-    return math.sqrt(variance) if variance >= 0 else math.nan
 
 
 def _moment_error(plane: Image, error: float, axis: int, weights: Image) -> float:

@@ -69,7 +69,8 @@ class Probe:
         if self.channels is not None:
             check_index("channels", self.channels, 1, 4)
         try:
-            dtype = np.dtype(self.dtype)
+            # To NumPy, None is float64.
+            dtype = np.dtype("" if self.dtype is None else self.dtype)
         except TypeError:
             raise TypeError(f"dtype: {self.dtype!r} is not a dtype") from None
         if dtype.name not in _ERRORS:

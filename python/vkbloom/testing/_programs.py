@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import os
 import re
 import signal
@@ -22,12 +21,8 @@ from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
 from vkbloom.testing._probe import Bloom
 
-_PLACES: Final = ("{input}", "{output}")
-#: Keywords of the bloom, by what stands for them in a command.
-_KEYWORDS: Final = {"{region}": "region", "{frame}": "time"}
-_PLACE: Final = re.compile("|".join(map(re.escape, (*_PLACES, *_KEYWORDS))))
-#: Frames a second, by which a time is the number of a frame.
-RATE: Final = 60.0
+_PLACEHOLDERS: Final = ("{input}", "{output}")
+_PLACEHOLDER: Final = re.compile("|".join(map(re.escape, _PLACEHOLDERS)))
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
 _BITS: Final = {"uint8": 8, "uint16": 16}
 _COARSE: Final = 8
@@ -45,10 +40,7 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     Parameters
     ----------
     argv : sequence of str
-        The program and its arguments. ``{input}`` and ``{output}`` in them stand for the files,
-        ``{region}`` for the view to blur, as "x,y,width,height" in pixels, ``{frame}`` for the
-        number of the frame, at 60 a second from 0. A program without the last two is not tested
-        with views, or in time.
+        The program and its arguments. ``{input}`` and ``{output}`` in them stand for the files.
     suffix : str
         The type of both files. EXR files have linear floats. Files of integers, such as ".png",
         are written and read as sRGB.
@@ -58,8 +50,7 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     Returns
     -------
     callable
-        Takes an image (H, W, 3) or (H, W, 4), with ``{region}`` and ``{frame}`` also the keywords
-        `region` and `time`, and returns an image in float32. Its errors name the
+        Takes an image (H, W, 3) or (H, W, 4), and returns an image in float32. Its errors name the
         program: TimeoutError if it hangs, ChildProcessError if it fails, FileNotFoundError if it
         does not exist or writes nothing, ValueError if its file cannot be read, has another size,
         or has NaN or infinity where the image has none. A file of 8 bits is a UserWarning, once.
@@ -80,7 +71,7 @@ class Program:
         if isinstance(argv, str) or not all(isinstance(word, str) for word in argv):
             raise TypeError(f"argv: {argv!r} is not a sequence of str; use shlex.split")
         self._argv = tuple(argv)
-        for placeholder in _PLACES:
+        for placeholder in _PLACEHOLDERS:
             if not any(placeholder in word for word in argv):
                 raise ValueError(f"argv: {' '.join(argv)!r} has no {placeholder}")
         if not suffix.startswith("."):
@@ -88,35 +79,19 @@ class Program:
         check_number("timeout", timeout, 1e-3, 1e6)
         self._suffix, self._timeout = suffix, timeout
         self.bits: int | None = None
-        # The laws ask for the keywords that a bloom takes.
-        taken = [
-            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None)
-            for placeholder, key in _KEYWORDS.items()
-            if any(placeholder in word for word in argv)
-        ]
-        image = inspect.Parameter("image", inspect.Parameter.POSITIONAL_ONLY)
-        self.__signature__ = inspect.Signature([image, *taken])
 
-    def __call__(
-        self,
-        image: NDArray[Any],
-        *,
-        region: tuple[int, int, int, int] | None = None,
-        time: float | None = None,
-    ) -> NDArray[Any]:
+    def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
         """Run the program once."""
         __tracebackhide__ = True
         height, width = image.shape[:2]
-        view = region or (0, 0, width, height)
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
             write(source, np.ascontiguousarray(image, np.float32), premultiplied=True)
-            values = (source, target, ",".join(map(str, view)), round((time or 0) * RATE))
-            self._run(dict(zip((*_PLACES, *_KEYWORDS), map(str, values), strict=True)))
+            self._run(dict(zip(_PLACEHOLDERS, (str(source), str(target)), strict=True)))
             if not target.exists():
-                raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACES[1]}")
+                raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACEHOLDERS[1]}")
             result = self._read(target)
-        if result.shape[1::-1] not in ((width, height), view[2:]):
+        if result.shape[1::-1] != (width, height):
             raise ValueError(
                 f"{self._name}: it wrote {result.shape[1]} x {result.shape[0]} pixels for "
                 f"{width} x {height}; both files must have the same size"
@@ -136,7 +111,7 @@ class Program:
 
     def _run(self, values: Mapping[str, str]) -> None:
         __tracebackhide__ = True
-        words = [_PLACE.sub(lambda match: values[match[0]], word) for word in self._argv]
+        words = [_PLACEHOLDER.sub(lambda match: values[match[0]], word) for word in self._argv]
         # A session of its own, so that what the program started ends with it.
         with subprocess.Popen(
             words,

@@ -1,17 +1,14 @@
 """References of a test module: lossless images, and the adapter that made them.
 
 A folder contains, for each name, ``<name>.json`` and the images that it lists:
-``<name>.<framebuffer>.png`` for integers, ``.exr`` for half and float, and
-``<name>.<framebuffer>.2.png`` and so on for further, equally valid references.
+``<name>.<framebuffer>.png`` for integers, and ``.exr`` for half and float.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +23,7 @@ from vkbloom._io.images import Picture
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
 _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
 _FILE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]*")
-_FORMAT: Final = 1
+_FORMAT: Final = 2
 
 # Extension, and OpenImageIO's name of the number type, by the array's dtype.
 _FILES: Final[Mapping[str, tuple[str, str]]] = {
@@ -42,29 +39,18 @@ class Origin:
     """The adapter, machine and version that made images.
 
     - `adapter`, `driver`: None if they are not known.
-    - `cpu_vendor`: Vendor of the machine's CPU; software renderers round differently by vendor.
     - `version`: Version of vkbloom.
-    - `driver_sha256`: Hash of a driver whose results are bit-equal on every machine; None for other
-      drivers.
     """
 
     adapter: str | None
     driver: str | None
-    cpu_vendor: str
     version: str
-    driver_sha256: str | None = None
 
     @property
     def summary(self) -> str:
-        """All fields except the version on one line; the hash is shortened."""
-        sha256 = f"SHA-256 {self.driver_sha256[:12]}" if self.driver_sha256 else None
-        made_by = [text for text in (self.adapter, self.driver, sha256) if text]
-        return ", ".join([*(made_by or ["arrays without an adapter"]), self.cpu_vendor])
-
-    @property
-    def machine(self) -> tuple[str | None, ...]:
-        """The fields that identify a machine: all but the version."""
-        return self.adapter, self.driver, self.cpu_vendor, self.driver_sha256
+        """All fields except the version on one line."""
+        made_by = [text for text in (self.adapter, self.driver) if text]
+        return ", ".join(made_by) or "arrays without an adapter"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,74 +74,55 @@ class ReferenceFolder:
         self.path = path
 
     def file(self, name: str) -> Path:
-        """Return the file that lists the references of a name."""
+        """Return the file that lists the images of a name."""
         return self.path / f"{name}.json"
 
-    def load(self, name: str) -> list[Reference]:
-        """Read the references of a name."""
-        return [
-            Reference(
-                images={
-                    entry["name"]: self._image(entry, self.file(name))
-                    for entry in listed["framebuffers"]
-                },
-                origin=Origin(**listed["origin"]),
-            )
-            for listed in self._listed(name)
-        ]
+    def load(self, name: str) -> Reference | None:
+        """Read the reference of a name; None if there is none."""
+        listed, file = self._listed(name), self.file(name)
+        if listed is None:
+            return None
+        images = {entry["name"]: self._image(entry, file) for entry in listed["framebuffers"]}
+        return Reference(images=images, origin=Origin(**listed["origin"]))
 
-    def write(
-        self, name: str, images: Mapping[str, NDArray[Any]], origin: Origin, *, add: bool
-    ) -> None:
-        """Write a reference."""
+    def write(self, name: str, images: Mapping[str, NDArray[Any]], origin: Origin) -> None:
+        """Write a reference, and remove files of the one before."""
         check_name(name)
         for framebuffer, image in images.items():
             _check_image(framebuffer, image)
-        listed = self._listed(name)
-        kept = [
-            entry for entry in listed if add and Origin(**entry["origin"]).machine != origin.machine
-        ]
-        used = {entry["number"] for entry in kept}
-        number = next(n for n in range(1, len(used) + 2) if n not in used)
+        before = (self._listed(name) or {"framebuffers": []})["framebuffers"]
         self.path.mkdir(parents=True, exist_ok=True)
         entries = [
-            self._write_image(name, framebuffer, image, number)
-            for framebuffer, image in images.items()
+            self._write_image(name, framebuffer, image) for framebuffer, image in images.items()
         ]
-        new = {"number": number, "origin": asdict(origin), "framebuffers": entries}
-        self._write_list(name, [*kept, new])
-        still_there = {entry["file"] for each in [*kept, new] for entry in each["framebuffers"]}
-        for entry in (entry for each in listed for entry in each["framebuffers"]):
-            if entry["file"] not in still_there:
-                (self.path / entry["file"]).unlink(missing_ok=True)
+        content = {"format": _FORMAT, "origin": asdict(origin), "framebuffers": entries}
+        safe_writing.write_file(self.file(name), f"{json.dumps(content, indent=2)}\n".encode())
+        for file in {entry["file"] for entry in before} - {entry["file"] for entry in entries}:
+            (self.path / file).unlink(missing_ok=True)
 
-    def _listed(self, name: str) -> list[dict[str, Any]]:
+    def _listed(self, name: str) -> dict[str, Any] | None:
         file = self.file(name)
         try:
             stored = file.read_bytes()
         except FileNotFoundError:
-            return []
+            return None
         try:
-            content = json.loads(stored.decode())
-            references = content["references"]
+            content: dict[str, Any] = json.loads(stored.decode())
             if content["format"] != _FORMAT:
                 raise ValueError(f"format {content['format']!r} is not {_FORMAT}")
-            for listed in references:
-                Origin(**listed["origin"])
-                int(listed["number"])
-                for entry in listed["framebuffers"]:
-                    tuple(entry["shape"])
-                    np.dtype(entry["dtype"])
-                    if not _FRAMEBUFFER.fullmatch(entry["name"]):
-                        raise ValueError(f"{entry['name']!r} cannot name a framebuffer")
-                    if not _FILE.fullmatch(entry["file"]):
-                        raise ValueError(f"{entry['file']!r} is not in this folder")
+            Origin(**content["origin"])
+            for entry in content["framebuffers"]:
+                tuple(entry["shape"])
+                np.dtype(entry["dtype"])
+                if not _FRAMEBUFFER.fullmatch(entry["name"]):
+                    raise ValueError(f"{entry['name']!r} cannot name a framebuffer")
+                if not _FILE.fullmatch(entry["file"]):
+                    raise ValueError(f"{entry['file']!r} is not in this folder")
         except KeyError as error:
             raise ValueError(f"{file}: not a list of references: no {error}") from error
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise ValueError(f"{file}: not a list of references: {error}") from error
-        result: list[dict[str, Any]] = references
-        return result
+        return content
 
     def _image(self, entry: Mapping[str, Any], listed_in: Path) -> NDArray[Any]:
         file = self.path / entry["file"]
@@ -168,12 +135,9 @@ class ReferenceFolder:
             )
         return pixels.reshape(shape)
 
-    def _write_image(
-        self, name: str, framebuffer: str, image: NDArray[Any], number: int
-    ) -> dict[str, Any]:
+    def _write_image(self, name: str, framebuffer: str, image: NDArray[Any]) -> dict[str, Any]:
         suffix, numbers = _FILES[image.dtype.name]
-        counted = f".{number}" if number > 1 else ""
-        file = self.path / f"{name}.{framebuffer}{counted}{suffix}"
+        file = self.path / f"{name}.{framebuffer}{suffix}"
         pixels = image.reshape(_with_channels(image.shape))
         is_grey = pixels.shape[2] < 3
         if is_grey:
@@ -201,10 +165,6 @@ class ReferenceFolder:
             raise OSError(f"{file}: the values read back differ from the values written")
         return entry
 
-    def _write_list(self, name: str, references: Sequence[Mapping[str, Any]]) -> None:
-        text = json.dumps({"format": _FORMAT, "references": references}, indent=2)
-        safe_writing.write_file(self.file(name), f"{text}\n".encode())
-
 
 def check_name(name: str) -> None:
     """Raise TypeError or ValueError if the name is not allowed for a reference."""
@@ -216,18 +176,6 @@ def check_name(name: str) -> None:
             f"name: {name!r} cannot name a reference; up to 100 letters, digits and _+,=.- are "
             "needed, the first a letter, a digit or _"
         )
-
-
-def cpu_vendor() -> str:
-    """Return the vendor of this machine's CPU, as the CPU reports it."""
-    try:
-        information = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        information = ""
-    match = re.search(r"^(?:vendor_id|CPU implementer)\s*:\s*(\S+)", information, re.MULTILINE)
-    if match:
-        return match[1]
-    return os.environ.get("PROCESSOR_IDENTIFIER") or platform.processor() or platform.machine()
 
 
 def _check_image(framebuffer: str, image: NDArray[Any]) -> None:

@@ -6,11 +6,8 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
-from numpy.typing import NDArray
-
-from vkbloom.testing._laws import first_infected
 from vkbloom.testing._moving_light import Stability, stability
 from vkbloom.testing._point_spread import measured_spread, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
@@ -38,7 +35,6 @@ class Subject:
     - `highest`: The largest value of an image that the bloom can be given.
     - `differences`: Returns the difference from a reference by framebuffer, as a share of its
       largest value. None: there is no reference.
-    - `frames`: Returns all framebuffers by name. None: they are not known.
     """
 
     bloom: Bloom
@@ -48,7 +44,6 @@ class Subject:
     gain: float | None = None
     highest: float = 1024.0
     differences: Callable[[], Mapping[str, float]] | None = None
-    frames: Callable[[NDArray[Any]], Mapping[str, NDArray[Any]]] | None = None
 
     @cached_property
     def measured_gain(self) -> float:
@@ -69,15 +64,22 @@ class Subject:
         return dataclasses.replace(probe, value=_LAMP) if dim else probe
 
     @cached_property
+    def dark(self) -> tuple[Image, float]:
+        """The bloom of a black image, and the error of its values."""
+        return self.probe.apply(self.bloom, self.probe.flat(0.0))
+
+    @cached_property
     def pixel(self) -> tuple[Image, float]:
         """The point spread of the probe's brightest value, and the error of its values."""
-        return measured_spread(self.bloom, self.probe)
+        return measured_spread(self.bloom, self.probe, dark=self.dark)
 
     @cached_property
     def spread(self) -> Image:
         """The point spread of the lamp."""
         lamp = self.lamp
-        return self.pixel[0] if lamp is self.probe else point_spread(self.bloom, lamp)
+        if lamp is self.probe:
+            return self.pixel[0]
+        return measured_spread(self.bloom, lamp, dark=self.dark)[0]
 
     @cached_property
     def stability(self) -> Stability:
@@ -94,13 +96,6 @@ class Subject:
     def reference(self) -> Mapping[str, float]:
         """The differences from the reference; empty without one."""
         return {} if self.differences is None else self.differences()
-
-    @cached_property
-    def first_infected(self) -> str | None:
-        """The first framebuffer that NaN reaches; None if there is none, or it is not known."""
-        if self.frames is None or self.probe.dtype.kind == "u":
-            return None
-        return first_infected(self.frames, self.probe)
 
 
 def fitting_probe(bloom: Bloom, probe: Probe) -> Probe:

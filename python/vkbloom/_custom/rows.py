@@ -1,0 +1,70 @@
+"""Passes, textures and buffers of custom methods as the core takes them: blocks of bytes."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, Final, NamedTuple
+
+#: The most images that a pass reads, textures and buffers that it binds, bytes of parameters.
+MAX_READS: Final = 16
+MAX_RESOURCES: Final = 16
+MAX_PARAMETERS: Final = 1024
+#: With the 0 at its end.
+NAME_SIZE: Final = 32
+
+
+class CoreShader(NamedTuple):
+    """A shader: its name in plans, its SPIR-V, and 16 bytes that are equal only for equal code."""
+
+    name: str
+    code: bytes
+    hash: bytes
+
+
+class Resource(NamedTuple):
+    """A texture or a buffer: a block of the core, and its content. None: zeros."""
+
+    block: bytes
+    data: bytes | None
+
+
+class Row(NamedTuple):
+    """A row of `core_passes`.
+
+    - `framebuffer`: Whether the image that it writes is one.
+    - `params`: The bytes of its parameters.
+    - `group`: The pixels of a compute shader's workgroup. None: it is a fragment shader.
+    - `turn`: Another number for each run of a pass that changes a resource; 0 for others.
+    """
+
+    name: str
+    shader: CoreShader
+    size: tuple[int, int]
+    reads: tuple[str, ...] = ()
+    framebuffer: bool = False
+    params: bytes = b""
+    group: tuple[int, int] | None = None
+    resources: tuple[Resource, ...] = ()
+    turn: int = 0
+
+    def packed(self) -> tuple[Any, ...]:
+        """Return it as the core takes it; ValueError where the core has no room."""
+        for what, count, most in (
+            ("images read", len(self.reads), MAX_READS),
+            ("textures and buffers", len(self.resources), MAX_RESOURCES),
+            ("bytes of parameters", len(self.params), MAX_PARAMETERS),
+        ):
+            if count > most:
+                raise ValueError(f"passes: {self.name}: {count} {what} are more than {most}")
+        block = struct.pack(
+            f"={MAX_PARAMETERS}sQ6I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s",
+            self.params,
+            self.turn,
+            *self.size,
+            *(self.group or (0, 0)),
+            self.framebuffer,
+            len(self.reads),
+            self.name.encode(),
+            b"".join(read.encode().ljust(NAME_SIZE, b"\0") for read in self.reads),
+        )
+        return block, *self.shader, self.resources

@@ -1,0 +1,83 @@
+"""A scene's frame as the core's scene_source takes it: blocks of bytes, and arrays."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom import _core
+from vkbloom._scene.mesh import Mesh
+from vkbloom._scene.scene import Scene
+from vkbloom._scene.textures import Texture
+from vkbloom._scene.view import matrices
+
+#: As Vulkan numbers them.
+_ADDRESS_MODES: Final = ("repeat", "mirror-repeat", "clamp-to-edge")
+_FILTERS: Final = ("nearest", "linear")
+_FORMATS: Final = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
+
+#: Arguments of scene_source: a block, one of each picture, and arrays.
+Arguments = tuple[bytes, bytes, tuple[NDArray[Any], ...]]
+
+
+def scene_arguments(scene: Scene, size: tuple[int, int], shading: str, turns: float) -> Arguments:
+    """Return the arguments of the core's scene_source, from checked values."""
+    # Textures by identity, not by content: each is uploaded once.
+    numbers: dict[Texture, int] = {}
+    body, body_counts = _mesh(scene.body, numbers)
+    glow, glow_counts = ([], (0, 0, 0)) if scene.glow is None else _mesh(scene.glow, numbers)
+    sky = () if scene.skybox is None else scene.skybox.levels
+    block = struct.pack(
+        "=Qd112s10I32s",
+        scene.contents_serial,
+        scene.glow_intensity,
+        # `turns` has period 1. It is reduced first, so that large times keep their precision.
+        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1]).tobytes(),
+        *size,
+        *body_counts,
+        *glow_counts,
+        scene.body.emission is not None,
+        len(numbers),
+        shading.encode(),
+    )
+    pictures = [_picture(sky), *map(_texture, numbers)]
+    levels = [level for texture in numbers for level in texture.levels]
+    return block, b"".join(pictures), (*body, *glow, *sky, *levels)
+
+
+def _mesh(
+    mesh: Mesh, numbers: dict[Texture, int]
+) -> tuple[list[NDArray[Any]], tuple[int, int, int]]:
+    """Return a mesh's arrays and their lengths; textures get the next numbers."""
+    arrays = [mesh.packed, np.ascontiguousarray(mesh.indices, np.uint32)]
+    surfaces = [
+        (part.index_count, *(numbers.setdefault(one, len(numbers)) for one in part.textures))
+        for part in mesh.surfaces
+    ]
+    if surfaces:
+        if mesh.texcoords is None:
+            raise ValueError("scene: surfaces need texcoords")
+        arrays += [np.ascontiguousarray(mesh.texcoords, np.float32), np.array(surfaces, np.uint32)]
+    return arrays, (len(mesh.vertices), len(mesh.indices), len(surfaces))
+
+
+def _picture(levels: tuple[NDArray[Any], ...], *sampler: int) -> bytes:
+    """Return the block of a picture; the last three axes of its levels are those of a face."""
+    if not levels:
+        return bytes(4 * 9)
+    height, width, _ = levels[0].shape[-3:]
+    number = _core.FORMATS.index(_FORMATS[levels[0].dtype.name])
+    return struct.pack("=9I", number, width, height, len(levels), *(sampler or (0,) * 5))
+
+
+def _texture(texture: Texture) -> bytes:
+    filters = (texture.mag_filter, texture.min_filter, texture.mipmap_filter)
+    return _picture(
+        texture.levels,
+        *map(_ADDRESS_MODES.index, texture.address_mode),
+        *map(_FILTERS.index, filters),
+    )

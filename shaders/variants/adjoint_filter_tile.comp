@@ -1,0 +1,60 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+// The transpose of a filter (adjoint_filter.frag) in tiles: a filter of the cotangents whose windows are the pixels
+// that read a texel, by the table.
+#include "lib/block.glsl"
+#include "lib/finite.glsl"
+
+UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
+#include "lib/where_finite.glsl"
+#include "lib/window.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D cotangents;
+layout(set = 0, binding = 2) uniform sampler2D table;
+layout(set = 0, binding = 3) uniform sampler2D scene;
+layout(set = 0, binding = 4) uniform sampler2D added;
+layout(set = 0, binding = 5) uniform sampler2D differentiated;
+layout(set = 0, binding = 6) uniform writeonly image2D target;
+#include "variants/filter_tile.glsl"
+
+vec4 entry(int place)
+{
+    return texelFetch(table, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH), 0);
+}
+
+// Windows of rows in a simple ratio begin as those of filters. Pixels that do not read the texel have no weight.
+Window window_at(ivec2 pixel, bool along_x)
+{
+    ivec2 within = min(pixel, imageSize(target) - 1);
+    ivec3 readers = ivec3(entry(along_x ? params.start_x + within.x : params.start_y + within.y).xyz);
+    Window window;
+    window.first = readers.x;
+    if (!along_x && EXACT_ROWS != 0)
+        window.first = offset_of(pixel.y) - (EXACT_ROWS == EXACT_DOUBLE ? 1 : 0) - (WINDOW / 2 - 1);
+    [[unroll]] for (int i = 0; i < WINDOW; ++i) {
+        int at = window.first + i - readers.x;
+        int place = readers.z + (LEVELS == 0 ? at / 4 : at);
+        vec4 weights = at >= 0 && at < readers.y ? entry(place) : vec4(0.0);
+        window.weights[i] = LEVELS == 0 ? vec3(weights[at & 3]) : weights.xyz;
+    }
+    return window;
+}
+
+vec4 texel_at(ivec2 texel)
+{
+    ivec2 within = clamp(texel, ivec2(0), textureSize(cotangents, 0) - 1);
+    vec4 value = texelFetch(cotangents, within, 0);
+    return BY == BY_BLOOM ? vec4(where_finite(value, texelFetch(scene, within, 0)).rgb, 0.0) : value;
+}
+
+vec4 own_at(ivec2 pixel)
+{
+    return ADD_OWN != 0 ? vec4(vec3(params.share), 1.0) * texelFetch(added, pixel, 0) : vec4(0.0);
+}
+
+vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
+{
+    sum = params.gain * sum + own;
+    return FROM_IMAGE != 0 ? where_finite(sum, texelFetch(differentiated, pixel, 0)) : sum;
+}
