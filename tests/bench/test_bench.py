@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import importlib
-import itertools
 import json
 import math
 import os
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +16,10 @@ from benchmarks.__main__ import command as program
 from benchmarks.cost import Line
 from benchmarks.image import SETTINGS, _time_one, full_kernel
 from benchmarks.inputs import REC709, THRESHOLD, pictures
-from benchmarks.machine import command
-from benchmarks.ours import contender
 from benchmarks.plan import VARIANTS_VARIABLE
-from benchmarks.requests import best_order, worst_order
 from benchmarks.results import Goal, Section, Table, agreement
 from benchmarks.spread import spread
 from benchmarks.timing import Contender, Times, alternate
-from benchmarks.writing import Earlier, read_earlier
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
@@ -70,11 +64,6 @@ def test_a_device_can_be_the_clock() -> None:
     assert alternate([contender], 3, warm_up=1)["device"].seconds == (0.5, 0.75, 1.0)
 
 
-def test_names_of_contenders_differ() -> None:
-    with pytest.raises(ValueError, match="twice"):
-        alternate([Contender("a", str), Contender("a", str)], 3)
-
-
 def test_a_ratio_is_of_medians_and_its_spread_of_rounds() -> None:
     slow, fast = Times((2.0, 8.0, 6.0, 40.0, 5.0)), Times((1.0, 2.0, 2.0, 4.0, 5.0))
     ratio = slow.over(fast)
@@ -84,10 +73,6 @@ def test_a_ratio_is_of_medians_and_its_spread_of_rounds() -> None:
     assert str(ratio) == "3 (2 to 4)"
     assert slow.least == 2.0
     assert slow.minus(fast).seconds == (1.0, 6.0, 4.0, 36.0, 0.0)
-
-
-def test_ratio_to_zero_is_not_a_number() -> None:
-    assert math.isnan(Times((1.0, 1.0)).over(Times((0.0, 0.0))).value)
 
 
 def test_a_line_is_found() -> None:
@@ -165,15 +150,6 @@ def test_a_peer_that_is_missing_or_fails_is_listed(
     assert missing == [fails if error else "CuPy is not installed"]
 
 
-def test_every_peer_has_a_module() -> None:
-    found = peers.versions()
-    assert list(found) == list(peers.PEERS)
-    assert found["SciPy"] is not None
-    for name in peers.PEERS:
-        if name != "wgpu":  # pygfx's own
-            importlib.import_module(f"benchmarks.peers.{name.lower().replace('-', '_')}")
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("name", ["scipy", "scikit_image"])
@@ -210,18 +186,6 @@ def test_no_rounding_decides_what_is_bright(dtype: Any) -> None:
     assert not np.array_equal(several[1], several[2])
 
 
-def test_settings_are_the_same_in_both_orders() -> None:
-    settings = best_order(10_000)
-    assert len(set(settings)) == 10_000
-    for name, count in (("blur_scale", 10), ("blur_strength", 20), ("intensity", 50)):
-        assert len({getattr(each, name) for each in settings}) == count
-    worst = worst_order(settings)
-    assert set(worst) == set(settings)
-    assert all(a.intensity != b.intensity for a, b in itertools.pairwise(settings))
-    assert all(a.blur_scale != b.blur_scale for a, b in itertools.pairwise(worst))
-    assert len(best_order(7)) == 7
-
-
 def test_the_spread_of_a_known_blur() -> None:
     ndimage = pytest.importorskip("scipy.ndimage")
 
@@ -231,17 +195,6 @@ def test_the_spread_of_a_known_blur() -> None:
 
     # The Gaussian is cut off at 4 sigma.
     assert spread(blur, (256, 128)) == pytest.approx((6.0, 3.0), rel=2e-3)
-
-
-def test_no_call_finds_its_passes_done(renderer: vkbloom.Renderer) -> None:
-    feed = itertools.cycle(pictures((20, 10), np.float16))
-    several = [
-        contender(str(taps), renderer, feed, vkbloom.Separable(weights=(1.0,) * taps))
-        for taps in (1, 2, 3)
-    ]
-    ran = [len(each.call(turn).timings) for turn in range(4) for each in several]
-    assert set(ran) == {ran[0]}
-    assert ran[0] > 0
 
 
 # Plans
@@ -259,19 +212,6 @@ def test_a_renderer_is_made_under_the_variant(monkeypatch: pytest.MonkeyPatch) -
     Plan().renderer()
     assert os.environ[VARIANTS_VARIABLE] == "mine"
     assert seen == [("software", "fragment"), ("auto", "auto")]
-
-
-@pytest.mark.parametrize(("name", "value"), [("rounds", 2), ("requests", 0), ("threads", 0)])
-def test_numbers_out_of_range(name: str, value: int) -> None:
-    with pytest.raises(ValueError, match=f"{name}: {value} is out of range"):
-        Plan(**{name: value})  # type: ignore[arg-type]
-
-
-def test_the_command_of_a_plan() -> None:
-    assert command(Plan()) == "python -m benchmarks"
-    plan = Plan(adapter="NVIDIA H", only=("image", "cost"), quick=True, rounds=9, requests=8)
-    expected = "python -m benchmarks --adapter 'NVIDIA H' --only image --only cost --quick"
-    assert command(plan) == f"{expected} --rounds 9 --requests 8"
 
 
 # Reports
@@ -314,20 +254,6 @@ def test_report_has_page_and_json(tmp_path: Path) -> None:
         "seconds": [0.5, 1.5, 1.0],
     }
     assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
-
-
-def test_two_drivers_in_one_table(tmp_path: Path) -> None:
-    machine = {"date": "", "command": "", "adapter": "X", "adapter type": "cpu", "peers": {}}
-    first, second = (
-        Report({**machine, "driver": f"Mesa {number}"}, (Section("id", "", [], [], goals),))
-        for number, goals in ((1, [Goal("x / y", 2.0, 3.0)]), (2, [Goal("x / y", 4.0, 3.0)]))
-    )
-    write(first, tmp_path / "first.md")
-    earlier = read_earlier(tmp_path / "first.json")
-    page = write(second, tmp_path / "both.md", [earlier, Earlier("Z", {})])[0].read_text()
-    header = "| ratio of medians | wanted | measured | met | with Mesa 1 | with Z | benchmark |"
-    assert header in page
-    assert "| x / y | at least 3 | 4 | yes | 2 | not measured | id |" in page
 
 
 def test_results_are_written_before_a_later_failure(
@@ -378,38 +304,7 @@ def test_everything_runs(smoke: tuple[Result, dict[str, Any], str]) -> None:
             assert len(rounds) == 1, "all contenders of a group run equally often"
 
 
-def test_the_report_says_on_what(smoke: tuple[Result, dict[str, Any], str]) -> None:
-    _, values, page = smoke
-    machine = values["machine"]
-    only = "".join(f" --only {name}" for name in RUN)
-    assert machine["command"] == f"python -m benchmarks --adapter {ADAPTER}{only} --quick"
-    assert machine["vkbloom"] == vkbloom.__version__
-    assert machine["CPU"]
-    with vkbloom.Renderer() as renderer:
-        assert machine["adapter"] == renderer.info.name
-        assert renderer.info.driver_info in machine["driver"]
-    for name, version in machine["peers"].items():
-        assert (version is None) == (find_spec(peers.PEERS[name]) is None)
-        assert f"| {name} | {version or 'not installed'} |" in page
-
-
-def test_the_best_order_runs_fewer_passes(smoke: tuple[Result, dict[str, Any], str]) -> None:
-    (section,) = (each for each in smoke[1]["sections"] if each["id"] == "requests")
-    rows = {row[0]: int(row[3].split()[0]) for row in section["tables"][0]["rows"]}
-    many, calls, worst = rows.values()
-    # The first single call may find images of earlier calls in the cache.
-    assert many <= calls <= worst
-
-
 # The command
-
-
-def test_the_list_names_every_benchmark() -> None:
-    result = bench("--list")
-    assert result.exit_code == 0
-    assert [line.split()[0] for line in result.stdout.splitlines()] == list(BENCHMARKS)
-    for name in BENCHMARKS:
-        assert callable(importlib.import_module(f"benchmarks.{name.replace('-', '_')}").run)
 
 
 @pytest.mark.parametrize(
@@ -431,21 +326,3 @@ def test_wrong_use(arguments: tuple[str, ...], message: str, tmp_path: Path) -> 
     assert result.exit_code == 2
     assert message in result.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-def test_unwritable_report_fails_before_anything_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ran: list[Plan] = []
-    monkeypatch.setattr("benchmarks.__main__.run", ran.append)
-    (tmp_path / "file").write_text("")
-    result = bench("-o", tmp_path / "file" / "b.md")
-    assert isinstance(result.exception, OSError)
-    assert str(tmp_path) in str(result.exception)
-    assert ran == []
-
-
-def test_no_such_adapter(tmp_path: Path) -> None:
-    result = CliRunner().invoke(program, ["--adapter", "Voodoo", "-o", str(tmp_path / "b.md")])
-    assert isinstance(result.exception, vkbloom.AdapterNotFoundError)
-    assert "Voodoo" in str(result.exception)

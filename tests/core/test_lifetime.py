@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import subprocess
 import sys
 import weakref
 from collections.abc import Callable
@@ -13,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.core.builds import ROOT, compiler, volk_folder
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import open_descriptors, output
-from vkbloom import Renderer, Scene, adapters
+from vkbloom import AdapterInfo, Renderer, Scene, adapters
 
 SIZE = (64, 36)
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -132,3 +134,25 @@ def test_adapters_and_renderers_that_fail_leave_nothing(made: Callable[[], objec
     for _ in range(20):
         made()
     assert in_use() == before
+
+
+# Validation messages reach the renderer whose call caused them, also with others at work.
+
+
+@pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="has a core of its own, unsanitized")
+def test_each_device_gets_its_own(tmp_path: Path, software: AdapterInfo) -> None:
+    """In the core without Python, where a test can misuse Vulkan (messages.c)."""
+    program = tmp_path / "messages"
+    volk = volk_folder()
+    subprocess.run(
+        [
+            *compiler(),
+            *("-std=c11", "-Wall", "-Wextra", "-Werror", "-DVK_NO_PROTOTYPES"),
+            *("-Icsrc", "-I.", f"-I{volk}", *map(str, ROOT.glob("csrc/vulkan/*.c"))),
+            *("tests/core/messages.c", "-o", str(program), "-lm", "-ldl", "-lpthread"),
+        ],
+        cwd=ROOT,
+        check=True,
+    )
+    done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "ok\n")

@@ -5,19 +5,25 @@ Each runs as a program in this process. Of presets and glares it finds a few, if
 
 from __future__ import annotations
 
+import doctest
+import importlib
+import pkgutil
 import runpy
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
+from tests.processes import output
 from vkbloom.testing import _measuring as measuring
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
@@ -43,7 +49,7 @@ LONG: Final = ("tools/tables/write.py",)
 #: What is run elsewhere, by its path or folder, and where: a test, a target of make.
 ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
-    "examples/cluster/": "tests/docs/test_cluster_scripts.py",
+    "examples/cluster/": "tests/docs/test_scripts.py",
     "examples/image_quality/": "tests/plugin/test_guide.py",
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
@@ -137,3 +143,64 @@ def test_shell_scripts_parse() -> None:
     for name in listed("tools", "examples", "packaging", ".ci"):
         if not name.endswith(".py"):
             subprocess.run(["bash", "-n", ROOT / name], check=True)
+
+
+# The scripts in examples/cluster: that of one machine runs as it stands there.
+
+
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
+
+
+@witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
+def test_on_this_machine(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    xarray = pytest.importorskip("xarray")
+    for script in FOLDER.glob("*.py"):
+        shutil.copy(script, tmp_path)
+    package = str(Path(vkbloom.__file__).parents[1])
+    output("on_this_machine.py", cwd=tmp_path, PYTHONPATH=package)
+    with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
+        assert stored["final"].shape == (8, 4, 90, 160, 3)
+        assert bool(stored["done"].all())
+
+
+# The examples in docstrings run as written.
+
+
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def modules() -> Iterator[str]:
+    """The modules of the package and its plugin."""
+    yield "vkbloom"
+    for found in pkgutil.walk_packages(vkbloom.__path__, "vkbloom."):
+        if not found.name.endswith(("__main__", "._core")):
+            yield found.name
+    yield "pytest_vkbloom"
+
+
+def examples_in(module: ModuleType) -> list[doctest.DocTest]:
+    """The examples of a module, with the names that they use without importing them."""
+    names = {"np": np, "vkbloom": vkbloom}
+    found = doctest.DocTestFinder(exclude_empty=True).find(module, extraglobs=names)
+    return [test for test in found if test.examples]
+
+
+@pytest.mark.parametrize("name", list(modules()))
+def test_examples_of_a_module(name: str, request: pytest.FixtureRequest) -> None:
+    if name.endswith((".torch", ".operators")):
+        pytest.importorskip("torch", reason="PyTorch is not installed")
+    module = importlib.import_module(name)
+    report: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=FLAGS, verbose=False)
+    tests = examples_in(module)
+    if any('"software"' in one.source for test in tests for one in test.examples):
+        request.getfixturevalue("software")  # skips where there is none
+    if name not in (
+        "vkbloom._renderer.renderer",
+        "vkbloom._renderer.surface",
+    ):  # they show what closing does
+        request.getfixturevalue("kept_renderers")
+    for test in tests:
+        runner.run(test, out=report.append)
+    assert runner.failures == 0, "".join(report)

@@ -8,6 +8,7 @@ import dataclasses
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.framebuffers import decode, make, mixed
-from tests.images import noise
+from tests.images import noise, noise_image
 from vkbloom import Separable
 from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._io.srgb import encode_srgb
@@ -214,3 +215,23 @@ def test_colours_above_1_keep_their_hue(dtype: str, stops: float, tmp_path: Path
     page = decode(picture_of(image, "bloom", is_encoded=False, stops=stops), tmp_path)
     assert np.abs(shown - expected).max() <= 1
     assert np.abs(page.astype(int) - shown).max() <= 1
+
+
+# What notebooks show: plain text with padded cells.
+
+
+def test_notebooks_get_plain_text_with_padded_cells(renderer: vkbloom.Renderer) -> None:
+    """Some notebooks refuse a subclass of str, and have no padding of their own."""
+    image = noise_image(16, 16, 3)
+    shown: list[Any] = [
+        renderer.apply(image),
+        renderer.plan(image, vkbloom.Pyramid(levels=2)),
+        vkbloom.presets,
+        vkbloom.testing.report(lambda given: given, size=(32, 32), laws=("gain",)),
+        vkbloom.fit(image, image, vkbloom.Pyramid(), ["intensity"], renderer=renderer, max_calls=3),
+    ]
+    for one in shown:
+        page = one._repr_html_()
+        assert type(page) is str, one
+        cells = re.findall(r"<t[dh]\b[^>]*>", page)
+        assert all("padding" in cell for cell in cells), one

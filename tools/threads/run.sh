@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes all calls of the core in 16 threads (tests/core/all_calls.py) with a core that is built for
-# ThreadSanitizer: run.sh [CALLS] (400). PYTHON: an interpreter with the test requirements.
+# ThreadSanitizer: run.sh [CALLS] (160). PYTHON: an interpreter with the test requirements.
 set -eu
 
 cd "$(dirname "$0")/../.."
@@ -18,5 +18,5 @@ cat tools/threads/threads.supp tools/free_threaded/tsan.supp >"$folder/tsan.supp
 env LD_PRELOAD="$(${CC:-cc} -print-file-name=libtsan.so)" \
     TSAN_OPTIONS="suppressions=$folder/tsan.supp:exitcode=66:history_size=4" \
     PYTHONPATH="$folder/package:$PWD" \
-    setarch -R "$PYTHON" -m tests.core.all_calls "${1:-400}"
+    setarch -R "$PYTHON" -m tests.core.all_calls "${1:-160}"
 echo "ThreadSanitizer found nothing"
